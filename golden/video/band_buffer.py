@@ -1,4 +1,4 @@
-"""Band buffer: bands of lines that are drawn while others are shown, and which band is drawn next."""
+"""Band buffer: one band of lines is drawn while another is shown; which band is drawn next."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -11,28 +11,28 @@ __all__ = ["RGB565", "RGB888", "BandBuffer"]
 
 RGB888 = (8, 8, 8)
 RGB565 = (5, 6, 5)
-"""Bits of red, green and blue that a buffer keeps."""
+"""Numbers of bits of red, green and blue that a buffer keeps."""
 
 
 @dataclass(frozen=True)
 class BandBuffer:
-    """Two bands of colour: one is shown, the other is drawn; what was not drawn is the background.
+    """Two bands of colour: one is shown, the other is drawn; pixels that were not drawn are background.
 
-    A band of `lines` lines takes the display its lines' time, its *slot*. A band that is not complete when
-    its slot begins is *late*: the background is shown in its place, and it is dropped when it is complete.
-    Drawn next is the band after the last one, unless its slot has begun: then the band of the next slot
-    (`following`). So the lines of a frame are each either right or background, and the display's timing
-    does not depend on what is drawn.
+    The *slot* of a band is the time in which the display shows its `lines` lines. A band that is not complete
+    when its slot begins is *late*: the background is shown in its place, and the band is dropped when it is
+    complete. The next band to draw is the one after the last one; if its slot has begun, it is the band of
+    the next slot (`following`). So each line of a frame is either right or background, and the display's
+    timing does not depend on the drawing.
 
-    Colours are kept by their highest bits, ``channel >> (8 - bits)``, and shown with these repeated below:
-    black stays black, white stays white, and a channel is off by at most ``2^(8 - bits) - 1``.
+    Colours are kept as their highest bits, ``channel >> (8 - bits)``, and shown with these bits repeated
+    below: black stays black, white stays white, and the error of a channel is at most ``2^(8 - bits) - 1``.
 
     Parameters
     ----------
     mode : DisplayMode
         Size of the picture.
     lines : int
-        Of a band, a power of two that divides the picture's lines into four bands or more.
+        Number of lines of a band, a power of two that divides the picture into four bands or more.
     colour_bits : tuple of int
         `RGB888`, `RGB565` or others from 4 to 8.
     background : tuple of int
@@ -41,7 +41,7 @@ class BandBuffer:
     Raises
     ------
     ValueError
-        If the lines are no such number, or the bits or the background out of range.
+        If ``lines`` is another number, or the bits or the background are out of range.
 
     Source: docs/theory/video.md#bands.
     """
@@ -78,23 +78,23 @@ class BandBuffer:
         return (1 << 8 - min(self.colour_bits)) - 1
 
     def kept(self, colour: np.ndarray) -> np.ndarray:
-        """Channels as the buffer has them, shape (..., 3)."""
+        """Codes of channels in the buffer, shape (..., 3)."""
         return np.asarray(colour) >> 8 - np.array(self.colour_bits)
 
     def shown(self, code: np.ndarray) -> np.ndarray:
-        """Channels of 8 bits, shape (..., 3), of those that the buffer has."""
+        """Channels of 8 bits, shape (..., 3), from codes in the buffer."""
         bits = np.array(self.colour_bits)
         return np.asarray(code) << 8 - bits | np.asarray(code) >> 2 * bits - 8
 
     def compute(self, picture: np.ndarray, late: Collection[int] = ()) -> np.ndarray:
-        """The frame that is shown of a picture that is drawn.
+        """The shown frame for a drawn picture.
 
         Parameters
         ----------
         picture : int array, shape (height, width, 3)
-            With the background where nothing is drawn.
+            Channels of 8 bits, with the background where nothing is drawn.
         late : collection of int
-            Bands that were late.
+            Indices of bands that were late.
         """
         shown = self.shown(self.kept(picture))
         for band in late:

@@ -1,4 +1,4 @@
-"""Band depth: the depths of one band, cleared for the next by a tag."""
+"""Band depth: a memory for the depths of one band, cleared for the next band by a tag."""
 
 from dataclasses import dataclass
 
@@ -11,20 +11,25 @@ __all__ = ["BandDepth"]
 
 @dataclass(frozen=True)
 class BandDepth:
-    """A memory of depths of which every word counts as cleared that was not written in this band.
+    """A memory of depths; a word that was not written in the present band counts as cleared.
 
     A word holds a depth and a tag of ``tag_bits`` bits: the number of the band in which it was written,
-    modulo ``2^tag_bits``. Another tag than the present one reads as `DepthTest.CLEARED`. So that no tag comes
-    round again, ``swept`` words are written with the tag before the present one when a band begins, in turn
-    those that were swept longest ago: with ``2^t`` tags every word is swept again at most ``2^t - 2`` bands
-    later, one before that tag is the present one.
+    modulo ``2^tag_bits``. A word with another tag than the present one reads as `DepthTest.CLEARED`. An old
+    tag must not become the present one again. So when a band begins, ``swept`` words are written with the tag
+    before the present one, first those that were swept longest ago: with ``2^t`` tags every word is swept
+    again at most ``2^t - 2`` bands later, one band before its tag would be the present one.
 
     Parameters
     ----------
     size : (int, int)
         Width and lines of a band.
     tag_bits : int
-        2 to 8.
+        Bits of a tag, 2 to 8.
+
+    Raises
+    ------
+    ValueError
+        If ``tag_bits`` is out of range.
 
     Source: docs/theory/video.md#bands; not in the documents.
     """
@@ -38,27 +43,27 @@ class BandDepth:
 
     @property
     def words(self) -> int:
-        """Pixels of a band."""
+        """Number of words: the pixels of a band."""
         return self.size[0] * self.size[1]
 
     @property
     def swept(self) -> int:
-        """Words swept for a band."""
+        """Number of words that are swept when a band begins."""
         return -(-self.words // ((1 << self.tag_bits) - 2))
 
     def compute(
         self, begins: np.ndarray, writes: np.ndarray, place: np.ndarray, depth: np.ndarray
     ) -> np.ndarray:
-        """What reads give: of each step the last depth written at its place since the last band began.
+        """Depth read at each step: the last one written at its place since the present band began.
 
         Parameters
         ----------
         begins : bool array, shape (N,)
-            Steps on which a band begins; its other words mean nothing.
+            Steps on which a band begins; its other words have no effect.
         writes : bool array, shape (N,)
             Steps that write ``depth`` after they have read.
         place, depth : int64 arrays, shape (N,)
-            Where, and what.
+            Index of the word, and depth.
         """
         band = np.cumsum(begins)
         key = band * self.words + place

@@ -1,4 +1,4 @@
-"""Clock plan: dividers of one PLL for the clocks of a display and of what draws for it."""
+"""Clock plan: dividers of one PLL for the clocks of a display and of the drawing logic."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -7,26 +7,26 @@ from math import ceil
 __all__ = ["ClockPlan", "NoClockPlan", "clock_plan"]
 
 VCO = (400_000_000, 800_000_000)
-"""Rates of the oscillator of an ECP5's PLL, Hz."""
+"""Lowest and highest rate of the oscillator of an ECP5's PLL, Hz."""
 
 PHASE_DETECTOR = 3_125_000
-"""Lowest rate of its phase detector, Hz."""
+"""Lowest rate of the PLL's phase detector, Hz."""
 
 DIVIDERS, FEEDBACK_DIVIDERS = 128, 80
-"""Largest divider of its reference and of an output, and of its feedback."""
+"""Largest divider of the PLL's reference and outputs, and largest divider of its feedback."""
 
 FEEDBACK = 200_000_000
-"""Highest rate that is fed back, Hz: the PLL's outputs go to 400 MHz."""
+"""Highest rate of the fed-back output, Hz, although the PLL's outputs go to 400 MHz."""
 
 SERIAL = 5
 """Rate of the serial clock over that of the pixel clock."""
 
 TOLERANCE = Fraction(1, 200)
-"""Share by which a display's pixel clock may be off."""
+"""Largest relative error of a display's pixel clock."""
 
 
 class NoClockPlan(ValueError):
-    """No dividers give the clocks that are asked for."""
+    """Raised if no dividers give the wanted clocks."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class ClockPlan:
     reference : int
         Rate of the board's clock, Hz.
     input_divider, feedback_divider : int
-        Of the reference, and of what is fed back.
+        Dividers of the reference, and of the output that is fed back.
     loop, serial, pixel, draw : int
-        Dividers of the outputs.
+        Dividers of the outputs; ``loop`` of the one that is fed back.
 
     Source: docs/theory/video.md#display.
     """
@@ -69,21 +69,21 @@ class ClockPlan:
 
 
 def clock_plan(reference: int, pixel_rate: float, draw_rate: float) -> ClockPlan:
-    """The plan whose pixel clock is nearest to what is asked for; of equal ones the fastest drawing clock.
+    """The plan with the nearest pixel clock; among equal ones, that with the fastest drawing clock.
 
     Parameters
     ----------
     reference : int
         Rate of the board's clock, Hz.
     pixel_rate : float
-        Pixel clock, Hz; within `TOLERANCE`.
+        Wanted pixel clock, Hz; the plan's is within `TOLERANCE`.
     draw_rate : float
-        The drawing clock is this, Hz, or less.
+        Largest rate of the drawing clock, Hz.
 
     Raises
     ------
     NoClockPlan
-        If there is none.
+        If there is no plan.
 
     Source: docs/theory/video.md#display.
     """

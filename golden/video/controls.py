@@ -1,4 +1,4 @@
-"""Controls: what buttons do to the frames that follow."""
+"""Controls: angle and preset of the next frames, by buttons."""
 
 from dataclasses import dataclass, replace
 
@@ -7,21 +7,21 @@ from blysk.golden.video.motion import ANGLE_BITS
 __all__ = ["BUTTONS", "ControlState", "Controls"]
 
 BUTTONS = ("pause", "step", "material", "light")
-"""What each button does: stop or go on; other way or, in a pause, one step; next material; next light."""
+"""Buttons: stop or go on; turn the other way, or in a pause one step; next material; next light."""
 
 
 @dataclass(frozen=True)
 class ControlState:
-    """State between frames.
+    """State of the controls between frames.
 
     Parameters
     ----------
     angle : int
-        Of the frame.
+        Code of the frame's angle.
     running, backwards : bool
-        Whether frames turn, and which way.
+        Whether the angle changes from frame to frame, and whether it decreases.
     material, light : int
-        Chosen preset.
+        Indices of the chosen preset.
     """
 
     angle: int = 0
@@ -33,22 +33,22 @@ class ControlState:
 
 @dataclass(frozen=True)
 class Controls:
-    """Angle and preset of each frame from buttons.
+    """Angle and preset of each frame, controlled by buttons.
 
-    A button is looked at every `2^debounce_bits` cycles, which is longer than it bounces, and counts when it
-    is down and was up before; the press of ``step`` turns by one step in a pause, else it turns the motion
-    round. The list of a frame is that of ``light * materials + material``.
+    A button is sampled every ``2^debounce_bits`` cycles, which is longer than it bounces; it is pressed when
+    it is down and was up in the sample before. In a pause the press of ``step`` turns by one step, else it
+    reverses the motion. The list of a frame has the index ``light * materials + material``.
 
     Parameters
     ----------
     materials, lights : int
-        How many presets there are of each, 1 or more.
+        Numbers of materials and of lights among the presets, 1 to 64.
     step : int
-        Codes of an angle from a frame to the next.
+        Codes of an angle from a frame to the next, 1 to 4095.
     first : int
-        Angle before the first frame.
+        Code of the angle before the first frame, 0 to 4095.
     debounce_bits : int
-        Of the counter of the cycles between two looks: 10 ms of 52 MHz by default.
+        Bits of the counter of cycles between two samples, 1 to 24; the default is 10 ms at 52 MHz.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class Controls:
         return replace(state, angle=self._turned(state)) if state.running else state
 
     def list_of(self, state: ControlState) -> int:
-        """Index of the list that is walked."""
+        """Index of the list of commands for a state."""
         return state.light * self.materials + state.material
 
     def _turned(self, state: ControlState) -> int:

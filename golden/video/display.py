@@ -19,21 +19,21 @@ __all__ = ["Display", "LaneError"]
 
 
 class LaneError(ValueError):
-    """Lanes that no display would show as the mode asks for, in one line."""
+    """Raised for lanes that break a rule of the display mode; the message is one line."""
 
 
 @dataclass(frozen=True)
 class Display:
-    """Words of four lanes, of frames in a mode: blue with both sync signals, green, red, and the clock.
+    """Words of four lanes for frames in a mode: blue with both sync signals, green, red, and the clock.
 
-    `compute` makes the words of a frame; `decode` finds words in bits as a display does, by the control
-    words, and checks them: that each is a control word just where the mode is blank, both sync signals pulse
-    where they should, lanes are aligned with the clock's, and no lane leans further than `MAX_DISPARITY`.
+    `compute` makes the words of frames; `decode` finds words in bits as a display does, by the control words,
+    and checks four rules: words are control words exactly where the mode is blank, both sync signals pulse at
+    the right pixels, lanes are aligned with the lane of the clock, and no disparity exceeds `MAX_DISPARITY`.
 
     Parameters
     ----------
     mode : DisplayMode
-        Of the display.
+        Mode of the display.
 
     Source: docs/theory/video.md#tmds.
     """
@@ -41,7 +41,7 @@ class Display:
     mode: DisplayMode = VGA
 
     def compute(self, frames: np.ndarray) -> np.ndarray:
-        """Words of frames from power-up: from the first blank line before the first of them.
+        """Words of frames from power-up: from the first blank line before the first frame on.
 
         Parameters
         ----------
@@ -62,12 +62,12 @@ class Display:
         return np.stack([*lanes, np.full(len(active), CLOCK_WORD)], axis=-1)
 
     def decode(self, bits: np.ndarray) -> np.ndarray:
-        """Frames of bits, shape (n, height, width, 3): all that are whole.
+        """All whole frames in the bits of lanes, shape (n, height, width, 3).
 
         Parameters
         ----------
         bits : int array, shape (n, 4)
-            In the order in which they are sent, from any bit on.
+            Bits of the lanes in the order in which they are sent, from any bit on.
 
         Raises
         ------
@@ -81,7 +81,7 @@ class Display:
         active = ~is_control[:, 0]
         control = np.searchsorted(np.sort(CONTROL_WORDS), words[:, 0])
         control = np.argsort(CONTROL_WORDS)[np.minimum(control, 3)]
-        # Where a frame begins: the first pixel after a blank line or more.
+        # A frame begins with the first pixel after at least one blank line.
         blank = np.diff(np.r_[-1, np.flatnonzero(active)])
         line = self.mode.horizontal
         tops = np.flatnonzero(active)[blank > line.total]
@@ -106,12 +106,12 @@ class Display:
         return frames
 
     def words(self, bits: np.ndarray) -> np.ndarray:
-        """Words of bits, shape (n // 10, 4), cut where control words stand.
+        """Words in the bits of lanes, shape (n // 10, 4), aligned by control words.
 
         Raises
         ------
         LaneError
-            If no cut gives runs of control words, or the clock's lane is not the clock at it.
+            If no alignment gives runs of control words, or the lane of the clock has another word.
         """
         weights = 1 << np.arange(BITS)
         counts = []
@@ -134,7 +134,7 @@ class Display:
         return words
 
     def _check_sync(self, control: np.ndarray, active: np.ndarray, tops: np.ndarray) -> None:
-        """Both sync signals in the blank parts of lines, from the first frame's top to the last one's."""
+        """Check both sync signals where lines are blank, from the first frame's top to the last one's."""
         for top, following in pairwise(tops):
             if following - top != self.mode.cycles:
                 raise LaneError(f"a frame lasts {following - top} pixels, not {self.mode.cycles}")
@@ -149,12 +149,12 @@ class Display:
 
     @staticmethod
     def _check_balance(words: np.ndarray, is_control: np.ndarray) -> None:
-        """Ones less zeros since the last control word, after every word of colour."""
+        """Check the disparity, ones minus zeros since the last control word, after every word of colour."""
         lean = 2 * bits_of(words[:, :3]).sum(-1) - BITS
         total = np.cumsum(np.where(is_control, 0, lean), axis=0)
         start = np.maximum.accumulate(np.where(is_control, np.arange(len(words))[:, np.newaxis], 0), axis=0)
         total = total - np.take_along_axis(total, start, axis=0)
-        # What came before the first control word began somewhere.
+        # Before the first control word the start of the sum is unknown.
         seen = np.maximum.accumulate(is_control, axis=0)
         if (np.abs(total)[seen] > MAX_DISPARITY).any():
             raise LaneError("a lane sends more ones than zeros, or fewer, than a balanced one may")

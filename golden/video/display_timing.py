@@ -1,4 +1,4 @@
-"""Display timing: which pixel a display shows on each cycle of the pixel clock, and its sync pulses."""
+"""Display timing: pixel and sync signals of a display on each cycle of the pixel clock."""
 
 from dataclasses import dataclass, field
 
@@ -14,7 +14,7 @@ class Axis:
     Parameters
     ----------
     visible, front, sync, back : int
-        Each at least 1, in this order.
+        Lengths of the parts in this order, each at least 1.
     positive : bool
         Whether the sync signal is high during its pulse.
 
@@ -36,23 +36,23 @@ class Axis:
 
     @property
     def total(self) -> int:
-        """All four parts."""
+        """Length of all four parts together."""
         return self.visible + self.front + self.sync + self.back
 
     @property
     def pulse(self) -> tuple[int, int]:
-        """First position of the sync pulse, and the first after it."""
+        """First position of the sync pulse, and first position after it."""
         return self.visible + self.front, self.visible + self.front + self.sync
 
 
 @dataclass(frozen=True)
 class DisplayMode:
-    """A mode of a display: 640x480 at 60 Hz unless told otherwise, 800x525 with its porches.
+    """A mode of a display; the default is 640x480 at 60 Hz, 800x525 with its porches.
 
     Parameters
     ----------
     horizontal, vertical : Axis
-        A line, and a frame of lines.
+        Parts of a line, and of a frame.
     refresh : float
         Frames a second.
 
@@ -85,11 +85,12 @@ VGA = DisplayMode()
 
 @dataclass(frozen=True)
 class DisplayTiming:
-    """Position, whether it is in the picture, and both sync signals, a cycle of the pixel clock each.
+    """Position, whether it is in the picture, and both sync signals, for each cycle of the pixel clock.
 
     Cycle 0 is the first pixel below the picture, so that the blank lines come before the first frame. The
-    position counts through the porches: x below the line's total, y below the frame's. The vertical signal
-    changes where the horizontal pulse begins, so that its porches count from the last pixel's end. Exact.
+    position counts the porches, too: x is below the line's total, y below the frame's total. The vertical
+    sync signal changes at the start of the horizontal pulse, so that its porches count from the last pixel's
+    end.
 
     Parameters
     ----------
@@ -109,7 +110,7 @@ class DisplayTiming:
         count : int
             Cycles.
         first : int
-            The first of them.
+            First cycle.
         """
         line, frame = self.mode.horizontal, self.mode.vertical
         position = (np.arange(first, first + count) + frame.visible * line.total) % self.mode.cycles

@@ -1,4 +1,4 @@
-"""Draw commands: lists that are walked for every band, and what a scene compiles to."""
+"""Draw commands: lists of commands that are executed for every band, and their making from a mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,12 +40,12 @@ class DrawCommands:
     words : int64 array, shape (C, 4)
         Kind, index, first, count.
     starts : tuple of int
-        Where each list begins.
+        Index of each list's first command.
 
     Raises
     ------
     ValueError
-        If a field does not fit, or a list does not end.
+        If a field does not fit, a kind is unknown, or the last command is not ``end``.
 
     Source: docs/theory/video.md#bands; [T] chapter 4.
     """
@@ -65,16 +65,16 @@ class DrawCommands:
     def of(
         cls, mesh: MeshMemory, presets: Sequence[Sequence[FrameConstants]], cull: Sequence[int] = ()
     ) -> "DrawCommands":
-        """A list for each preset: its constants, then each part transformed by the slot of its number, drawn.
+        """A list for each preset: its constants, a transform of each part by its own slot, and the draws.
 
         Parameters
         ----------
         mesh : MeshMemory
-            What is drawn.
+            Meshes to draw.
         presets : sequence of sequence of FrameConstants
-            Of each preset the constants of every material.
+            For each preset, the constants of every material.
         cull : sequence of int
-            Parts left out.
+            Indices of parts that are left out.
         """
         rows, starts = [], []
         for constants in presets:

@@ -1,4 +1,4 @@
-"""Drawing a frame band by band: from a mesh in memory to the pixels of each band."""
+"""Draw unit: from a mesh in memory to the pixels of each band of a frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -31,13 +31,13 @@ class BandPixels:
     Parameters
     ----------
     band : int
-        Index, 0 at the top.
+        Index of the band, 0 at the top.
     x, y : int64 arrays, shape (P,)
         Column, and line of the band.
     color : uint8 array, shape (P, 3)
         Red, green, blue.
     counts : dict of str to int
-        Those of `TriangleAssembly` and of `Renderer`.
+        Counters of `TriangleAssembly` and of `Renderer`.
     """
 
     band: int
@@ -51,9 +51,9 @@ class BandPixels:
 class Drawing:
     """Bit-accurate model of drawing in bands: a mesh memory, its motion, lists of commands, a renderer.
 
-    A frame's vertices are transformed once; its triangles are walked for every band, clipped to its lines,
-    and shaded. As a pixel's depth and colour follow from its triangle alone, whatever the clipping, the bands
-    together are the picture of the whole frame, to the bit.
+    A frame's vertices are transformed once; for every band all triangles are read, clipped to the lines of
+    the band, and shaded. As depth and colour of a pixel depend on its triangle and not on the clipping, the
+    bands together are the picture of the whole frame, to the bit.
 
     Parameters
     ----------
@@ -64,24 +64,25 @@ class Drawing:
     commands : DrawCommands
         Lists, one for each preset of ``controls``.
     presets : tuple of tuple of FrameConstants
-        What the lists write, of each material.
+        Constants that the lists write, of each preset and material.
     renderer : Renderer
-        Of a design whose ``x_bits`` and ``y_bits`` hold a band.
+        Renderer with a design whose ``x_bits`` and ``y_bits`` are those of `place_bits`.
     size : (int, int)
         Width and height of the picture.
     frames : tuple of Frame
-        The whole picture by preset: a highlight that is steeper cuts spans shorter.
+        The whole picture for each preset, as spans are cut shorter for a steeper highlight.
     controls : Controls
         Angle and preset of each frame.
     lines : int
-        Of a band.
+        Number of lines of a band.
     transform : VertexTransform
-        Of vertices.
+        Vertex unit.
 
     Raises
     ------
     ValueError
-        If the design is made for another size, or presets and lists differ in number.
+        If the design is made for another size, the numbers of lists, presets and frames are not that of the
+        controls, or the numbers of slots and parts differ.
 
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
@@ -112,7 +113,7 @@ class Drawing:
 
     @staticmethod
     def place_bits(size: tuple[int, int], lines: int) -> tuple[int, int]:
-        """Bits of a column and of a line of a band, as a design is to have them."""
+        """Bits of a column and of a line of a band: ``x_bits`` and ``y_bits`` of the design."""
         return max((size[0] - 1).bit_length(), 1), max((lines - 1).bit_length(), 1)
 
     @classmethod
@@ -132,20 +133,20 @@ class Drawing:
         Parameters
         ----------
         scenes : sequence of Scene
-            Of one mesh, camera and size; they differ in materials and lights, and are the presets.
+            The presets: scenes with the same mesh, camera and size, and different materials and lights.
         design : Design, optional
             Shading; its ``x_bits`` and ``y_bits`` are replaced. By default `board_design` for the lights and
             materials of the scenes.
         lines : int
-            Of a band.
+            Number of lines of a band.
         axis : three floats
-            The axis.
+            Axis of the rotation.
         controls : Controls, optional
-            By default every scene is a material.
+            Buttons; by default every scene is a material of the controls.
         transform : VertexTransform, optional
-            Of vertices.
+            Vertex unit.
         angle : float, optional
-            As `sent_triangles` has it.
+            As for `sent_triangles`.
 
         Raises
         ------
@@ -183,17 +184,17 @@ class Drawing:
 
     @property
     def assembly(self) -> TriangleAssembly:
-        """Assembly of its triangles."""
+        """Bit-accurate model of the triangle assembly."""
         return TriangleAssembly(self.mesh, self.transform.grid)
 
     def rows(self, band: int, preset: int = 0) -> Frame:
-        """The frame of a band."""
+        """The frame, clipped to the lines of a band."""
         frame = self.frames[preset]
         top = frame.top + band * self.lines
         return replace(frame, top=top, bottom=min(top + self.lines, frame.bottom))
 
     def vertices(self, angle: int) -> ScreenVertices:
-        """All vertices at an angle's code."""
+        """All vertices on the screen, at the code of an angle."""
         made = [
             self.transform.compute(
                 self.mesh.position[part.first : part.first + part.count],
@@ -206,7 +207,7 @@ class Drawing:
         return ScreenVertices(*(np.concatenate([getattr(part, name) for part in made]) for name in names))
 
     def triangles(self, angle: int, preset: int, rows: Frame) -> tuple[Triangles, dict[str, int]]:
-        """Triangles of some scanlines, and what the assembly counts."""
+        """Triangles of some scanlines, and the counters of the assembly."""
         words = self.commands.compute(self.commands.starts[preset], True)
         draws = words[words[:, 0] == KINDS.index("draw")]
         return self.assembly.compute(
@@ -219,7 +220,7 @@ class Drawing:
         Parameters
         ----------
         band : int
-            Index.
+            Index of the band.
         angle : int
             Code of the angle.
         preset : int
@@ -231,7 +232,7 @@ class Drawing:
         return BandPixels(band, drawn.x, drawn.y, drawn.color, counts | drawn.counts)
 
     def whole(self, angle: int, preset: int = 0) -> DrawnPixels:
-        """The same triangles through a renderer of whole frames."""
+        """Pixels of the same triangles from a renderer of whole frames."""
         design = self.renderer.design
         y_bits = max((self.size[1] - 1).bit_length(), 1)
         renderer = Renderer(replace(design, y_bits=y_bits), self.renderer.geometry)
@@ -249,21 +250,21 @@ class Drawing:
 
 
 def board_design(lights: int = 1, materials: int = 1) -> Design:
-    """The shading that a small device shows a picture with: chord, cosquad, a span each 9 cycles.
+    """The shading pipeline for a small device: chord, cosquad, a span every 9 cycles.
 
-    13 multipliers with one light, where a span each 3 cycles takes 18; with the geometry's 10, and one each
-    for vertices and motion, 25 of the 28 of an ECP5-25F.
+    It has 13 multipliers with one light, where a span every 3 cycles would take 18. With 10 for geometry, and
+    one each for vertices and motion, these are 25 of the 28 multipliers of an ECP5-25F.
 
     Parameters
     ----------
     lights, materials : int
-        As `Design` has them.
+        As for `Design`.
     """
     return preset("chord", "cosquad", lights, materials=materials, setup_interval=9)
 
 
 def turned(scene: Scene, angle: int, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> Scene:
-    """The scene whose mesh is turned by an angle's code, in float64: what the frame should show."""
+    """The scene with its mesh turned by the code of an angle, in float64: what the frame should show."""
     mesh = scene.mesh
     centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     turn = rotation(axis, Motion.radians(angle))

@@ -12,16 +12,16 @@ from blysk.golden.reference.geometry import Mesh
 __all__ = ["BLOCK_BITS", "MeshMemory", "Part", "block_rams"]
 
 BLOCK_BITS = 36
-"""Width of an ECP5's block RAM of 512 words."""
+"""Width in bits of an ECP5's block RAM with 512 words."""
 
 _BLOCK_WORDS = 512
 
 
 def block_rams(words: int, width: int) -> int:
-    """Block RAMs of an ECP5 (18 kbit, 36 bits wide at most) that a memory of so many words takes, at least.
+    """Least number of block RAMs of an ECP5 (18 kbit, at most 36 bits wide) for a memory.
 
-    Blocks have ``512 2^k`` words of ``36 / 2^k`` bits, 9 down to 1 bit from 2048 words on without the ninth
-    for bits; the best k is taken.
+    Blocks have 512 words of 36 bits, 1024 of 18, 2048 of 9, 4096 of 4, 8192 of 2 or 16384 of 1; the best
+    shape is taken.
     """
     shapes = ((512, 36), (1024, 18), (2048, 9), (4096, 4), (8192, 2), (16384, 1))
     return min(-(-words // depth) * -(-width // bits) for depth, bits in shapes)
@@ -34,13 +34,13 @@ class Part:
     Parameters
     ----------
     first, count : int
-        Its vertices.
+        First vertex and number of vertices.
     draws : tuple of (int, int, int)
-        Material, first triangle and triangles of each of its ranges.
+        Material, first triangle and number of triangles of each range.
     centre : float64 array, shape (3,)
-        Where the middle of its box was, in world units.
+        Middle of the mesh's box, in world units.
     scale : float
-        World units of 1 in the memory.
+        Length in world units of 1 in the memory.
     """
 
     first: int
@@ -54,14 +54,14 @@ class Part:
 class MeshMemory:
     """Contents of the memories of vertices and of triangles.
 
-    Positions count from the middle of their mesh's box in such units that the largest component is ONE;
-    they and the normals are rounded to ``SQ(1, 17)``, so that a position is off by at most 2^-18 of half the
-    box's longest side.
+    Positions count from the middle of their mesh's box, in units in which the largest component is ONE.
+    Positions and normals are rounded to ``SQ(1, 17)``, so that the error of a position is at most 2^-18 of
+    half the box's longest side.
 
     Parameters
     ----------
     position, normal : int64 arrays, shape (V, 3)
-        ``SQ(1, 17)``.
+        Positions and unit normals, ``SQ(1, 17)``.
     faces : int64 array, shape (T, 3)
         Indices of the corners.
     parts : tuple of Part
@@ -85,12 +85,12 @@ class MeshMemory:
 
     @classmethod
     def of(cls, meshes: Sequence[Mesh]) -> "MeshMemory":
-        """The memory of meshes; triangles of one material follow each other.
+        """The memory of meshes, with the triangles of a mesh sorted by material.
 
         Raises
         ------
         ValueError
-            If there are more than `LARGEST` - 1 vertices or triangles.
+            If there are no vertices or triangles, or more than `LARGEST` - 1.
         """
         positions, normals, faces, parts = [], [], [], []
         vertices = triangles = 0
@@ -141,7 +141,7 @@ class MeshMemory:
         return _words(self.faces, self.index_bits)
 
     def world(self, part: Part) -> Mesh:
-        """The mesh that a part stands for, as it is stored."""
+        """The mesh of a part in world units, as it is stored."""
         chosen = slice(part.first, part.first + part.count)
         position = Fixed(COMPONENT, self.position[chosen]).values * part.scale + part.centre
         normal = self.normal[chosen] / np.linalg.norm(self.normal[chosen], axis=1, keepdims=True)
@@ -150,7 +150,7 @@ class MeshMemory:
         return Mesh(position, self.faces[np.concatenate(ranges)] - part.first, normal, material)
 
     def blocks(self, screen_bits: int) -> int:
-        """Block RAMs of vertices, triangles, and screen vertices of so many bits."""
+        """Number of block RAMs for vertices, triangles, and screen vertices of ``screen_bits`` bits."""
         return (
             block_rams(self.vertices, self.VERTEX_BITS)
             + block_rams(self.triangles, 3 * self.index_bits)
@@ -159,7 +159,7 @@ class MeshMemory:
 
     @classmethod
     def triangles_that_fit(cls, blocks: int, screen_bits: int, vertices_per_triangle: float = 0.6) -> int:
-        """Triangles of a mesh that fit so many block RAMs.
+        """Largest number of triangles of a mesh that fits a number of block RAMs.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class MeshMemory:
         screen_bits : int
             Bits of a screen vertex.
         vertices_per_triangle : float
-            A closed mesh has 0.5 and some more for its seams.
+            Vertices over triangles: 0.5 for a closed mesh, and more for its seams.
         """
         best = 0
         for triangles in range(1, cls.LARGEST):

@@ -16,20 +16,20 @@ from blysk.golden.video.vertex_unit import ENTRY, OFFSET, Matrix, VertexTransfor
 __all__ = ["ANGLE_BITS", "ENTRIES", "Motion", "rotation"]
 
 ANGLE_BITS = 12
-"""Bits of an angle, a whole turn."""
+"""Number of bits of an angle; ``2^12`` codes are a whole turn."""
 
 ENTRIES = 21
 """Words of a matrix: nine of positions, three offsets, nine of normals."""
 
 
 def rotation(axis: Sequence[float], angle: float) -> np.ndarray:
-    """Matrix that turns by an angle in radians around an axis, anticlockwise seen against it, in float64."""
+    """Matrix of a rotation in radians, anticlockwise if the axis points to the viewer; float64."""
     constant, cosine, sine = _turns(axis)
     return constant + np.cos(angle) * cosine + np.sin(angle) * sine
 
 
 def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """``a a^T``, ``1 - a a^T`` and the cross product's matrix, of the unit axis a."""
+    """``a a^T``, ``1 - a a^T`` and the matrix of the cross product with a, the unit axis."""
     x, y, z = a = normalise(axis)
     along = np.outer(a, a)
     return along, np.eye(3) - along, np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -39,20 +39,20 @@ def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 class Motion:
     """Entries ``c0 + c1 cos a + c2 sin a`` of the matrices of turning meshes.
 
-    Whatever the axis and the camera, every entry of camera times rotation has this form. The sine of
-    ``(k + 1/2) 2 pi / 2^12`` stands in a table of a quarter turn, 1024 words, in ``SQ(2, 16)``; the half step
-    makes the other quarters its mirror images. Two products an entry; their sum with c0 is rounded to 20
-    fraction bits for offsets, to 16 for the others.
+    With any axis and camera, every entry of camera times rotation has this form. The sines of
+    ``(k + 1/2) 2 pi / 2^12`` are in a table of a quarter turn, 1024 words, in ``SQ(2, 16)``; due to the half
+    step the other quarters are its mirror images. An entry takes two products; their sum with c0 is rounded
+    to 20 fraction bits for offsets, to 16 for the other entries.
 
-    An entry is off by at most `ENTRY_ERROR`: 2^-17 for each of sine and cosine times coefficients below 2;
-    2^-17 for each of those; 2^-21 for c0; and half a step for the rounding.
+    The error of an entry is at most `ENTRY_ERROR`: 2^-17 each for sine and cosine, times coefficients below
+    2; 2^-17 each for c1 and c2; 2^-21 for c0; and half a step for the rounding.
 
     Parameters
     ----------
     constant : int64 array, shape (S, 21)
-        c0 of each slot, `OFFSET`.
+        c0 of each slot, codes of `OFFSET`.
     cosine, sine : int64 arrays, shape (S, 21)
-        c1 and c2, `ENTRY`.
+        c1 and c2 of each slot, codes of `ENTRY`.
 
     Raises
     ------
@@ -78,20 +78,20 @@ class Motion:
         axis: Sequence[float] = (0.0, 1.0, 0.0),
         unit: VertexTransform | None = None,
     ) -> "Motion":
-        """Slots of a memory's parts: each turns around an axis through its own middle, before a camera.
+        """Motion with a slot for each part of a memory: it turns around an axis through its own middle.
 
         Parameters
         ----------
         mesh : MeshMemory
             The parts.
         camera : Camera
-            A perspective one.
+            Perspective camera.
         size : (int, int)
             Width and height of the picture, which is in the middle of the grid.
         axis : three floats
-            The axis.
+            Axis of the rotation.
         unit : VertexTransform, optional
-            Its ``scale_bits`` count.
+            Vertex unit; only its ``scale_bits`` matter.
 
         Raises
         ------
@@ -136,7 +136,7 @@ class Motion:
 
     @staticmethod
     def radians(angle: int) -> float:
-        """The angle that a code stands for."""
+        """The angle of a code, in radians."""
         return (angle + 0.5) * 2 * np.pi / (1 << ANGLE_BITS)
 
     def turn(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -152,7 +152,7 @@ class Motion:
         return sine(np.asarray(angle) + quarter), sine(np.asarray(angle))
 
     def compute(self, slot: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Bit-accurate entries, shape (..., 21), in `OFFSET`; those but the offsets have 16 fraction bits.
+        """Bit-accurate entries, shape (..., 21): codes of `OFFSET` for the offsets, else of `ENTRY`.
 
         Parameters
         ----------

@@ -14,15 +14,15 @@ LANES = 4
 
 @dataclass(frozen=True)
 class Serialiser:
-    """Ten bits as five pairs, bit 0 first: of a pair bit 0 is sent first. Exact.
+    """Words of ten bits as five pairs each, from bit 0 on; bit 0 of a pair is sent first.
 
     An output cell sends both bits of a pair within one cycle of the serial clock (double data rate), so that
-    this is five times the pixel clock.
+    the serial clock is five times the pixel clock.
 
     Parameters
     ----------
     lanes : int
-        Words at a time.
+        Number of lanes.
 
     Source: docs/theory/video.md#tmds.
     """
@@ -37,7 +37,7 @@ class Serialiser:
         Parameters
         ----------
         words : int64 array, shape (n, lanes)
-            Ten bits each.
+            Words of ten bits.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""TMDS encoder: a byte of colour as ten bits with few transitions and no direct current; and back."""
+"""TMDS encoder: a byte of colour as ten bits with few transitions and no direct current; and decoder."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ BITS = 10
 """Bits of a word; bit 0 is sent first."""
 
 CONTROL_WORDS = (0b1101010100, 0b0010101011, 0b0101010100, 0b1010101011)
-"""Words outside the picture, by ``c1 c0``: seven transitions or more, which no word of colour has."""
+"""Words outside the picture, by ``c0 + 2 c1``: with seven transitions or more, unlike words of colour."""
 
 CLOCK_WORD = 0b1111100000
 """What the clock's lane repeats: a word begins with its falling edge."""
 
 MAX_DISPARITY = 8
-"""Largest running disparity after a word: ones less zeros sent since the last control word."""
+"""Largest running disparity after a word: ones minus zeros sent since the last control word."""
 
 
 def bits_of(words: np.ndarray, count: int = BITS) -> np.ndarray:
@@ -26,15 +26,15 @@ def bits_of(words: np.ndarray, count: int = BITS) -> np.ndarray:
 
 @dataclass(frozen=True)
 class TmdsEncoder:
-    """Ten bits for each byte, after figure 3-5 of DVI 1.0: first few transitions, then the balance.
+    """Ten bits for each byte, after figure 3-5 of DVI 1.0: a step for few transitions, then one for balance.
 
-    Bit 0 of the *chain* is that of the byte; each further bit is the byte's, XOR or XNOR the bit before it:
-    XNOR where the byte has more than four ones, or four of which bit 0 is none. Bit 8 tells which, 1 for XOR.
-    Then the eight bits are sent as they are or inverted, as bit 9 tells, so that the running disparity comes
-    nearer to 0. In a control period one of `CONTROL_WORDS` is sent, and the disparity becomes 0.
+    Bit 0 of the *chain* is bit 0 of the byte; each further bit is the bit of the byte XOR or XNOR the chain's
+    bit before. XNOR is taken if the byte has more than four ones, or four ones and bit 0 is 0. Bit 8 is 1 for
+    XOR, 0 for XNOR. Then the eight bits are sent as they are, or inverted with bit 9 set, so that the running
+    disparity comes nearer to 0. In a control period one of `CONTROL_WORDS` is sent, and the disparity becomes
+    0.
 
-    Exact: every word decodes to its byte. The running disparity stays even and within `MAX_DISPARITY`,
-    whatever is sent.
+    Every word decodes to its byte. The running disparity stays even and within `MAX_DISPARITY` for all data.
 
     Source: docs/theory/video.md#tmds.
     """
@@ -56,16 +56,16 @@ class TmdsEncoder:
         Parameters
         ----------
         chain : int64 array
-            From `chain`.
+            Result of `chain`.
         disparity : int64 array
-            Before the word; even.
+            Running disparity before the word; even.
         """
         xor = chain >> 8 & 1
         excess = 2 * bits_of(chain & 255, 8).sum(-1) - 8
         even = (disparity == 0) | (excess == 0)
         invert = np.where(even, 1 - xor, (disparity > 0) == (excess > 0))
         word = np.where(invert, ~chain & 255, chain & 255) | xor << 8 | invert << 9
-        # Ones less zeros of the word: its eight bits, and the two that tell of them.
+        # Ones minus zeros of the word: of its eight bits, and of bits 8 and 9.
         return word, disparity + np.where(invert, -excess, excess) + 2 * (xor + invert) - 2
 
     def compute(self, data: np.ndarray, control: np.ndarray, active: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ class TmdsEncoder:
         control : int64 array, shape (n,)
             ``c0 + 2 c1``; sent elsewhere.
         active : bool array, shape (n,)
-            In the picture.
+            Whether the pixel is in the picture.
 
         Returns
         -------

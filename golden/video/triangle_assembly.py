@@ -1,4 +1,4 @@
-"""Triangle assembly: triangles of a range of the mesh memory that lie in a band, from screen vertices."""
+"""Triangle assembly: from screen vertices and ranges of the mesh memory to the triangles in a band."""
 
 from dataclasses import dataclass, field
 
@@ -11,20 +11,20 @@ from blysk.golden.video.vertex_unit import ScreenVertices
 __all__ = ["COUNTERS", "TriangleAssembly"]
 
 COUNTERS = ("sent", "rejected", "outside")
-"""What is counted: triangles sent, rejected by y, and dropped for a corner outside."""
+"""Counters: triangles sent, rejected by y, and dropped because a corner is outside."""
 
 
 @dataclass(frozen=True)
 class TriangleAssembly:
-    """Triangles of which no corner is outside and of which a scanline's centre may be in the band.
+    """Triangles with no corner outside that may cover the centre of a scanline of the band.
 
-    A triangle is *rejected* where no scanline from ``top`` to ``bottom - 1`` has its centre from the highest
-    corner on and above the lowest: exactly those that `VertexSort` would find empty by y.
+    A triangle is *rejected* if no scanline from ``top`` to ``bottom - 1`` has its centre between the highest
+    corner, included, and the lowest, excluded: exactly the triangles that `VertexSort` would find empty by y.
 
     Parameters
     ----------
     mesh : MeshMemory
-        The triangles.
+        Memory with the triangles.
     grid : Grid
         Fraction bits of the coordinates.
 
@@ -53,11 +53,11 @@ class TriangleAssembly:
         Parameters
         ----------
         vertices : ScreenVertices
-            All of the memory.
+            All vertices of the memory.
         first, count, material : int64 arrays, shape (R,)
-            Ranges of triangles, 1 or more each, and the material of each.
+            First triangle, number of triangles, 1 or more, and material of each range.
         top, bottom : int
-            Scanlines of the band.
+            First scanline of the band, and first scanline after it.
         """
         first, count, material = (np.atleast_1d(value) for value in (first, count, material))
         source = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())

@@ -16,21 +16,21 @@ ENTRY = SQ(2, 16)
 """Number format of an entry of a matrix."""
 
 OFFSET = SQ(5, 20)
-"""Number format of an offset, in near planes."""
+"""Number format of an offset, in units of the near plane's distance."""
 
 
 @dataclass(frozen=True)
 class Matrix:
-    """Where vertices go: rows X, Y and W for positions, rows x, y and z for normals.
+    """Matrix for vertices: rows X, Y and W for positions, rows x, y and z for normals.
 
     Parameters
     ----------
     position : int64 array, shape (3, 3)
-        `ENTRY`; rows X, Y, W.
+        Rows X, Y, W, codes of `ENTRY`.
     offset : int64 array, shape (3,)
-        `OFFSET`, added to the rows.
+        Offsets of these rows, codes of `OFFSET`.
     normal : int64 array, shape (3, 3)
-        `ENTRY`; a rotation.
+        A rotation, codes of `ENTRY`.
     """
 
     position: np.ndarray
@@ -39,7 +39,7 @@ class Matrix:
 
     @property
     def codes(self) -> dict[str, np.ndarray]:
-        """What the hardware is given."""
+        """Words of the matrix by name, as the hardware takes them."""
         return {name: getattr(self, name) for name in ("position", "offset", "normal")}
 
 
@@ -50,14 +50,14 @@ class ScreenVertices:
     Parameters
     ----------
     x, y : int64 arrays, shape (V,)
-        Steps of the grid.
+        Coordinates in steps of the grid.
     depth : int64 array, shape (V,)
-        0 at the near plane, `DEPTH`.
+        Depth, 0 at the near plane, codes of `DEPTH`.
     normal : int64 array, shape (V, 3)
-        N/W, `ATTRIBUTE`.
+        N/W, codes of `ATTRIBUTE`.
     outside : bool array, shape (V,)
-        Nearer than the near plane, as far as `VertexTransform.FAR` near planes, or beside the grid; the other
-        words then mean nothing.
+        Whether the vertex is nearer than the near plane, at `VertexTransform.FAR` near planes or farther, or
+        beside the grid; its other words are then invalid.
     """
 
     x: np.ndarray
@@ -68,7 +68,7 @@ class ScreenVertices:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Output beats of the hardware, by field."""
         return dict(vars(self))
 
 
@@ -76,18 +76,18 @@ class ScreenVertices:
 class VertexTransform:
     """``x = X/W``, ``y = Y/W``, ``1 - 1/W`` and ``N/W`` of vertices by a matrix.
 
-    W counts near planes: it is 1 on the near plane, and a vertex with W under 1 is outside, as is one with W
-    of `FAR` or more. X/W and Y/W count ``2^scale_bits`` pixels from the middle of the grid. The depth
-    ``1 - 1/W`` and N/W are linear on the screen; the scale of N/W is that of the frame, the same for all
-    triangles, so that a vertex is transformed once for all of its triangles.
+    W is in units of the near plane's distance: it is 1 on the near plane. A vertex with W under 1, or with W
+    of `FAR` or more, is outside. X/W and Y/W are in units of ``2^scale_bits`` pixels from the middle of the
+    grid. The depth ``1 - 1/W`` and N/W are linear on the screen; the scale of N/W is that of the frame, the
+    same for all triangles, so that a vertex is transformed once for all of its triangles.
 
     ============ ============ =====================================================================
     word         format       why
     ============ ============ =====================================================================
     p, N         SQ(1, 17)    18 bits for the multiplier
-    entries      SQ(2, 16)    likewise; rotations hold 1
+    entries      SQ(2, 16)    18 bits for the multiplier; holds 1, for rotations
     X, Y, W      SQ(6, 25)    sum of three products and the offset, rounded
-    m            UQ(1, 25)    W shifted by s = 0 to 3 to 1 and below 2; cut
+    m            UQ(1, 25)    W shifted by s = 0 to 3 into [1, 2); cut
     r = 1/m      UQ(1, 25)    `Reciprocal`
     X', Y'       SQ(6, 25)    shifted by s; cut
     x, y         SQ(3, 17)    from three products, 20 fraction bits, then rounded to the grid (scale 9)
@@ -97,19 +97,19 @@ class VertexTransform:
     N/W          SQ(1, 23)    ``N' r' 2^-s``, rounded to 26 fraction bits before the shift, then cut
     ============ ============ =====================================================================
 
-    With the entries as they are, a coordinate of a vertex inside is off by at most `ERROR` steps of the grid:
-    the last rounding; an eighth of `wide_product.LOST`; and, times ``2^17``, by the roundings of X (2^-26 and
-    the cut 2^-25), the reciprocal's error times X' (at most 8) and the cut of m, 2^-25, times 4. The depth is
-    off by at most `DEPTH_ERROR`: 1 for the cut, half of the reciprocal's error and of m's cut in 2^-25. A
-    component of N/W is off by at most `NORMAL_ERROR`: 2^-18 for N', 2^-17 for r' (whose error only scales N/W
-    of the vertex), 2^-27 and 2^-23 for N/W.
+    Error bounds, for the given entries. The error of a coordinate of a vertex inside is at most `ERROR` steps
+    of the grid: the last rounding; an eighth of `wide_product.LOST`; and, times ``2^17``, the roundings of X
+    (2^-26 and the cut 2^-25), the reciprocal's error times X' (at most 8) and the cut of m, 2^-25, times 4.
+    The error of the depth is at most `DEPTH_ERROR`: 1 for the cut, plus half of the reciprocal's error and of
+    m's cut in 2^-25. The error of a component of N/W is at most `NORMAL_ERROR`: 2^-18 for N', 2^-17 for r'
+    (whose error only scales N/W of the vertex), 2^-27 and 2^-23 for N/W.
 
-    29 multiplications.
+    The unit takes 29 multiplications.
 
     Parameters
     ----------
     scale_bits : int
-        Pixels of 1 in X/W, as a power of two: 4 to 11; 9 serves pictures up to 1024 pixels wide.
+        Logarithm to base 2 of the pixels of 1 in X/W, 4 to 11; 9 is for pictures up to 1024 pixels wide.
     grid : Grid
         Fraction bits of the coordinates.
 
@@ -140,7 +140,7 @@ class VertexTransform:
 
     @property
     def place(self):
-        """Number format of x and y in X/W: those of the grid."""
+        """Number format of x and y, as X/W and Y/W, with the steps of the grid."""
         return self.grid.coordinate.scaled(-self.scale_bits)
 
     def space(self, position: np.ndarray, matrix: Matrix) -> Fixed:
@@ -158,7 +158,7 @@ class VertexTransform:
         Parameters
         ----------
         position, normal : int64 arrays, shape (V, 3)
-            ``SQ(1, 17)``.
+            Codes of ``SQ(1, 17)``.
         matrix : Matrix
             The matrix.
         """
