@@ -40,7 +40,7 @@ class AxiLite(wiring.Signature):
 
 
 class AxiLiteUnit(wiring.Component):
-    """AXI4-Lite to accesses, one at a time, reads and writes in turns where both wait.
+    """Adapter from AXI4-Lite to accesses, one at a time; reads and writes alternate when both wait.
 
     An address and a word each wait in a register; so every ready and every valid is a register, and no path
     leads from one to another. A refused access is answered with SLVERR.
@@ -67,7 +67,7 @@ class AxiLiteUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Registers of the three channels in, and of the two out."""
+        """Registers of the three input channels and of the two output channels."""
         m = Module()
         bus, access, answer = self.bus, self.i, self.o
         address = {name: Signal(ADDRESS_BITS, name=f"{name}_address") for name in ("write", "read")}

@@ -15,7 +15,7 @@ from blysk.hdl.bus.wishbone import Wishbone, WishboneUnit
 __all__ = ["BUSES", "PORT_DESCRIPTIONS", "AxiStream", "BusUnit"]
 
 BUSES = {"axi": ("s_axil", AxiLite, AxiLiteUnit), "wishbone": ("wb", Wishbone, WishboneUnit)}
-"""Buses by name: the member for registers, its signature, and what is behind it."""
+"""Buses by name: the member for registers, its signature, and the unit behind it."""
 
 PORT_DESCRIPTIONS = {
     "s_axis_tdata": "one triangle or span, see above",
@@ -36,7 +36,7 @@ class AxiStream(wiring.Signature):
     size : int
         Bytes of TDATA.
     user : int
-        Bits of TUSER; with any, there is TKEEP, too.
+        Bits of TUSER; 0: neither TUSER nor TKEEP.
     """
 
     def __init__(self, size: int, user: int = 0):
@@ -47,10 +47,10 @@ class AxiStream(wiring.Signature):
 
 
 class BusUnit(wiring.Component):
-    """A core with bytes in and out, and registers: those of `FramingUnit` and `RegistersUnit`, connected.
+    """A core on a bus: a `FramingUnit` for its streams and a `RegistersUnit` for its registers, connected.
 
-    Registers are written while no frame is inside, so that constants never change under one. No path leads
-    from a ready to a valid; s_axis_tready may follow from s_axis_tvalid and the index of a material.
+    Registers are written only while no frame is inside, so that constants never change within a frame. No
+    path leads from a ready to a valid; s_axis_tready may depend on s_axis_tvalid and the index of a material.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ class BusUnit(wiring.Component):
     top : str
         One of `TOPS`.
     parameters : Design or Renderer
-        Of the core.
+        Parameters of the core.
     **options
-        To its constructor.
+        Keyword arguments of its constructor.
 
     Members
     -------
@@ -72,7 +72,7 @@ class BusUnit(wiring.Component):
     s_axil : :py:`In(AxiLite())`
         Registers; or ``wb``, :py:`In(Wishbone())`.
     memory
-        That of the core, where it has one.
+        Memory port of the core, if it has one.
 
     Attributes
     ----------

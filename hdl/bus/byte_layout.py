@@ -1,4 +1,4 @@
-"""Bytes of a bus to the fields of a payload and back, by the layout that follows from its shape."""
+"""Conversion between bytes of a bus and fields of a payload; the layout follows from the payload's shape."""
 
 from collections.abc import Iterator, Sequence
 
@@ -13,13 +13,13 @@ __all__ = ["bytes_of", "fields_of", "layout_of", "misfits"]
 def layout_of(shape: ShapeLike, without: Sequence[str] = ()) -> ByteLayout:
     """Layout of the bytes of a payload.
 
-    Members of a structure in a structure have both names, with an underscore between; so have structures in
-    an array, with their index.
+    A member of a nested structure is named by both names, with an underscore between; an array of structures
+    gives an index as the name of each.
 
     Parameters
     ----------
     shape : ShapeLike
-        Of the payload, a structure.
+        Shape of the payload, a structure.
     without : sequence of str
         Members that are elsewhere on the bus.
     """
@@ -61,7 +61,7 @@ def _places(shape: ShapeLike, without: Sequence[str]) -> Iterator[tuple[Field, i
 
 
 def fields_of(shape: ShapeLike, word: Value) -> Value:
-    """A payload, of its bytes; bits beside its numbers are not read."""
+    """Payload made from its bytes; padding bits are not read."""
     parts, bit = [], 0
     for field, first, place in _places(shape, ()):
         assert first == bit, "a structure without gaps"

@@ -16,36 +16,36 @@ from blysk.hdl.geometry.triangles import COUNTER_BITS, count_events
 __all__ = ["FramingUnit", "given_shape", "made_shape"]
 
 _SETTLES = 3
-"""Cycles after which whatever watches the core has seen a beat."""
+"""Cycles after which the logic that watches the core has seen a beat."""
 
 
 def given_shape(layout: ByteLayout) -> data.StructLayout:
-    """Shape of what goes in: bytes, and whether it is the last of its frame."""
+    """Shape of a beat that goes in: bytes, and whether it is the last of its frame."""
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1})
 
 
 def made_shape(layout: ByteLayout) -> data.StructLayout:
-    """Shape of what comes out: bytes, end of a packet, first and last of a frame."""
+    """Shape of a beat that comes out: bytes; ``last`` of a packet; ``first`` and ``end`` of a frame."""
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1, "first": 1, "end": 1})
 
 
 class FramingUnit(wiring.Component):
     """A core between streams of bytes with the borders of frames: `Framing` is the bit-accurate model.
 
-    A frame is what comes up to a beat with ``last``. No beat is accepted after it until the core is empty and
-    the frame's last beat has been accepted at the output, so that nothing of two frames is ever inside, and
-    constants can change in between. One beat is held back until the next one comes or the frame ends: only
-    then is it known whether it is the last. That takes 2 cycles, and no throughput. A frame that gives
-    nothing ends without a beat; ``frames`` counts it.
+    A frame ends with a beat that has ``last``. No beat is accepted after it until the core is empty and the
+    frame's last beat has been accepted at the output, so that beats of two frames are never inside together,
+    and constants can change in between. One output beat is held back until the next one comes or the frame
+    ends: only then is it known whether it is the last. This costs 2 cycles of latency, and no throughput. A
+    frame without output gives no beat; ``frames`` counts it.
 
     Parameters
     ----------
     top : str
         One of `TOPS`.
     parameters : Design or Renderer
-        Of the core.
+        Parameters of the core.
     **options
-        To its constructor.
+        Keyword arguments of its constructor.
 
     Members
     -------
@@ -54,10 +54,10 @@ class FramingUnit(wiring.Component):
     o : :py:`Out(stream.Signature(made_shape(layout)))`
         Pixels or spans.
     write, constants, memory
-        Those of the core, where it has them.
+        Members of the core, if it has them.
     status : :py:`Out(...)`
-        Counters of the core; ``frames`` that have ended, ``misfits``, beats of which a number did not fit its
-        field (whose low bits were taken), and ``busy``.
+        Counters of the core; ``frames``, which have ended; ``misfits``, the beats with a number that did not
+        fit its field (its low bits were taken); and ``busy``.
 
     Source: docs/theory/bus.md#streams; not in the documents.
     """
@@ -80,7 +80,7 @@ class FramingUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The core; what may come in; the beat held back and its flags."""
+        """The core; the admission of beats; the beat held back and its flags."""
         m = Module()
         m.submodules.core = core = self.core
         inside = self.top.watch(core)

@@ -20,14 +20,14 @@ __all__ = ["RegistersUnit", "access_shape", "answer_shape"]
 
 
 def access_shape() -> data.StructLayout:
-    """Shape of an access: address of a byte, whether it is a write, the word, the bytes that count."""
+    """Shape of an access: byte address, whether it is a write, the word, and a strobe for each byte."""
     return data.StructLayout(
         {"address": ADDRESS_BITS, "write": 1, "data": WORD_BITS, "strobe": WORD_BITS // 8}
     )
 
 
 def answer_shape() -> data.StructLayout:
-    """Shape of an answer: the word read, 0 of a write, and whether the access was refused."""
+    """Shape of an answer: the word read (0 for a write), and whether the access was refused."""
     return data.StructLayout({"data": WORD_BITS, "error": 1})
 
 
@@ -50,9 +50,9 @@ class RegistersUnit(wiring.Component):
     o : :py:`Out(stream.Signature(answer_shape()))`
         Their answers.
     constants : :py:`In(...)`
-        What the core says: ``busy``, and its counters by name.
+        State of the core: ``busy``, and its counters by name.
     picture : :py:`Out(...)`
-        Registers of the picture by name; only where there are some.
+        Registers of the picture by name; only if there are any.
     load : :py:`Out(...)`
         A frame constant, written on the cycle on which ``valid`` is high.
 
@@ -75,7 +75,7 @@ class RegistersUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The access in a register; where it goes; its answer in another."""
+        """The access in a register; its decoding; its answer in another register."""
         m = Module()
         access, full = Signal(self.i.payload.shape(), name="access"), Signal(name="full")
         answer, answered = Signal(self.o.payload.shape(), name="answer"), Signal(name="answered")

@@ -23,13 +23,14 @@ class Top:
     Parameters
     ----------
     title : str
-        What it makes of what.
+        Its input and its output, as in ``triangles to spans``.
     unit : callable
-        Makes it of a `Design` or a `Renderer`; keywords go to its constructor.
+        Makes the core from a `Design` or a `Renderer`; keywords go to its constructor.
     takes_triangles : bool
-        Whether triangles go in, else spans; the unit is then made of a `Renderer`.
+        Whether triangles go in, and ``unit`` takes a `Renderer`; else spans go in, and it takes a `Design`.
     watch : callable
-        Gives, of the core before it is elaborated, whether anything is inside but for what waits at ``o``.
+        Makes a signal from the core, before it is elaborated: high while anything is inside, except a beat
+        that waits at ``o``.
     """
 
     title: str

@@ -33,7 +33,7 @@ class Wishbone(wiring.Signature):
 
 
 class WishboneUnit(wiring.Component):
-    """Wishbone to accesses, one at a time.
+    """Adapter from Wishbone to accesses, one at a time.
 
     A request is taken on a cycle on which ``stall`` is low. From the next one on, up to and with the cycle of
     ``ack`` or ``err``, ``stall`` is high: so a classic initiator, which keeps ``stb`` until it is answered,

@@ -36,20 +36,21 @@ MULTIPLIER_LATENCY = 2
 
 @dataclass(frozen=True, eq=False)
 class FunctionalUnit:
-    """Equal instances of hardware, shared by the uses of a graph.
+    """Equal instances of hardware that operations of a graph share.
 
     Parameters
     ----------
     graph : Dataflow
-        Whose uses they serve.
+        Graph of the operations.
     name : str
-        Of its operand registers.
+        Beginning of its registers' names.
     shapes : sequence of ShapeLike
-        Operands; each instance has a register for every one.
+        Shapes of the operands; each instance has a register for every operand.
     latency : int
-        Registers from those of the operands to the result.
+        Registers from the operand registers to the result.
     make : callable
-        Makes an instance: from a function that makes a register (value, name) and the operands, the result.
+        Makes an instance and returns its result; arguments are a function that makes a register (value, name)
+        and the operands.
     """
 
     graph: "Dataflow"
@@ -60,7 +61,7 @@ class FunctionalUnit:
 
     @property
     def count(self) -> int:
-        """How many instances there are."""
+        """Number of instances."""
         return self.graph.schedule.counts.get(self, 0)
 
 
@@ -121,14 +122,14 @@ class Dataflow:
         return word
 
     def input(self, name: str, read: Callable[[Any], Any], formula: str | None = None) -> Word:
-        """A word of the beat: ``read(operands)``; formulas call it as given, by `SYMBOLS` or its name."""
+        """A word of the beat, ``read(operands)``; formulas show ``formula``, or `SYMBOLS`, or its name."""
         first = 0 if self.interval == 1 else 1
         word = Word(name, (), 0, self.interval, since=first, text=formula or SYMBOLS.get(name, name))
         word.make = lambda build: read(build.operands)
         return self._add(word)
 
     def wire(self, name: str, function: Callable[[Any], Any], word: Word, formula: str | None = None) -> Word:
-        """Wiring from a word's value; read after the word's lifetime, the wire is copied, not the word."""
+        """Wiring from a word's value; a read after the word's lifetime copies the wire, not the word."""
         wire = Word(name, (word,), 0, word.lifetime, text=formula, trace=traced(function))
         wire.make = lambda build: function(build.at(word, wire.read))
         return self._add(wire)
@@ -148,14 +149,14 @@ class Dataflow:
         name : str
             Of the word.
         function : callable
-            Of the values of `words`.
+            Takes the values of ``words``, and returns that of the register.
         *words : Word
-            What it is made from.
+            Words that it is made from.
         since : int or Word
             Earliest stage of the word, or the word that it comes with: a word that is read late needs no
             copies before.
         formula : str or None
-            What drawings call it; ``None``: what ``function`` tells.
+            Formula in drawings; ``None``: the one read from ``function``.
         """
         register = Word(name, words, 1, self.interval, since=since, text=formula, trace=traced(function))
 
@@ -192,17 +193,18 @@ class Dataflow:
         name : str
             Of the word.
         words : sequence of Word
-            What the operands are made from.
+            Words that the operands are made from.
         operands : callable
             Wiring from the words' values to the operands.
         result : callable
             Wiring from the functional unit's result to the word's value.
         latency : int or None
-            Registers from the operands to that value, where ``result`` takes one on the way; ``None``: all.
+            Registers from the operands to that value, if ``result`` reads a register before the last one;
+            ``None``: all.
         since : int or Word
             Earliest stage of the word, as for `register`.
         formula : str or None
-            What drawings call it; ``None``: its name.
+            Formula in drawings; ``None``: its name.
         """
         latency = functional_unit.latency if latency is None else latency
         use = Word(name, tuple(words), 1 + latency, 1, functional_unit, since, text=formula)
@@ -227,7 +229,7 @@ class Dataflow:
     ) -> Word:
         """Exact product of two words on a shared multiplier.
 
-        It takes a cycle, and `MULTIPLIER_LATENCY` more; one more in a graph of low latency.
+        Latency ``1 + MULTIPLIER_LATENCY`` cycles; 2 cycles in a graph of low latency.
 
         Parameters
         ----------
@@ -240,7 +242,7 @@ class Dataflow:
         since : int
             As for `use`.
         formula : str or None
-            What drawings call it; ``None``: the product of its operands' formulas.
+            Formula in drawings; ``None``: the product of its operands' formulas.
 
         Raises
         ------
@@ -288,15 +290,15 @@ class Dataflow:
         name : str
             Of the table.
         words : sequence of int
-            Of the table, a power of two of them.
+            Words of the table; their number is a power of two.
         width : int
-            Bits of each.
+            Bits of a word.
         address : Word
-            As many bits as needed, unsigned.
+            Unsigned address, with as many bits as needed.
         registered : bool
             Whether there is a register behind the memory, enabled with it.
         formula : str or None
-            What drawings call a word of it; ``None``: the name.
+            Formula of the word in drawings; ``None``: the name.
         """
         # The word that is read has the lifetime of the address.
         word = Word(name, (address,), 1 + registered, address.lifetime, text=formula)
@@ -312,7 +314,7 @@ class Dataflow:
         return self._add(word)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[[Word, int], Any]:
-        """Make the hardware; the result gives a word's value at a stage.
+        """Make the hardware; the function returned gives a word's value at a stage.
 
         Parameters
         ----------
@@ -321,7 +323,7 @@ class Dataflow:
         unit : PipelinedUnit
             Unit whose beats they belong to; its initiation interval is that of the graph.
         operands
-            What the unit's `PipelinedUnit.datapath` is given.
+            Operands that `PipelinedUnit.datapath` of the unit gets.
         """
         build = _Build(self, m, unit, operands)
         for word in self._words:
@@ -349,7 +351,7 @@ def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> A
 
 
 def shared_sums(graph: Dataflow, product: Format) -> FunctionalUnit:
-    """What sums dot products, whose products have a format: two cycles; see `dot`."""
+    """Adders of the three products of a dot product, in the format ``product``: two cycles; see `dot`."""
     shapes = FixedShape(product + product), FixedShape(product)
     return graph.share("sum", shapes, 1, lambda register, x, y: register(x + y, "total"))
 
@@ -373,11 +375,11 @@ def dot(
     a : Word
         A vector.
     b : Word or callable
-        The other; or what makes it from the value of ``a``.
+        The other vector, or a function that makes it from the value of ``a``.
     sums : FunctionalUnit or None
         From `shared_sums`; ``None``: the sums have registers of their own.
     symbol : str or None
-        What formulas call the other vector; ``None``: as its word, or as ``a``.
+        Symbol of the other vector in formulas; ``None``: that of its word, or of ``a``.
     """
     left = a.symbol
     right = Formula(symbol) if symbol else b.symbol if isinstance(b, Word) else left
@@ -403,7 +405,9 @@ def dot(
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:
-    """An initiation interval from 1 to that of one multiplier for all; ``None`` means the default.
+    """An initiation interval from 1 to ``longest``, that of one multiplier for all products.
+
+    ``None`` means ``default``, or ``longest`` without a default.
 
     Raises
     ------
@@ -445,7 +449,7 @@ class _Build:
         return copies[max(start for start in copies if start <= stage)]
 
     def issue(self, functional_unit: FunctionalUnit, use: Word, operands: Sequence[Any]) -> Any:
-        """Issue operands of a use to an instance of a functional unit; its result, for all uses."""
+        """Issue operands to an instance of a functional unit; return its result, which all its uses read."""
         placement = self.graph.schedule.placements[use]
         instance, when = placement.instance, self.when(placement.read)
         key = functional_unit, instance
@@ -465,8 +469,8 @@ class _Build:
     def connect(self) -> None:
         """Connect each instance's operand registers, which have no enable.
 
-        No two uses meet, so their operands are gated and merged: a chain of multiplexers would be as long as
-        there are uses, and larger.
+        No two uses meet, so their operands are gated and merged by OR: a chain of multiplexers would have one
+        for each use, and be larger.
         """
         for key, uses in self._issued.items():
             for k, to in enumerate(self._instances[key][0]):

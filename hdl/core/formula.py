@@ -28,10 +28,10 @@ SYMBOLS = {
     "one_minus_cosine": "u",
     "position": "P",
 }
-"""What formulas call the fields of a beat; others have their names."""
+"""Symbols of a beat's fields in formulas; other fields appear by their names."""
 
 LONGEST = 14
-"""Characters of a formula that others repeat; of a longer one they have the name of its word."""
+"""Most characters of a formula that other formulas repeat; a longer one they replace by its word's name."""
 
 _SUM, _PRODUCT, _ATOM = range(3)
 
@@ -41,7 +41,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 class Formula(FixedValue):
     """Text in the place of a value, for the operations that a `FixedValue` has.
 
-    It is one so that Python asks it first where a constant stands on the left.
+    It is a `FixedValue`, so that Python calls its operator first if the left operand is one.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ class Formula(FixedValue):
 
     @classmethod
     def read(cls, text: str) -> "Formula":
-        """Formula of a text that somebody wrote."""
+        """Formula of a text written by hand; its binding is read from the operators outside parentheses."""
         outer = re.sub(r"\([^()]*\)", "", text)
         return cls(text, _SUM if re.search(" [+−<≤>≥=] ", outer) else _PRODUCT if "·" in outer else _ATOM)
 
     def as_value(self):
-        """There are no bits.
+        """Refuse: a formula has no bits.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Formula(FixedValue):
         raise TypeError(f"the formula {self.text} has no bits")
 
     def shape(self):
-        """There is no shape; see `as_value`."""
+        """Refuse: a formula has no shape; see `as_value`."""
         return self.as_value()
 
     def within(self, binding: int) -> str:
@@ -147,7 +147,7 @@ class Formula(FixedValue):
         return Formula(f"{factor}·{self.within(_PRODUCT)}", _PRODUCT)
 
     def _kept(self, _) -> "Formula":
-        """The same: a number rounded or in another format."""
+        """The same formula, for a number rounded or in another format."""
         return self
 
     truncate = round_half_up = saturate = wrap = extend = _kept
@@ -162,7 +162,7 @@ def component(vector: Formula, index: int) -> Formula:
 
 
 def formula_of(function: Callable[..., Any], operands: Iterable[Formula]) -> Any:
-    """What a function gives for formulas; ``None`` where it looks at bits, or at the unit around it."""
+    """Result of a function called with formulas; ``None`` if it looks at bits, or at the unit around it."""
     try:
         return function(*operands)
     except (AttributeError, IndexError, TypeError, ValueError):

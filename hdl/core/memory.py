@@ -1,4 +1,4 @@
-"""Memories read through the register that an FPGA's memories have behind their word, and a FIFO of one."""
+"""Memories read through the output register of an FPGA's memory blocks, and FIFOs made from memories."""
 
 from amaranth.hdl import Module, Shape, Signal, Value
 from amaranth.lib import stream
@@ -9,10 +9,10 @@ from blysk.hdl.core.stream import require_same_shape
 __all__ = ["LATE_FIFO_LATENCY", "UNCOUNTED", "connect_late_fifo", "connect_wide_fifo", "registered_read"]
 
 LATE_FIFO_LATENCY = 4
-"""Clocks that a payload takes through the empty FIFO of `connect_late_fifo`."""
+"""Cycles that a payload takes through the empty FIFO of `connect_late_fifo`."""
 
 UNCOUNTED = 2
-"""Payloads that `connect_late_fifo` has taken and its level does not have yet."""
+"""Payloads that `connect_late_fifo` has taken and its level does not count yet."""
 
 
 def registered_read(
@@ -24,9 +24,9 @@ def registered_read(
 ) -> tuple[Signal, Value]:
     """Word of a memory, two cycles after its address; both registers move by one enable.
 
-    A memory's word is there late in a clock's period, one from its register early. What a memory gives on the
-    clock on which the same word is written differs between FPGAs: then nothing moves, so that no logic is
-    needed for that between the memory and the register.
+    A memory gives its word late in a cycle, the register behind it early. FPGAs differ in the word read on a
+    cycle that writes to the same address: on such a cycle the registers do not move, so that no logic is
+    needed between the memory and the register.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def registered_read(
     memory : Memory
         The memory.
     address : Value
-        Of the word.
+        Address of the word.
     wanted : Value
         Whether the registers are to move.
     write : WritePort or None
@@ -62,12 +62,12 @@ def connect_late_fifo(
 ) -> Value:
     """Connect two streams through a FIFO in a memory, between registers.
 
-    One is before the memory, so that the source's handshake ends there; behind it is that of
-    `registered_read`. Whether there is room follows from the FIFO's level alone, in a register; `UNCOUNTED`
-    payloads of the depth are for those that the level does not have yet. A payload takes `LATE_FIFO_LATENCY`
-    cycles through the empty FIFO.
+    A register before the memory ends the source's handshake; behind the memory are the registers of
+    `registered_read`. The source's ready is a register that depends on the FIFO's level alone; `UNCOUNTED`
+    payloads of the depth are reserved for those that the level does not count yet. A payload takes
+    `LATE_FIFO_LATENCY` cycles through the empty FIFO.
 
-    What it takes and refuses is as for `connect_fifo`; two payloads more than its depth wait behind it.
+    Parameters and errors are those of `connect_fifo`; two payloads more than the depth can wait behind it.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def connect_wide_fifo(
     For a sink that takes payloads straight into registers. A payload takes `SLICE_LATENCY` cycles through the
     empty FIFO. The source's ready and the sink's valid are registers.
 
-    What it takes and refuses is as for `connect_fifo`; its depth is 2 or more, as that of a register slice.
+    Parameters and errors are those of `connect_fifo`, but the depth is 2 or more, as in a register slice.
     """
     require_same_shape(source.payload.shape(), sink.payload.shape())
     width = Shape.cast(source.payload.shape()).width

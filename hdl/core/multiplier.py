@@ -39,10 +39,10 @@ class SteppedMultiplier:
             self.load(factor, operand)
 
     def load(self, factor: FixedValue, operand: FixedValue) -> None:
-        """Give two operands at no step, in the state or condition that is open in the module."""
+        """Give two operands at any step, in the state or condition that is open in the module."""
         self._m.d.sync += [self._factor.eq(factor), self._operand.eq(operand)]
 
     @property
     def free(self) -> Value:
-        """Whether the present step gives no operands: who else gives some may read their product on time."""
+        """Whether the present step issues no operands, so that others can be loaded on this cycle."""
         return ~Cat(self._step == at for at in self._taken).any()

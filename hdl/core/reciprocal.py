@@ -26,7 +26,7 @@ def checked_length_bits(length_bits: int) -> int:
 
 
 def reciprocal_codes(length_bits: int = LENGTH_BITS, table: Fixed | None = None) -> list[int]:
-    """Codes of the table for lengths of so many bits: the words of the whole table that such spans read.
+    """Codes of the table for lengths of ``length_bits`` bits: the words of the whole table that they read.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Wor
     product : Word
         Exact square of a reciprocal in `RECIPROCAL_FORMAT`.
     shift : Word
-        Its shift.
+        Shift of the reciprocal.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """The scheduler: operations of a unit placed in time and on shared functional units, before any hardware.
 
-It knows neither words' widths nor Amaranth: operations, what each takes its operands from, and how long it
-takes. `blysk.hdl.core.dataflow` describes the operations and makes registers of the schedule.
+It knows neither words' widths nor Amaranth, only operations: the operands and the latency of each.
+`blysk.hdl.core.dataflow` describes the operations and makes registers of the schedule.
 
 What it guarantees, for every schedule that it returns:
 
@@ -22,7 +22,7 @@ from math import prod
 __all__ = ["Operation", "Placement", "Schedule", "place"]
 
 _MOST_SEARCHED = 500
-"""Ways to share instances that are tried, for beats at any distance."""
+"""Most ways to share instances that are tried, for beats at any distance."""
 
 
 @dataclass(eq=False)
@@ -34,18 +34,18 @@ class Operation:
     name : str
         Of the result.
     operands : tuple of Operation
-        Whose results it takes, all on the same cycle.
+        Operations whose results it takes, all on the same cycle.
     latency : int
-        Cycles from there to the first on which its result can be read: 0 for wiring.
+        Cycles from that one to the first on which its result can be read: 0 for wiring.
     lifetime : int or None
-        Cycles on which the result can be read, before the next beat's replaces it; ``None`` for wiring: that
-        of its operand.
+        Cycles on which the result can be read, before the next beat's result replaces it; ``None`` for
+        wiring: that of its operand.
     unit : hashable or None
         Functional unit that serves it: equal instances of hardware, shared by its uses. ``None``: hardware of
         its own.
     since : int or Operation
-        Earliest stage of the result: a number, or the stage of another's. What is read late needs no copies
-        before.
+        Earliest stage of the result: a number, or the stage of another operation's result. A result that is
+        read late needs no copies before.
     """
 
     name: str
@@ -58,14 +58,14 @@ class Operation:
 
 @dataclass(frozen=True)
 class Placement:
-    """When an operation reads its operands, and on which instance.
+    """Place of an operation: the stage at which it reads its operands, and its instance.
 
     Parameters
     ----------
     read : int
         Enabled cycles from the input of a beat to that on which the operands are read.
     instance : int
-        Of the functional unit; 0 where there is none.
+        Number of the functional unit's instance; 0 without a functional unit.
     """
 
     read: int
@@ -79,7 +79,7 @@ class Schedule:
     Parameters
     ----------
     placements : dict of Operation to Placement
-        Of every operation.
+        Placement of every operation.
     counts : dict
         Instances of each functional unit.
     """
@@ -104,13 +104,13 @@ def place(operations: Sequence[Operation], interval: int, spaced: bool = False) 
     cycles. In a *spaced* schedule beats come at any distance from the interval on: then the uses of an
     instance lie within as many stages as the interval has cycles.
 
-    Then operations with hardware of their own move to as late a stage as costs no copy of their operands:
-    where these are read later by others all the same.
+    Then operations with hardware of their own move to the latest stage that needs no copy of their operands:
+    they can move where other operations read the same operands later.
 
     Parameters
     ----------
     operations : sequence of Operation
-        Each after those whose results it takes.
+        Operations, each after those whose results it takes.
     interval : int
         Initiation interval, at least 1.
     spaced : bool
@@ -140,7 +140,7 @@ def _earliest(operation: Operation, placements: dict) -> int:
 
 
 def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Schedule:
-    """Each use at the first free slot; more instances where that takes too long."""
+    """Each use at the first free slot; another instance if no slot is free within two intervals."""
     placements: dict[Operation, Placement] = {}
     instances: dict[Hashable, list[set[int]]] = {}
     for unit in (o.unit for o in operations if o.unit is not None):
@@ -182,8 +182,8 @@ def _size(schedule: Schedule) -> tuple[int, int]:
 def _shared(operations: Sequence[Operation], interval: int, units: Sequence[Hashable]) -> Iterator[Schedule]:
     """Schedules for beats at any distance with few instances; none if there are too many ways.
 
-    Uses of a unit, in the order in which they could come first, are shared out in runs of neighbours; each
-    run has an instance, whose first use waits until the last comes within the interval.
+    The uses of a functional unit, sorted by their earliest stage, are divided into runs of neighbours. Each
+    run has an instance; its first uses wait until all uses of the run lie within the interval.
     """
     alone: dict[Operation, Placement] = {}
     for operation in operations:
@@ -213,7 +213,7 @@ def _shared(operations: Sequence[Operation], interval: int, units: Sequence[Hash
 
 
 def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
-    """Sizes of the runs of neighbours: as few runs as there can be, then one or two more."""
+    """Sizes of the runs of neighbours: with the fewest runs first, then with one or two more."""
 
     def parts(left: int, count: int) -> Iterator[tuple[int, ...]]:
         if count == 0:
@@ -260,7 +260,7 @@ def _windows(
 def _delayed(
     operations: Sequence[Operation], placements: dict[Operation, Placement]
 ) -> dict[Operation, Placement]:
-    """Operations with hardware of their own moved to as late as costs no copies of their operands."""
+    """Operations with hardware of their own, moved to the latest stage that needs no copy of an operand."""
     placements = dict(placements)
     readers: dict[Operation, list[Operation]] = {o: [] for o in operations}
     for operation in operations:

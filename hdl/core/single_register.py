@@ -11,7 +11,7 @@ __all__ = ["connect_register", "hold_output"]
 def connect_register(m: Module, name: str, source: stream.Interface, sink: stream.Interface) -> None:
     """Connect two streams through one register, which takes a payload each two cycles at most.
 
-    The source's ready and the sink's valid follow from a register.
+    The source's ready and the sink's valid depend on a register alone.
 
     Parameters
     ----------

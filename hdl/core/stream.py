@@ -25,13 +25,13 @@ __all__ = [
 ]
 
 FIFO_LATENCY = 2
-"""Clocks that a payload takes through an empty buffer."""
+"""Cycles that a payload takes through the empty FIFO of `connect_fifo`."""
 
 _MANY, _PART = 36, 12
 """Stages from which on they are looked at by parts, and those of a part."""
 
 SLICE_LATENCY = 1
-"""Clocks that a payload takes through the register of `connect_slice`."""
+"""Cycles that a payload takes through the register of `connect_slice`."""
 
 
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
@@ -130,8 +130,8 @@ def connect_fifo(
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:
     """Words that pass beside a unit while its beats are inside, in their order, without handshakes.
 
-    A memory with an address for the words that come and one for those that go: there is no level to count,
-    as the unit's own handshakes tell when a word is there.
+    The words are in a memory with a write and a read address. No level is counted: the unit's own handshakes
+    tell when a word is there.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def moving(
     source, sink : stream.Interface
         Where payloads go in and come out.
     last : ValueLike
-        Whether what comes out is the last, or only, part of a payload.
+        Whether the beat that comes out is the last, or only, part of a payload.
     dropped : ValueLike
         Whether a payload ends between the two.
     """
@@ -311,8 +311,8 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
     Returns
     -------
     active, ends : Signal
-        Whether there is a pixel; whether the next span may begin: there is none, or it is the last. Both are
-        registers.
+        Whether there is a pixel; whether the next span may begin, as there is no pixel or it is the last one.
+        Both are registers.
     """
     active, ends = Signal(name="active"), Signal(name="ends", init=1)
     remaining = Signal(len(length), name="remaining")
@@ -332,8 +332,9 @@ class PipelinedUnit(wiring.Component):
     A beat that is accepted on one cycle is on the output ``latency`` cycles later, unless the output is
     stalled: then the whole unit is disabled, from the cycle after the first on which a beat was not accepted,
     and holds its payloads (`skid_buffer`). As long as a beat is inside, the next is accepted a whole multiple
-    of ``initiation_interval`` enabled cycles after it; of a *spaced* unit any number of enabled cycles that
-    is not less. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset empties the unit.
+    of ``initiation_interval`` enabled cycles after it; in a *spaced* unit any number of enabled cycles from
+    ``initiation_interval`` on. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset
+    empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
     from the *stage* of a beat: `at` tells whether a beat was accepted so many enabled cycles ago.
@@ -345,7 +346,7 @@ class PipelinedUnit(wiring.Component):
     latency : int
         Cycles from input to output, at least 1.
     initiation_interval : int
-        Distance in cycles of two inputs. With 1, `datapath` gets the input itself, and registers it;
+        Cycles from an input to the next. With 1, `datapath` gets the input itself, and registers it;
         with more, it gets a register that holds the input on stages 1 to ``initiation_interval``.
     constants : ShapeLike or None
         Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
@@ -364,12 +365,12 @@ class PipelinedUnit(wiring.Component):
     o : :py:`Out(stream.Signature(output_shape))`
         Results.
     constants : :py:`In(constants)`
-        Only where asked for.
+        Only if ``constants`` is given.
 
     Attributes
     ----------
     advance : Signal
-        The common enable, from `elaborate` on: for what belongs to the unit but not to its data path.
+        The common enable, from `elaborate` on: for logic of the unit outside its data path.
     """
 
     def __init__(
@@ -451,7 +452,7 @@ class PipelinedUnit(wiring.Component):
     def _wait(self, m: Module, advance: Value, accept: Value) -> Value:
         """Whether a beat may come: ``initiation_interval`` enabled cycles after the last one, or more.
 
-        A register, worked out a clock ahead.
+        A register, computed a cycle ahead.
         """
         ready = Signal(name="ready", init=1)
         left = Signal(range(self.initiation_interval), name="left")

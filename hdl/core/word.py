@@ -20,14 +20,14 @@ class Word(Operation):
     name, operands, latency, lifetime, unit, since
         As for `Operation`.
     graph : Dataflow
-        That it is a word of.
+        Graph of the word.
     make : callable
         Makes its hardware.
     text : str or None
-        Its formula, where its function does not tell.
+        Its formula, if it is not read from its function.
     trace : callable
-        Gives, of the symbols of the operands, its formula and those of what its functional unit is given;
-        no formula where it has none.
+        Takes the symbols of the operands; returns the word's formula, or ``None``, and the formulas of the
+        operands of its functional unit.
     """
 
     graph: Any = None
@@ -42,18 +42,18 @@ class Word(Operation):
 
     @property
     def given(self) -> Sequence[Any]:
-        """Formulas of the operands of its functional unit, where they have any."""
+        """Formulas of the operands of its functional unit, if they have any."""
         return self._found[1]
 
     @property
     def formula(self) -> Formula | None:
-        """What it is, of the words that it is made from; ``None`` if that has no formula."""
+        """Formula of the word in the symbols of its operands; ``None`` if it has none."""
         found = self._found[0]
         return found if isinstance(found, Formula) else None
 
     @property
     def symbol(self) -> Formula:
-        """What it is called in formulas of others: its own formula if that is short, or its name.
+        """Symbol of the word in formulas of others: its own formula if that is short, else its name.
 
         A name of one or two letters is a symbol of its own.
         """
@@ -74,5 +74,5 @@ class Word(Operation):
 
 
 def traced(function: Callable[..., Any]) -> Callable[..., tuple[Any, Sequence[Any]]]:
-    """Trace of a word that a function makes of its operands."""
+    """Trace of a word that a function makes from its operands."""
     return lambda *symbols: (formula_of(function, symbols), ())

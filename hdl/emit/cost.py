@@ -27,7 +27,7 @@ class Cost:
     register_bits : int
         Flip-flops.
     rom_bits, ram_bits : int
-        Bits of memories that nothing writes, and of those that something does.
+        Bits of memories without a write port, and of those with one.
     """
 
     cells: int

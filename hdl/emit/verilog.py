@@ -76,12 +76,12 @@ def emit(
     ``i`` with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes ``i_valid``,
     ``i_ready``, ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes; the port
     table at the top of the text gives each one's direction, width, signedness, number format and
-    description. A memory's read register starts undefined, as in every Verilog simulator, where
-    Amaranth's own simulator starts it at 0.
+    description. A memory's read register starts undefined in Verilog simulators, and at 0 in Amaranth's own
+    simulator.
 
-    Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning. What
-    Verilator would say about the style of any generated netlist is switched off inside the text, by
-    name and with the reason, and restored at its end.
+    Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning.
+    Verilator's warnings about the style of generated netlists are switched off inside the text, by name and
+    with the reason, and restored at its end.
 
     The same component, header and descriptions give the same text.
 
@@ -134,7 +134,7 @@ def emit(
 
 
 def check_name(name: str) -> None:
-    """Refuse what cannot name a module, before there is a component: Yosys is asked by one that is empty.
+    """Refuse a name that no module can have, before there is a component: Yosys reads an empty module.
 
     Raises
     ------

@@ -44,7 +44,7 @@ def run_yosys(script: str) -> str:
 
 
 def cells_and_ports(netlist: str) -> dict:
-    """Module ``top`` of an RTLIL text, flattened, with constants folded and memories whole, as Yosys's JSON.
+    """Module ``top`` of an RTLIL text as Yosys's JSON: flattened, constants folded, memories kept as cells.
 
     Modules with the attribute ``keep_hierarchy`` stay cells.
 
