@@ -50,7 +50,7 @@ class AngularSetupUnit(PipelinedUnit):
     Parameters
     ----------
     parameters : AngularSetup
-        Bit-accurate model: unit that gives psi, tables and formats.
+        Bit-accurate model: the method of psi (``angle``), tables and formats.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to 26, by arccos 1 to 21; ``None``: 6.
 

@@ -28,7 +28,7 @@ def chord(
 def chord_exact(
     graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View], symbol: str | None = None
 ) -> Word:
-    """Word of ``|a - b|^2 / 2``, exact for one of 34 fraction bits: three multiplications of the graph.
+    """Word of ``|a - b|^2 / 2`` in ``SQ(5, 35)``, not saturated: three multiplications of the graph.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def chord_exact(
     b : Word or callable
         The other unit vector; or a function that gives one that is constant while beats are inside.
     symbol : str or None
-        What formulas call the other vector; ``None``: as its word.
+        Symbol of the other vector in formulas; ``None``: that of its word.
     """
     differences = data.ArrayLayout(FixedShape(COMPONENT - COMPONENT), 3)
 

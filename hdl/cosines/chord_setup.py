@@ -30,7 +30,7 @@ def span_values_shape(lights: int, highlights: bool = True) -> data.ArrayLayout:
 
 
 def span_factors_shape(factors: int) -> data.ArrayLayout:
-    """Shape of the factors of so many lights that fade, at the same three pixels, in the format of N·L."""
+    """Shape of the factors of the lights that fade, at the same three pixels, in the format of N·L."""
     return data.ArrayLayout(data.ArrayLayout(FixedShape(ChordSetup.DIFFUSE_FORMAT), 3), factors)
 
 
@@ -47,7 +47,7 @@ def span_operands_shape(
 def chord_differences_shape(
     lights: int, highlights: bool = True, parameters: ChordSetup | None = None, factors: int = 0
 ) -> data.StructLayout:
-    """Shape of the differences of N·L and of u along a span, for each light; of factors; and its flag."""
+    """Shape of a span's differences: of N·L and u for each light, of the factors; and ``out_of_range``."""
     format = (parameters or ChordSetup()).format
     names = ("diffuse", "highlight") if highlights else ("diffuse",)
     differences = data.StructLayout({"first": FixedShape(format), "second": FixedShape(format)})
@@ -62,9 +62,9 @@ class ChordSetupUnit(PipelinedUnit):
 
     `ChordSetup` is the bit-accurate model; it has formats and error bounds.
 
-    One product of a span, 3 of each u and 2 of each f share multipliers of 18x18 bits, 2 for one light and an
-    initiation interval of 3; the attribute ``multipliers`` tells. Without highlights a light has 2 products,
-    one that fades has 2 more.
+    A span has one product for its step, 3 for each u (with highlights), 2 for each f and 2 for each factor.
+    They share multipliers of 18x18 bits: 2 for one light and an initiation interval of 3; the attribute
+    ``multipliers`` is their number.
     Beats come at any distance from the interval on. A table of ``2^(length_bits - 1)`` words of 17 bits holds
     the reciprocals. The attribute ``latency`` depends on how the products share the multipliers.
 

@@ -93,7 +93,7 @@ class ChordValuesUnit(PipelinedUnit):
         )
 
     def _rounded(self, name, word, format, scale=0):
-        """A word in a format of fewer bits; times ``2^scale``, and then 1 at most: two cycles."""
+        """A word, times ``2^scale``, rounded to a format of fewer bits; if scaled, at most 1: two cycles."""
 
         def limited(value):
             value = value.saturate(format)

@@ -41,7 +41,7 @@ class HalfChordUnit(PipelinedUnit):
     Raises
     ------
     ValueError
-        If `initiation_interval` is none of those.
+        If ``initiation_interval`` is out of range.
 
     Members
     -------

@@ -1,4 +1,4 @@
-"""Span limit unit: which spans are wider than the chord method's error bound allows at an exponent."""
+"""Span limit unit: whether a span is wider than the chord method's error bound allows at an exponent."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data
@@ -15,18 +15,18 @@ __all__ = ["SpanLimitUnit", "octave_limit"]
 
 
 def octave_limit(m: Module, name: str, exponent: Value, limits: Fixed) -> FixedValue:
-    """The limit of an exponent, from one for each number of its bits: two clocks.
+    """Limit of an exponent, from a table by the number of its bits: two cycles.
 
     Parameters
     ----------
     m : Module
         Module that gets the registers.
     name : str
-        Of the second of them.
+        Name of the second register.
     exponent : Value
         Ten bits.
     limits : Fixed
-        By the number of bits of the exponent, 0 to 10.
+        Limits by the number of bits of the exponent, 0 to 10.
     """
     count = Const(0, range(len(exponent) + 1))
     for bit in range(len(exponent)):
@@ -42,9 +42,10 @@ def octave_limit(m: Module, name: str, exponent: Value, limits: Fixed) -> FixedV
 
 
 class SpanLimitUnit(PipelinedUnit):
-    """Whether spans are wide; `SpanLimit` is the bit-accurate model.
+    """Whether a span is too wide for the error bound; `SpanLimit` is the bit-accurate model.
 
-    Three products share one multiplier at an interval of 3. Beats come at any distance from that on.
+    Latency 10 cycles, initiation interval 3; three products share one multiplier. Beats come at any distance
+    from 3 cycles on.
 
     Parameters
     ----------
@@ -58,8 +59,8 @@ class SpanLimitUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"normal_left": ..., "normal_right": ...})))`
         Unit normals at the ends of spans.
     o : :py:`Out(stream.Signature(StructLayout({"wide": 1, "wide_if_lit": 1})))`
-        Whether a span of four pixels or more is wide, whatever the light; or if a light that is not behind
-        the span may have a highlight there.
+        ``wide``: a span of four pixels or more is too wide under any light; ``wide_if_lit``: it is if a light
+        that is not behind the span may have a highlight there.
     constants : :py:`In(10)`
         Specular exponent, 1 to 1000, constant from 3 cycles before a beat. Only with highlights.
 

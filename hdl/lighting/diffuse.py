@@ -20,9 +20,9 @@ class DiffuseUnit(PipelinedUnit):
     parameters : Diffuse
         Bit-accurate model: format of the operand.
     latency : int or None
-        At least 2, or 3 where the initiation interval is over 1; ``None``: that.
+        At least 2, or 3 where the initiation interval is over 1; ``None``: the least.
     initiation_interval : int
-        Distance in cycles of two inputs, at least 1.
+        Cycles from an input to the next, at least 1.
 
     Members
     -------

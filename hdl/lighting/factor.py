@@ -16,7 +16,7 @@ class FactorUnit(PipelinedUnit):
     """``a S`` of a specular term S and a factor a; the diffuse term waits. `Factor` is the model.
 
     Latency 2 cycles (operands, product), initiation interval 1; one multiplier of 17 by 17 bits, with
-    registers before and after. Without a factor the unit only waits as long, and has no multiplier.
+    registers before and after. Without a factor the unit only delays the terms, and has no multiplier.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class FactorUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse": ..., "specular": ..., "factor": ...})))`
-        Terms and factor, ``UQ(0, 17)`` each; the last only where there is one.
+        Terms and factor, ``UQ(0, 17)`` each; ``factor`` only with ``has_factor``.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse": ..., "specular": ...})))`
         Terms, ``UQ(0, 17)``.
 

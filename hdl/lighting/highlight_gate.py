@@ -41,7 +41,7 @@ class HighlightGateUnit(PipelinedUnit):
     lights : int
         Number of lights, at least 1.
     initiation_interval : int or None
-        Distance in cycles of two inputs, from 1 to the number of multiplications. ``None``: 6.
+        Cycles from an input to the next, 1 to the number of multiplications. ``None``: 6.
     exponent : int or None
         Exponent that is fixed at build time, 1 to 1000: no PROM. ``None``: the exponent is a port.
     takes_threshold : bool
@@ -50,7 +50,7 @@ class HighlightGateUnit(PipelinedUnit):
     Raises
     ------
     ValueError
-        If `initiation_interval` or the exponent is out of range, or both are asked for.
+        If ``initiation_interval`` or the exponent is out of range, or ``takes_threshold`` has an exponent.
 
     Members
     -------

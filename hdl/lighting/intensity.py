@@ -66,11 +66,11 @@ class IntensityUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse": ..., "specular": ...})))`
-        One term a light, ``UQ(0, 17)``; the latter only where there are specular terms.
+        A term of each kind for each light, ``UQ(0, 17)``; ``specular`` only if there are specular terms.
     o : :py:`Out(stream.Signature(pixel_color_shape()))`
         Channels.
     constants : :py:`In(StructLayout({"ambient", "diffuse", "specular"}))`
-        Colour operands, the latter two one a light; constant while beats are inside.
+        Colour operands: one ``ambient``, and the other two for each light; constant while beats are inside.
 
     Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
     """
@@ -146,7 +146,7 @@ class CompactIntensityUnit(wiring.Component):
     Attributes
     ----------
     latency, initiation_interval : int
-        Cycles of a pixel all of whose terms are not 0.
+        Cycles of a pixel that has no term of 0.
 
     Members
     -------

@@ -33,10 +33,11 @@ class SpecularKind(NamedTuple):
         ``initiation_interval``, ``exponent`` (fixed at build time, or ``None``) and ``shares_slope``
         (or, of a lobe, its memory).
     compact_interval : callable
-        Initiation interval at which one multiplier serves, from the model and the fixed exponent or ``None``.
+        Gives the initiation interval at which one multiplier is enough, from the model and the fixed exponent
+        or ``None``.
     slope_unit : callable or None
-        Makes the unit of what depends on the exponent alone, from the model; it serves all lights. ``None``:
-        there is no such unit.
+        Makes, from the model, the unit of the words that depend on the exponent alone; it serves all lights.
+        ``None``: there is no such unit.
     """
 
     unit: Callable[..., PipelinedUnit]
@@ -49,14 +50,14 @@ def _specular_unit(parameters: Specular, **options) -> PipelinedUnit:
 
 
 def _power_unit(parameters: Power, *, initiation_interval: int, **_) -> PipelinedUnit:
-    """A power needs nothing of its exponent beforehand, and has two structures."""
+    """Power unit: the exponent needs no preparation; sequential from an interval of 42 on."""
     return PowerUnit(parameters, form="sequential" if initiation_interval >= 42 else "pipelined")
 
 
 def _lobe_unit(
     parameters: Lobe, *, initiation_interval: int, shares_slope: bool, exponent: None
 ) -> PipelinedUnit:
-    """A lobe has tables in place of an exponent, in a memory of its own or outside."""
+    """Lobe unit: tables in place of an exponent, in a memory of its own or outside."""
     tables = None if shares_slope else parameters.fixed_tables
     return LobeUnit(parameters, initiation_interval, tables=tables, shares_memory=shares_slope)
 
@@ -91,7 +92,7 @@ class LightUnit(wiring.Component):
     diffuse : Diffuse
         Format of ``N . L``.
     initiation_interval : int
-        Distance in cycles of two inputs, at least 1. That of `Power` is 42 from 42 on, else 1.
+        Cycles from an input to the next, at least 1. With a `Power` it becomes 42 from 42 on, else 1.
     exponent : int or None
         Exponent that is fixed at build time; see `SpecularUnit`.
     shares_slope : bool
@@ -100,13 +101,14 @@ class LightUnit(wiring.Component):
     gated : bool
         Whether there is a highlight gate.
     fades : bool or None
-        Whether the light has a factor. ``False``: it has none, and waits as long as one that has.
+        Whether the light has a factor. ``False``: it has none, but the latency of one that has. ``None``:
+        it has neither.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"cosine", "highlight", "gated", "factor"})))`
-        ``N . L`` and the specular operand; the third, only where there is a gate, tells that the beat's span
-        has no highlight; the last, ``UQ(0, 17)``, only of a light that fades.
+        ``N . L`` and the specular operand; ``gated``, only with a gate: the beat's span has no highlight;
+        ``factor``, ``UQ(0, 17)``, only for a light that fades.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "specular"})))`
         Terms, ``UQ(0, 17)``.
     constants
@@ -220,7 +222,7 @@ class LightUnit(wiring.Component):
 
     @property
     def _depth(self) -> int:
-        """Terms that wait for the specular unit at most.
+        """Most terms that wait for the specular unit.
 
         As many as it has inside, one that it is about to take, and one for the output.
         """
@@ -235,7 +237,7 @@ class LightUnit(wiring.Component):
         dark: Value,
         o: stream.Interface,
     ) -> None:
-        """Diffuse terms wait for the specular ones, which not all have."""
+        """Diffuse terms wait for the specular terms of their beats; a dark beat has none."""
         depth = self._depth
         # A term is under way while its mark waits.
         m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)

@@ -28,9 +28,9 @@ def lobe_write_shape() -> data.StructLayout:
 
 
 def lobe_read_signature(parameters: Lobe) -> wiring.Signature:
-    """Port for reading words: the word of an ``address`` is there two clocks with ``enable`` later.
+    """Read port: the word of an ``address`` is there two cycles with ``enable`` later.
 
-    Without ``enable`` the word stays; so it may while the word of the address is written.
+    Without ``enable`` the word stays; it may also stay on a cycle that writes to the address.
     """
     return wiring.Signature(
         {
@@ -45,10 +45,10 @@ class LobeMemory(wiring.Component):
     """Tables of `Lobe` in one memory, with a read port for each unit that it serves.
 
     ``banks (E + 1) M`` words of 35 bits: up to 512 in a block RAM of 512 by 36. Where two units, of two
-    lights, read the same tables, Yosys makes a copy of tables that are written for either port. Tables that
-    are fixed at build time need none: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
+    lights, read the same tables, Yosys makes a copy for each port if the tables are written. Tables that are
+    fixed at build time need no copy: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
 
-    A write is taken on every clock. The first write of a table, with ``begins``, tells its bank. The values
+    A write is taken on every cycle. The first write of a table, with ``begins``, tells its bank. The values
     follow in order: each but the first makes the word of the value before it, which is in the memory two
     cycles after the write was taken. Values beyond the end of a table are lost, and so are all those of a
     bank that does not exist. A table that is not completed keeps the other words of the one before. Reset
@@ -89,7 +89,7 @@ class LobeMemory(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The memory, and what makes its words of the values written."""
+        """The memory, and the logic that makes its words from the values written."""
         p = self.parameters
         m = Module()
         words = [word for table in self.tables or [] for word in table.words.tolist()]
@@ -103,7 +103,7 @@ class LobeMemory(wiring.Component):
         return m
 
     def _write(self, m: Module, port: Any) -> None:
-        """Word by word behind the values."""
+        """Write a word with each value but the first: that of the value before, and the difference."""
         p, write = self.parameters, self.write.payload
         value, previous = (Signal.like(write.value, name=name) for name in ("value", "previous"))
         address, last = (Signal.like(port.addr, name=name) for name in ("address", "last"))
@@ -151,7 +151,7 @@ class LobeUnit(PipelinedUnit):
     parameters : Lobe
         Size and number of the tables, and the operand.
     initiation_interval : int
-        Distance in cycles of two inputs, at least 1.
+        Cycles from an input to the next, at least 1.
     tables : sequence of LobeTable or None
         Tables fixed at build time, one for each bank. ``None``: they are written.
     shares_memory : bool
@@ -164,11 +164,11 @@ class LobeUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"bank": ...}))`
-        Where there are several: the bank, less than their number; stays while beats are inside.
+        Only with several banks: the number of the bank, constant while beats are inside.
     write : :py:`In(stream.Signature(lobe_write_shape()))`
-        Where the unit has a memory of its own that is not fixed; see `LobeMemory`.
+        Only if the unit has a memory of its own that is not fixed; see `LobeMemory`.
     table : :py:`Out(lobe_read_signature(parameters))`
-        Where the memory is outside.
+        Only if the memory is outside.
 
     Raises
     ------
@@ -223,7 +223,7 @@ class LobeUnit(PipelinedUnit):
         return m
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last word."""
+        """The graph, read at the stage of its last word."""
         p = self.parameters
         self._base = Const(0, 1)
         if p.banks > 1:
@@ -310,7 +310,7 @@ class LobeUnit(PipelinedUnit):
 
 
 def _leading_zeros(code: Value) -> Value:
-    """How many bits at the top are 0, by halves."""
+    """Number of leading zeros, by halves."""
     if len(code) == 1:
         return ~code
     half = 1 << (len(code) - 1).bit_length() - 1

@@ -144,7 +144,7 @@ class SpecularUnit(PipelinedUnit):
     parameters : Specular
         Bit-accurate model: reflection model, kind of operand, form.
     initiation_interval : int
-        Distance in cycles of two inputs, at least 1.
+        Cycles from an input to the next, at least 1.
     exponent : int or None
         Exponent that is fixed at build time, 1 to 1000: no PROM, a constant shift, and the slope's multiplier
         is one by a constant, so that M is one less. ``None``: the exponent is a port.
@@ -203,7 +203,7 @@ class SpecularUnit(PipelinedUnit):
 
     @staticmethod
     def multiplications(parameters: Specular, exponent: int | None = None) -> int:
-        """M of the table above; with that initiation interval there is one multiplier."""
+        """Multiplications M, as in the table above; an initiation interval of M needs one multiplier."""
         chords = 3 if parameters.is_coscos else int(parameters.is_exponential)
         by_slope = exponent is None and not parameters.as_published
         return by_slope + parameters.squarings + chords

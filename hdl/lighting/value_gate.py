@@ -67,7 +67,7 @@ class ValueGateUnit(PipelinedUnit):
 
     @property
     def ports(self) -> dict[str, Member]:
-        """The port of exponent or threshold, for what passes it on; none if the exponent is fixed."""
+        """The port of exponent or threshold, for units that pass it on; none if the exponent is fixed."""
         return {name: member for name, member in self.signature.members.items() if name == "constants"}
 
     def datapath(self, m, operands):

@@ -51,8 +51,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Unit normals, three components ``SQ(1, 17)`` each; pixels.
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range": 1, "last": 1})))`
-        Normals, three components ``SQ(1, 17)``; ``out_of_range``: of a span wider than the bisection's
-        ``max_angle``; ``last``: the last of its span.
+        Normals, three components ``SQ(1, 17)``; ``out_of_range``: the span is wider than the bisection's
+        ``max_angle``; ``last``: the last normal of its span.
 
     Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7.
     """
@@ -83,8 +83,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
     def interval(self, levels: int) -> int:
         """Cycles from a span to the next, if both have so many levels and ``2^levels + 1`` pixels.
 
-        The longer one of the first two parts. Between spans of different levels the first part may wait up to
-        6 cycles for the multiplier.
+        The longer one of the first two parts decides. Between spans of different levels the first part may
+        wait up to 6 cycles for the multiplier.
         """
         return max(self.counting(levels), SEGMENT_CYCLES * ((1 << levels) + 1))
 
@@ -449,7 +449,7 @@ class _Levels:
 
 
 class _Segments:
-    """Registers and wires of the part that prepares segments: what the levels told, and its own."""
+    """Registers and wires of the part that prepares segments: the results of the first part, and its own."""
 
     def __init__(self, parameters: AdaptiveNormaliser):
         p, bits, depth = parameters, parameters.LENGTH_BITS, parameters.depth

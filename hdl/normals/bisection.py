@@ -23,7 +23,8 @@ def coefficient(parameters: Bisection, power: int, first_step: Value) -> FixedVa
     power : int
         Power of the coefficient.
     first_step : Value
-        Whether of the polynomial of the first step, for spans of 45 to 90 degrees; not read without one.
+        Whether it is from the polynomial of the first step, for spans of 45 to 90 degrees; not read if the
+        model has none.
     """
     codes = []
     for first in (False, True):
@@ -66,7 +67,7 @@ class BisectionUnit(PipelinedUnit):
     Raises
     ------
     ValueError
-        If `initiation_interval` is none of those.
+        If ``initiation_interval`` is out of range.
 
     Members
     -------

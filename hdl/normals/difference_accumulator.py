@@ -24,8 +24,8 @@ class AccumulatorUnit(wiring.Component):
     cycles that follow, unless the output waits. The next span is accepted early enough to leave no gap. A
     span of length 0 takes one cycle and gives nothing. No multipliers.
 
-    The accumulators take the words of a span in a cycle after it was accepted, so that a register drives all
-    that take them in.
+    The accumulators load the words of a span a cycle after it was accepted, so that a register drives the
+    enables of all of them.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ class AccumulatorUnit(wiring.Component):
     ports : mapping of str to Member, optional
         Further members, by name.
 
-    A subclass may carry further words of a span to its pixels; see `carried`. Its words may come from
-    elsewhere, a cycle after the length; see `hold`.
+    A subclass may carry further words of a span to its pixels; see `carried`. The words of a span may come
+    from elsewhere, a cycle after the length; see `hold`.
 
     Members
     -------
@@ -96,7 +96,7 @@ class AccumulatorUnit(wiring.Component):
 
     @classmethod
     def rounded(cls, parameters: DifferenceAccumulator, value: FixedValue) -> FixedValue:
-        """What the result is cut from: the value."""
+        """The value that the result is cut from: here ``value`` itself."""
         return value
 
     def elaborate(self, platform):

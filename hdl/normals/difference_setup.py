@@ -73,15 +73,15 @@ class DifferenceSetupUnit(PipelinedUnit):
         Cycles from an input to the next, 1 to 7, or to 9 in the order of [T]. ``None``: as many as there are
         products.
     order : int
-        Degree of the curve: 2; or 1 for a straight line, G = 0 without a port, of which the second difference
-        is 0.
+        Degree of the curve: 2; or 1 for a straight line, with G = 0 and no port for it, and a second
+        difference of 0.
     length_bits : int
         Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
 
     Raises
     ------
     ValueError
-        If a parameter is none of those.
+        If a parameter is out of range.
 
     Members
     -------
@@ -170,7 +170,7 @@ class DifferenceSetupUnit(PipelinedUnit):
             words["second", c] = graph.register(f"second_{c}", _twice, second)
 
     def _as_published(self, words, p, g, reciprocal, shift) -> None:
-        """``(G dt + P) dt`` and ``2 (G dt) dt``; of the curvature ``G dt`` a word without the shift of dt."""
+        """``(G dt + P) dt`` and ``2 (G dt) dt``; the word of ``G dt`` leaves the shift of dt out."""
         graph = self._graph
         curvature_format, step_format = DifferenceSetup.CURVATURE_FORMAT, SQ(1, 29)
         products = [

@@ -43,7 +43,7 @@ class MiddleNormalUnit(PipelinedUnit):
     Raises
     ------
     ValueError
-        If `initiation_interval` is none of those.
+        If ``initiation_interval`` is out of range.
 
     Members
     -------

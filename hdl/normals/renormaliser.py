@@ -40,7 +40,8 @@ class RenormaliserUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"vector": vector_shape(), "span": 1})))`
         Vectors, with a bit that passes through.
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range", "span"})))`
-        Unit vector, ``SQ(1, 17)``; whether the vector was too short, and the normal means nothing; the bit.
+        Unit vector, ``SQ(1, 17)``; ``out_of_range``: the vector is too short, and the normal invalid; the
+        bit.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
