@@ -105,7 +105,7 @@ class FrameConstantsUnit(wiring.Component):
     hold : :py:`In(1)`
         Whether no write is accepted.
     material : :py:`In(range(materials))`
-        Only where there are several: the material whose constants are given.
+        Only with several materials: index of the material whose constants are given.
     constants : :py:`Out(frame_constants_shape(lights, threshold, banks))`
         The constants.
 

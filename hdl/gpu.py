@@ -1,4 +1,4 @@
-"""A mesh in memory to the lanes of a monitor."""
+"""The GPU: from a mesh in memory to the lanes of a monitor."""
 
 from amaranth.hdl import Module, Signal
 from amaranth.lib import data, wiring
@@ -19,7 +19,7 @@ STATUS = (*DRAWN, "late_bands", "frames_shown")
 
 
 class GpuUnit(wiring.Component):
-    """`DrawUnit` and `DisplayUnit`: `Gpu` is the bit-accurate model.
+    """Draws a mesh and shows it, by a `DrawUnit` and a `DisplayUnit`: `Gpu` is the bit-accurate model.
 
     Three clocks, see `DisplayUnit`. Pixels are drawn as fast as they come, and shown a band later.
 
@@ -28,7 +28,7 @@ class GpuUnit(wiring.Component):
     parameters : Gpu
         Bit-accurate model, with all contents of memories.
     setups, compact
-        As `RenderUnit` has them.
+        As for `RenderUnit`.
 
     Members
     -------

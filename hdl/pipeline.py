@@ -55,13 +55,13 @@ PORT_DESCRIPTIONS = {
 def span_shape(parameters: Design) -> data.StructLayout:
     """Shape of a raster span: first pixel, pixels, unit normals at the first and last pixel centre.
 
-    Without lights there are no normals; a method that takes values has them in place of normals; with several
-    materials there is the index of its own, ``material``.
+    Without lights there are no normals; for a method that takes values these are in place of normals; with
+    several materials ``material`` is the index of the span's material.
 
     Parameters
     ----------
     parameters : Design
-        Of the pipeline.
+        Design of the pipeline.
     """
     members = {
         "x": unsigned(parameters.x_bits),
@@ -84,11 +84,10 @@ def span_shape(parameters: Design) -> data.StructLayout:
 def status_shape() -> data.StructLayout:
     """Shape of the pipeline's counters since reset, which stop at their largest value.
 
-    ``out_of_range_spans``: spans of an angle that the method does not serve, whose pixels have no error
-    bound; counted some cycles after the span is accepted. ``wide_spans``: spans that are wider than the error
-    bound of the exponent allows, of the chord method; see `SpanLimit`. ``empty_spans``: spans of length 0.
-    ``overrun``:
-    whether a span went past the largest x, after which x goes on from 0.
+    ``out_of_range_spans``: spans whose angle the method does not serve, so that their pixels have no error
+    bound; counted some cycles after the span is accepted. ``wide_spans``, with the chord method: spans that
+    are wider than the error bound of the exponent allows; see `SpanLimit`. ``empty_spans``: spans of length
+    0. ``overrun``: whether a span went past the largest x, after which x goes on from 0.
     """
     return data.StructLayout(
         {
@@ -109,7 +108,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
     each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles; up to two prepared
-    spans wait before the accumulator, so that after a long one short ones take less, but for a cycle.
+    spans wait before the accumulator, so that short spans after a long one take fewer, except for one cycle.
     (``bisection`` takes longer for spans of several segments.) A span of length 0 is accepted like any other
     and gives no pixel.
 
@@ -121,11 +120,12 @@ class ShadingPipelineUnit(wiring.Component):
 
     Without lights there is neither interpolator nor multiplier; every pixel has the ambient colour.
 
-    In the *compact* style the colours have one multiplier, the specular terms of a light one, its products
-    with a normal, where there is one, two, and the setup one or two (as many as its longest interval needs).
-    A pixel takes a cycle a channel for each of its diffuse and specular terms that is not 0, at least one;
-    and, where its light is in front and its span not dark, as many cycles as its specular model has products,
-    a power 42. So pixels without a highlight take fewer cycles. The pixels are the same to the bit.
+    In the *compact* style there is one multiplier for the colours, one for the specular terms of each light,
+    two for its products with a normal (if the method finds normals), and one or two for the setup (as many as
+    its longest interval needs). A pixel takes a cycle a channel for each of its diffuse and specular terms
+    that is not 0, and for one term at least; or, if a light is in front and the span not dark, as many cycles
+    as the specular model has products (a power 42), if those are more. So pixels without a highlight take
+    fewer cycles. The pixels are the same to the bit.
     ``cycles_per_pixel`` and ``latency`` are then those of a pixel with every term.
 
     A write is accepted when no span is inside, and no span is accepted while a write waits, so the constants
@@ -264,7 +264,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     @property
     def spans_inside(self) -> int:
-        """Spans that are inside at most."""
+        """Most spans inside at a time."""
         # Two more wait behind the memory of the coordinates.
         return self._waiting_spans + 2 + self._assembler.SPANS_INSIDE
 

@@ -43,7 +43,7 @@ class PixelAssemblerUnit(wiring.Component):
     Members
     -------
     coordinates : :py:`In(stream.Signature(coordinates_shape(x_bits, y_bits, length_bits)))`
-        Coordinates of each span, of 1 pixel or more. Past the largest x it goes on from 0.
+        Coordinates of each span, of 1 pixel or more. Past the largest x, x goes on from 0.
     colors : :py:`In(stream.Signature(pixel_color_shape()))`
         Colours, in the order of the spans' pixels.
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`

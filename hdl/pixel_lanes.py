@@ -28,7 +28,7 @@ class PixelLanesUnit(wiring.Component):
     """Joins several streams of pixels into beats of a pixel a lane; a lane may have none.
 
     A pixel leaves 1 cycle after it was accepted, and every lane accepts one on every cycle without stalls:
-    no lane waits for another. What a lane without a pixel holds has no meaning. No multipliers.
+    no lane waits for another. The payload of a lane without a pixel has no meaning. No multipliers.
 
     Parameters
     ----------

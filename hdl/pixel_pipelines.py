@@ -29,9 +29,9 @@ WAITING_SPANS = 512
 """Spans that wait before a pipeline in a memory.
 
 Block RAMs hold 512 words, and a memory in look-up tables of 32 words takes more logic than the block RAMs'
-ports. A mesh whose spans have about as many pixels as there are pipelines leaves the span port no cycle to
-spare, and each that a full FIFO takes from it is lost: of 10,712 triangles of the teapot at 640x480 four
-pipelines give 3.3 times the pixels of one with 32 words, and 3.6 times with 512.
+ports. If the spans of a mesh have about as many pixels as there are pipelines, the span port has no cycle to
+spare, and each cycle on which a full FIFO stops it is lost: for the 10,712 triangles of the teapot at 640x480
+four pipelines give 3.3 times the pixels of one with 32 words, and 3.6 times with 512.
 """
 
 
@@ -64,14 +64,14 @@ class PixelPipelinesUnit(wiring.Component):
     pipeline: its pixels keep the order of its spans. Between scanlines no order holds.
 
     One span is accepted a cycle, into the FIFO before its pipeline; a full FIFO stops the port. So the pixels
-    a cycle are at most the mean number of pixels of a span, and less where many spans in a row are of one
+    a cycle are at most the mean number of pixels of a span, and fewer where many spans in a row go to one
     pipeline. Spans triangle by triangle, which go from scanline to scanline, keep all pipelines busy; a frame
-    sorted by scanlines keeps one busy as soon as a scanline has more spans than a FIFO.
+    sorted by scanlines keeps only one busy if a scanline has more spans than a FIFO holds.
 
     A write goes to all pipelines. It is accepted when no span is inside, in a FIFO or a pipeline, and no span
     is accepted while a write waits. The first pixel leaves an idle unit `latency` cycles after its span was
-    accepted. Every pipeline has its own frame constants, and waits for itself alone where the material
-    changes.
+    accepted. Every pipeline has its own frame constants, and at a change of the material waits only for its
+    own spans.
 
     Counters of ``status`` are the sums of those of the pipelines and stop at their largest value, like those
     of one pipeline; they come a cycle later for each doubling of the pipelines.
@@ -120,7 +120,7 @@ class PixelPipelinesUnit(wiring.Component):
 
     @property
     def spans_inside(self) -> int:
-        """Spans that are inside one pipeline and its FIFO at most."""
+        """Most spans inside one pipeline and its FIFO at a time."""
         return self.pipelines[0].spans_inside + self._waiting + _BEHIND
 
     def elaborate(self, platform):
@@ -171,7 +171,7 @@ class PixelPipelinesUnit(wiring.Component):
 
 
 class _JoinedPipelines(wiring.Component):
-    """`PixelPipelinesUnit` with one stream of what a unit makes of the pipelines' pixels.
+    """`PixelPipelinesUnit` with one output stream, which a unit makes from the pipelines' pixels.
 
     Parameters
     ----------
@@ -234,8 +234,8 @@ class WidePipelinesUnit(_JoinedPipelines):
 class MergedPipelinesUnit(_JoinedPipelines):
     """`PixelPipelinesUnit` with one stream of pixels, in the order of the spans: that of one pipeline.
 
-    It gives a pixel a cycle at most. Of pipelines that take several cycles a pixel, as those of the compact
-    style do, it gives the pixels of all.
+    It gives a pixel a cycle at most, so that several pipelines gain speed only if each takes several cycles a
+    pixel, as in the compact style.
 
     Parameters
     ----------

@@ -76,10 +76,10 @@ class RenderUnit(wiring.Component):
     """Triangles to the pixels that are to be written: `Renderer` is the bit-accurate model.
 
     `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; spans wait between the first two in a
-    FIFO, and their depths pass the pipeline in another. With a coarse depth test a span waits there for its
-    answer, too, and leaves, or is dropped on one cycle. Each takes as long as it would alone, at the same
-    time as the others: a frame as many cycles as the slowest, if none of them waits for long. The compact
-    style is that of the design's build, of shading and, unless told otherwise, of geometry.
+    FIFO, and their depths pass the pipeline in another. With a coarse depth test a span also waits in the
+    FIFO for the test's answer, and then leaves, or is dropped in one cycle. The units work at the same time:
+    a frame takes as many cycles as the slowest of them alone, if none waits for long. The style of the
+    design's build is that of shading, and that of geometry unless ``compact`` says otherwise.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
     for the pipeline to be empty, see `ShadingPipelineUnit`.
@@ -89,9 +89,9 @@ class RenderUnit(wiring.Component):
     parameters : Renderer
         Bit-accurate model.
     size : (int, int) or None
-        As `DepthTestUnit` has it.
+        As for `DepthTestUnit`.
     setups : int
-        As `GeometryUnit` has it.
+        As for `GeometryUnit`.
     compact : bool or None
         Style of the geometry; ``None``: that of the design's build.
 
@@ -104,8 +104,8 @@ class RenderUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants of the shading pipeline.
     constants : :py:`In(frame_shape())`
-        The picture; stays while triangles are inside. With a coarse depth test it has a bit ``picture`` more,
-        which is another for each picture.
+        The picture's borders and options; constant while triangles are inside. With a coarse depth test also
+        a bit ``picture``, which changes from picture to picture.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
@@ -114,7 +114,7 @@ class RenderUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        No triangle, span or pixel is inside. A cycle after the last left.
+        No triangle, span or pixel is inside; high from a cycle after the last has left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -220,7 +220,7 @@ class RenderUnit(wiring.Component):
         return m
 
     def _judge(self, m: Module, room: Signal, taken: Value, head: stream.Interface) -> tuple[Value, Value]:
-        """Whether it is known of the first span that waits if it is hidden, and whether it is.
+        """For the first span that waits: whether its depth test has an answer, and whether it is hidden.
 
         The coarse depth test, if there is one, gets the spans of geometry, too, while it has ``room``.
         """

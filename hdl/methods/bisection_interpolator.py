@@ -35,7 +35,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInte
         self.setup_interval = self._normaliser.interval(0)
 
     def source(self, m):
-        """The normaliser; its flag, of the last pixel of a span."""
+        """The normaliser's normals, and its flag, on the last pixel of a span."""
         m.submodules.adaptive_normaliser = normaliser = self._normaliser
         m.d.comb += [
             *(normaliser.i.payload[name].eq(word) for name, word in span_words(self.i.payload)),

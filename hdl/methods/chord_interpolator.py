@@ -23,9 +23,9 @@ __all__ = ["ChordInterpolatorUnit"]
 
 
 class _Place(enum.IntEnum):
-    """What a normal is to its span: the normal of a pixel, or one of the three of a longer span.
+    """Place of a normal in its span: that of a pixel, or one of the three of a longer span.
 
-    The upper bit: the span is not complete with it; the lower one, of a complete span: it is long.
+    Upper bit: the span is not complete with this normal. Lower bit, of a complete span: it is long.
     """
 
     PIXEL = 0
@@ -57,8 +57,8 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
     Members
     -------
     constants : :py:`In(StructLayout({"lights": ..., "exponent": 10, "threshold": UQ(3, 15)}))`
-        L and H of each light, with highlights the specular exponent for `SpanLimit`, of tables a threshold;
-        constant while spans are inside.
+        L and H of each light; with highlights the specular exponent, for `SpanLimit`; with tables a
+        threshold. Constant while spans are inside.
     wide : :py:`Out(1)`
         High for one cycle for each wide span.
 
@@ -109,21 +109,21 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
 
     @property
     def light_vectors(self):
-        """L and H of each light, of the constants."""
+        """L and H of each light, from the constants."""
         return self.constants.lights
 
     @property
     def exponent(self):
-        """The specular exponent, of the constants."""
+        """The specular exponent, from the constants."""
         return self.constants.exponent if self.highlights else None
 
     @property
     def threshold(self):
-        """The threshold of a lobe's table, of the constants."""
+        """The threshold of a lobe's table, from the constants."""
         return self.constants.threshold if self.takes_threshold else None
 
     def elaborate(self, platform):
-        """Normals one after the other to the values; these, collected, to the spans."""
+        """Normals one after the other to the chord values; the values, collected, to the spans."""
         m = Module()
         m.submodules.chord_values = values = self._values
         m.submodules.span_limit = limit = self._limit
@@ -148,7 +148,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         return m
 
     def _send(self, m: Module, values, limit, word) -> None:
-        """Normals of a span: the first as the span is accepted, those that follow from registers."""
+        """Normals of a span: the first as the span is accepted, the others from registers."""
         span = self.i.payload
         right, middle = (
             Signal.like(normal, name=name, reset_less=True)
@@ -224,18 +224,18 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         self._flag(m, spans, limit, values.o, word, left)
 
     def _flag(self, m: Module, spans, limit, values: stream.Interface, word, left) -> None:
-        """Whether a span is wide, some cycles after it is complete: its angle, and where a highlight may be.
+        """Whether a span is wide, some cycles after it is complete: by its angle, and its highlights.
 
         Parameters
         ----------
         m : Module
             Module that gets the logic.
         spans, limit : wiring.Component
-            Where complete spans go, and whose results there are in their order.
+            The unit that complete spans go to, and the span limit, whose results come in their order.
         values : stream.Interface
             Values of the normals.
         word, left : data.View
-            What a normal is to its span, and the values at the first pixel.
+            Place of a normal in its span, and the values at the first pixel.
         """
         p = self._limit.parameters
         # A result can be read two cycles after it is there.
@@ -268,7 +268,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         m.d.comb += self.wide.eq(wide_now)
 
     _LIMITS_INSIDE = 8
-    """Results of the limit that wait at most for the values of their spans."""
+    """Most results of the limit that wait for the values of their spans."""
 
     def _is_lit(self, m: Module, name: str, values: stream.Interface, word, first, light, level) -> Value:
         """Whether a light is not behind a span and may have a highlight there, three cycles after it.

@@ -25,7 +25,7 @@ _LONG = 3
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
-    """``N . L`` and u of each light, and factors, a quadratic each; see `AccumulatorUnit`.
+    """Accumulators of ``N . L`` and u of each light, and of factors, a quadratic each; see `AccumulatorUnit`.
 
     The words of a span come a cycle after it was accepted.
 
@@ -40,7 +40,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     gated : bool
         Whether spans bring a gate's decision for each light, ``lit``.
     factors : sequence of int
-        Lights that fade, which have a quadratic more.
+        Indices of the lights that fade, which have a quadratic more.
 
     Members
     -------
@@ -50,7 +50,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         First values of the span that is taken in, and its differences; with factors ``factor_start`` and
         ``factors``, too.
     taken : :py:`Out(1)`
-        High for one cycle as the words of the span are taken in that was accepted before.
+        High for one cycle as the words of the span accepted before are taken in.
     o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights, ...)))`
         Operands of the pixels.
 
@@ -89,7 +89,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     @classmethod
     def begin(cls, parameters, start):
-        """The start alone where half a step of the result would take a sum: it is added to the result."""
+        """The start; where adding half a step of the result takes an adder, `rounded` adds it."""
         return (
             start.extend(parameters.format)
             if cls._adds_late(parameters)
@@ -98,7 +98,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     @classmethod
     def rounded(cls, parameters, value):
-        """The value, with the half that it does not have yet."""
+        """The value, with half a step of the result if `begin` has not added it."""
         return super().begin(parameters, value) if cls._adds_late(parameters) else value
 
     @staticmethod
@@ -112,7 +112,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         return self.words
 
     def hold(self, m, load):
-        """The decision alone: the words come when they are taken in."""
+        """Keep the decision alone: the words are on the port when they are taken in."""
         if self.gated:
             self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
             with m.If(self.i.ready):
@@ -126,7 +126,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
                 yield ~self._lit[index], light.gated
 
     def quadratics(self, values):
-        """Those of each light."""
+        """Quadratics of each light, and of each factor."""
         for index, (start, light) in enumerate(zip(self.span.start, self.span.lights, strict=True)):
             result = values[index]
             for name in self.functions:
@@ -158,9 +158,9 @@ class ChordSpansUnit(wiring.Component):
     length_bits : int
         Bits of the length.
     gate : ValueGateUnit or None
-        Decides which spans have no highlight; ``None``: nothing does.
+        Decides which spans have no highlight; ``None``: no gate.
     factors : sequence of int
-        Lights that fade.
+        Indices of the lights that fade.
 
     Members
     -------
@@ -173,7 +173,7 @@ class ChordSpansUnit(wiring.Component):
     out_of_range : :py:`Out(1)`
         High for one cycle for each span with a word that does not fit.
     constants : :py:`In(10)` or :py:`In(18)`
-        Specular exponent or threshold, constant while spans are inside; only of a gate that has it as a port.
+        Specular exponent or threshold, constant while spans are inside; only if the gate has it as a port.
 
     Source: docs/theory/chord.md#differences.
     """
@@ -219,16 +219,16 @@ class ChordSpansUnit(wiring.Component):
 
     @property
     def starts_inside(self) -> int:
-        """Depth of the memory of starts: all spans that may follow one that has just begun its setup.
+        """Depth of the memory of starts: room for the spans that may follow one during its setup.
 
-        Or come before it: its values may take an interval, in which none comes.
+        And for those before it: its values may take an interval, in which no span comes.
         """
         needed = self._setup.latency + self._setup.initiation_interval + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
 
     @property
     def differences_inside(self) -> int:
-        """Depth of the memory of differences: those inside the setup, too, a pixel a cycle behind it."""
+        """Depth of the memory of differences: room also for the spans inside the setup, three cycles each."""
         needed = -(-self._setup.latency // _LONG) + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
 
@@ -269,8 +269,9 @@ class ChordSpansUnit(wiring.Component):
     def _count(self, m: Module, accepted: Value, popped: Value) -> tuple[Signal, Signal]:
         """Whether there is room for a span, and whether differences wait; both are registers.
 
-        Between two spans of three pixels or more that the accumulators accept are two cycles or more, so that
-        a register may tell of differences. Spans are counted a cycle late: nothing is between handshakes.
+        The accumulators accept spans of three pixels or more at least two cycles apart, so that a register
+        can tell whether differences wait. Spans are counted a cycle late, so that no count lies between
+        handshakes.
         """
         joined, setup = self._accumulator.i, self._setup
         went, is_room = [], []
@@ -363,9 +364,9 @@ def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, d
     word : ValueLike
         Word that comes.
     written, taken : Value
-        Whether it does, and whether the first is taken.
+        Whether a word comes, and whether the first is taken.
     depth : int
-        Words at most, a power of two.
+        Most words inside, a power of two.
     """
     word = Value.cast(word)
     m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])

@@ -47,20 +47,20 @@ class InterpolatorUnit(wiring.Component):
     lights : int
         Number of lights, at least 1.
     setup_interval : int or None
-        Least cycles from a span to the next, one of `setup_intervals`. ``None``: 4, the largest if it is
-        less, or that of a method without a choice.
+        Least cycles from a span to the next, one of `setup_intervals`. ``None``: the largest of them up to 4,
+        or the only one of a method without a choice.
     highlights : bool
         Whether there is specular light; without it there are no operands of it.
     length_bits : int
         Bits of the length.
     product_interval : int
-        Least cycles from a pixel to the next in the products with L and H, of methods that find normals.
+        Least cycles from a pixel to the next in the products with L and H, for methods that find normals.
     gate : ValueGateUnit or None
-        Decides which spans have no highlight, of the chord methods; operands then have ``gated``.
+        Decides which spans have no highlight, for the chord methods; operands then have ``gated``.
     takes_threshold : bool
         Whether a threshold tells where highlights end, in place of the exponent; see `Design.threshold_of`.
     factors : sequence of int
-        Lights that fade, of methods with `TAKES_VALUES`; see `Design`.
+        Indices of the lights that fade, for methods with `TAKES_VALUES`; see `Design`.
 
     Members
     -------
@@ -69,9 +69,9 @@ class InterpolatorUnit(wiring.Component):
     o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
         Operands of the pixels.
     constants : :py:`In(light_vectors_shape(lights))`
-        L and H of each light; constant while spans are inside. None of methods with `TAKES_VALUES`.
+        L and H of each light; constant while spans are inside. Not for methods with `TAKES_VALUES`.
     out_of_range : :py:`Out(1)`
-        High for one cycle for each span of an angle that the method does not serve.
+        High for one cycle for each span whose angle the method does not serve.
 
     Raises
     ------
@@ -98,22 +98,22 @@ class InterpolatorUnit(wiring.Component):
         return ()
 
     def further_members(self) -> dict[str, wiring.Member]:
-        """Ports of a method's own, or in place of the common ones."""
+        """Further ports of a method; one with the name of a common port replaces it."""
         return {}
 
     @property
     def light_vectors(self) -> data.View | tuple:
-        """L and H of each light, of the constants; none of methods with `TAKES_VALUES`."""
+        """L and H of each light, from the constants; empty for methods with `TAKES_VALUES`."""
         return () if self.parameters.TAKES_VALUES else self.constants
 
     @property
     def exponent(self) -> Value | None:
-        """The specular exponent, of the constants; ``None`` where the method does not need it."""
+        """The specular exponent, from the constants; ``None`` where the method does not need it."""
         return None
 
     @property
     def threshold(self) -> Value | None:
-        """The threshold, of the constants; ``None`` where there is none."""
+        """The threshold, from the constants; ``None`` where there is none."""
         return None
 
     @classmethod
@@ -123,7 +123,7 @@ class InterpolatorUnit(wiring.Component):
         Parameters
         ----------
         lights, highlights, length_bits
-            Of the unit.
+            As for the unit.
         """
         return span_normals_shape(length_bits)
 

@@ -37,7 +37,7 @@ def operands_shape(
     gated : bool
         Whether a gate's decision, that there is no highlight, comes with them.
     factored : bool
-        Whether the factor comes with them of lights that fade; of others it is 0, and means nothing.
+        Whether factors of the lights that fade come with them; the factor of another light is 0, and unused.
     """
     operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
     if highlights:

@@ -19,7 +19,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
     """Chord setup, then accumulators: spans with values in, the operands of their pixels out.
 
     `LocalChordInterpolator` is the bit-accurate model. No multiplier a pixel; the attribute ``multipliers``
-    tells those of the setup. A span of two pixels takes two cycles, as two of one.
+    is the number of those of the setup. A span of two pixels takes two cycles, as two spans of one pixel do.
 
     Spans carry values in place of normals, so there are no vectors of lights. A span is flagged if one of its
     words does not fit.
@@ -36,7 +36,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
     Members
     -------
     constants : :py:`In(10)` or :py:`In(18)`
-        Specular exponent or threshold, constant while spans are inside; only of a gate that has it as a port.
+        Specular exponent or threshold, constant while spans are inside; only if the gate has it as a port.
 
     Source: docs/theory/chord.md#local-lights.
     """
@@ -96,7 +96,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         return m
 
     def _values(self, *spans: data.View) -> Iterator[tuple]:
-        """Name of each three values, and these of spans."""
+        """Name of each operand, and its three values in each of the spans."""
         for index, lights in enumerate(zip(*(span["values"] for span in spans), strict=True)):
             for name in lights[0].shape().members:
                 yield f"{name}_{index}", *(light[name] for light in lights)

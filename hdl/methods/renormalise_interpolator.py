@@ -18,7 +18,7 @@ __all__ = ["LineAccumulatorUnit", "RenormaliseInterpolatorUnit"]
 
 
 class LineAccumulatorUnit(AccumulatorUnit):
-    """Vectors of a straight line, and a bit that is another for the pixels of the next span.
+    """Vectors of a straight line, and a bit that changes from span to span.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class LineAccumulatorUnit(AccumulatorUnit):
         yield self.span.span, values.span
 
     def quadratics(self, values):
-        """The components; of second difference 0."""
+        """The components, with second differences of 0."""
         p, line = self.parameters.accumulator, self.span.line
         zero = FixedValue.constant(p.difference_format, 0)
         for c in range(3):
@@ -87,7 +87,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
         self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency
 
     def source(self, m):
-        """Lines, their vectors, unit vectors; spans of which a vector was too short."""
+        """Lines, their vectors, unit vectors; and a flag for each span with a vector that is too short."""
         m.submodules.line_setup = setup = self._setup
         m.submodules.line_accumulator = accumulator = self._accumulator
         m.submodules.renormaliser = renormaliser = self._renormaliser

@@ -21,7 +21,7 @@ def band_pixel_shape(parameters: BandBuffer) -> data.StructLayout:
 
 
 def shown_shape(parameters: BandBuffer) -> data.StructLayout:
-    """Shape of a cycle of the pixel clock: the timing's, and the colour."""
+    """Shape of a cycle of the pixel clock: the timing, and the colour."""
     timing = timing_shape(parameters.mode).members
     return data.StructLayout(dict(timing) | {channel: unsigned(8) for channel in "rgb"})
 
@@ -30,18 +30,19 @@ class BandBufferUnit(wiring.Component):
     """Two bands in a memory with two clocks: `BandBuffer` is the bit-accurate model.
 
     The domain ``sync`` draws, the domain ``pixel`` shows. Pixels of a free buffer are written as they come,
-    one a cycle. With ``done`` it goes to the display, which clears each word as it reads it, on the same port
-    (the memory reads before it writes), and gives it back after its last line; or at the beginning of the
-    next slot, as it is, if it came too late. Such a buffer, and each after a reset, the drawing side clears
-    itself, a word a cycle, while its band is already asked for. The display takes no notice of how long
-    drawing takes: its addresses follow from the timing alone. What is shown leaves a cycle after its timing.
-    No multipliers.
+    one a cycle. With ``done`` the buffer goes to the display. The display clears each word as it reads it, on
+    the same port (the memory reads before it writes), and gives the buffer back after its last line. A buffer
+    that came too late is given back, not cleared, at the beginning of the next slot. The drawing side clears
+    such a buffer, and each buffer after a reset, a word a cycle, while the band is already requested. The
+    display does not depend on the time that drawing takes: its addresses follow from the timing alone. A
+    colour leaves a cycle after its timing. No multipliers.
 
-    Between the clocks go four toggles (a buffer is filled; it is free), one of a slot that begins, and one of
-    a late band, each through two flip-flops; and the numbers of bands and of the slot, and whether a buffer
-    that is free was not shown, each written a cycle before its toggle or with it and read two cycles of the
-    reader's clock later or more: constraint: their paths take less than one period of the reader's clock. A
-    slot lasts longer than any of this takes: its lines have 800 pixels each by default.
+    These toggles cross between the clocks, each through two flip-flops: two for each buffer (it is filled; it
+    is free), one for the beginning of a slot, one for a late band. Beside them cross the numbers of bands and
+    of the slot, and whether a free buffer was not shown. Each of these words is written with its toggle or a
+    cycle before, and read two cycles of the reader's clock later or more. Constraint: their paths take less
+    than one period of the reader's clock. A slot lasts longer than a crossing: its lines have 800 pixels each
+    by default.
 
     Parameters
     ----------
@@ -51,17 +52,17 @@ class BandBufferUnit(wiring.Component):
     Members
     -------
     request : :py:`Out(stream.Signature(band))`
-        Bands to draw, in the order of the picture but for those whose slot has begun.
+        Bands to draw, in the order of the picture, without those whose slot has begun.
     pixels : :py:`In(stream.Signature(band_pixel_shape(parameters)))`
         Pixels of the band asked for last.
     done : :py:`In(stream.Signature(band))`
-        That band's number: all its pixels have been taken.
+        Number of that band, when all its pixels have been taken.
     timing : :py:`In(timing_shape(parameters.mode))`
         Domain ``pixel``.
     shown : :py:`Out(shown_shape(parameters))`
         Domain ``pixel``: the timing a cycle later, and the colour.
     status : :py:`Out(counters_shape("late_bands", "frames"))`
-        Bands in whose place the background was shown, and frames begun, since the reset.
+        Bands replaced by the background, and frames begun, since the reset.
 
     Source: docs/theory/video.md#bands.
     """
@@ -83,7 +84,7 @@ class BandBufferUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The memory, both sides of it, and what crosses between them."""
+        """The memory, both sides of it, and the signals that cross between them."""
         m = Module()
         given, width = self.parameters, sum(self.parameters.colour_bits)
         m.submodules.colours = memory = Memory(shape=width, depth=2 * given.pixels, init=[])

@@ -16,22 +16,22 @@ __all__ = ["BandDepthUnit"]
 class BandDepthUnit(wiring.Component):
     """The memory behind a `DepthMemory` port that a band begins anew: `BandDepth` is the bit-accurate model.
 
-    With ``begin`` the tag goes on, and `BandDepth.swept` words are swept, one a cycle, or all with the first
-    band after a reset; ``busy`` is high for so long, and the port must not be used. No multipliers.
+    With ``begin`` the tag counts up, and `BandDepth.swept` words (all words after a reset) are swept, one a
+    cycle; meanwhile ``busy`` is high, and the port must not be used. No multipliers.
 
     Parameters
     ----------
     parameters : BandDepth
         Bit-accurate model.
     x_bits, y_bits : int
-        Bits of a place.
+        Bits of the coordinates.
 
     Members
     -------
     memory : :py:`In(DepthMemory(x_bits, y_bits))`
         Depths of the band.
     begin : :py:`In(1)`
-        A band begins; while ``busy`` is low.
+        A band begins; only while ``busy`` is low.
     busy : :py:`Out(1)`
         Words are swept.
 

@@ -1,4 +1,4 @@
-"""Clocks: a PLL that makes the clocks of a display and of what draws for it, of a board's clock."""
+"""Clocks: a PLL that makes the clocks for drawing and for the display from a board's clock."""
 
 from amaranth.hdl import ClockSignal, Const, Instance, Module, Signal
 from amaranth.lib import wiring
@@ -12,9 +12,9 @@ __all__ = ["ClockUnit"]
 class ClockUnit(wiring.Component):
     """ECP5's PLL, ``EHXPLLL``, which drives the domains ``sync``, ``pixel``, ``serial``.
 
-    Their clocks stand still until it is locked, behind a gate each, ``DCCA``, which lets only whole pulses
-    through. So every register starts as the configuration set it, and none needs a reset, whose net would go
-    to half of them. Who uses it defines the domains, without reset.
+    Each clock has a gate, ``DCCA``, which lets only whole pulses through, and stands still until the PLL is
+    locked. So every register starts as the configuration set it, and no register needs a reset, whose net
+    would go to half of them. The enclosing module defines the domains, without reset.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class ClockUnit(wiring.Component):
     Attributes
     ----------
     clocks : dict of str to Signal
-        By domain, for constraints.
+        Clocks by domain, for constraints.
 
     Source: docs/theory/video.md#display; Lattice FPGA-TN-02200, ECP5 sysCLOCK PLL.
     """

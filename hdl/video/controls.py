@@ -1,4 +1,4 @@
-"""Controls: what buttons do to the frames that follow."""
+"""Controls: buttons that set the angle and the list of the next frames."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import wiring
@@ -15,8 +15,8 @@ class ControlsUnit(wiring.Component):
     """Angle and list of each frame: `Controls` is the bit-accurate model.
 
     Buttons go through two flip-flops, and are sampled when a counter of all of them is full; a press is a
-    sample that is down after one that is up. On the cycle after ``frame`` the next frame's angle and list are
-    there, and stay until the next one, but for presses. No multipliers.
+    sample that is down after one that is up. Angle and list of a frame are valid from the cycle after
+    ``frame``, and change before the next ``frame`` only by a press. No multipliers.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class ControlsUnit(wiring.Component):
     Members
     -------
     buttons : :py:`In(4)`
-        From `BUTTONS`, 1 while down, of any clock.
+        One bit for each of `BUTTONS`, 1 while down, from any clock domain.
     frame : :py:`In(1)`
         A frame begins.
     angle : :py:`Out(12)`
@@ -74,7 +74,7 @@ class ControlsUnit(wiring.Component):
         return ("material", self.parameters.materials), ("light", self.parameters.lights)
 
     def _pressed(self, m: Module) -> Signal:
-        """Whether each button gets down on this cycle, without its bounces."""
+        """Whether each button goes down on this cycle, without bounces."""
         down = Signal(len(BUTTONS), name="down")
         count = Signal(self.parameters.debounce_bits, name="count")
         state, pressed = Signal.like(down, name="state"), Signal.like(down, name="pressed")

@@ -1,4 +1,4 @@
-"""Display: pixels of bands to the pairs of bits of four lanes."""
+"""Display: from the pixels of bands to pairs of bits on four lanes."""
 
 from amaranth.hdl import Cat, Const, DomainRenamer, Module
 from amaranth.lib import data, wiring
@@ -31,7 +31,7 @@ class DisplayUnit(wiring.Component):
     Members
     -------
     request, pixels, done, status
-        Of `BandBufferUnit`.
+        As for `BandBufferUnit`.
     pairs : :py:`Out(data.ArrayLayout(2, 4))`
         Domain ``serial``: two bits of each lane, bit 0 first, for `OutputCells`.
 

@@ -25,8 +25,8 @@ def timing_shape(mode: DisplayMode) -> data.StructLayout:
 class DisplayTimingUnit(wiring.Component):
     """Two counters and the signals that follow from them: `DisplayTiming` is the bit-accurate model.
 
-    Free-running: the display never waits. A position a cycle, the model's cycle 0 on the first after the
-    reset. No multipliers. Its clock is the pixel clock.
+    Free-running: the display never waits. A position each cycle; the first cycle after the reset is the
+    model's cycle 0. No multipliers. Its clock is the pixel clock.
 
     Parameters
     ----------

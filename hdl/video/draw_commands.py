@@ -1,4 +1,4 @@
-"""Draw commands: the lists of a memory, walked for every band."""
+"""Draw commands: lists in a memory, read through for every band."""
 
 from amaranth.hdl import Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
@@ -19,7 +19,7 @@ def command_shape() -> data.StructLayout:
 
 
 def walk_request_shape(commands: int) -> data.StructLayout:
-    """Shape of what asks for a walk: where the list begins, and whether it is a frame's first band."""
+    """Shape of a request for a walk: start address of the list, and whether it is a frame's first band."""
     bits = max((commands - 1).bit_length(), 1)
     return data.StructLayout({"start": unsigned(bits), "first_band": unsigned(1)})
 
@@ -27,9 +27,9 @@ def walk_request_shape(commands: int) -> data.StructLayout:
 class DrawCommandsUnit(wiring.Component):
     """Walks a list from its start to its end: `DrawCommands` is the bit-accurate model.
 
-    A word a cycle is read; those of a frame's first band are left out in others. The first command is offered
-    two cycles after the request was accepted, and the next request accepted after the end was taken. No
-    multipliers.
+    A word a cycle is read; commands for a frame's first band are left out in other bands. The first command
+    is offered two cycles after the request was accepted, and the next request accepted after the end was
+    taken. No multipliers.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ from blysk.hdl.video.vertex_unit import VertexUnit, matrix_shape
 __all__ = ["STATUS", "DrawUnit", "band_shape", "drawn_band_pixel_shape"]
 
 STATUS = (*COUNTERS, *RENDERED, "frames", "bands", "busy")
-"""Counters of `DrawUnit`: of the assembly, of the renderer; frames and bands begun, cycles without a wait."""
+"""Counters of `DrawUnit`: those of the assembly and of the renderer; frames and bands begun; busy cycles."""
 
 
 def band_shape(bands: int):
@@ -41,12 +41,12 @@ def drawn_band_pixel_shape(x_bits: int, y_bits: int) -> data.StructLayout:
 
 
 class DrawUnit(wiring.Component):
-    """Draws bands as they are asked for: `Drawing` is the bit-accurate model.
+    """Draws bands on request: `Drawing` is the bit-accurate model.
 
-    A band that does not follow the one before it begins a frame: the controls move on, the vertices of all
-    meshes are transformed, and the constants written. Then, and for every other band at once, the list's
-    triangles are walked, those of the band drawn. When the last pixel has left, ``done`` gives the band's
-    index; the depths are cleared for the next one while nothing is asked for.
+    A band begins a frame if its index is not larger than that of the band before: the controls move on, the
+    vertices of all meshes are transformed, and the constants written. After that (in other bands at once) the
+    list's triangles are read, and those in the band are drawn. When the last pixel has left, ``done`` gives
+    the band's index; then the depths are cleared, before the next request is accepted.
 
     A frame takes, beside the renderer's cycles: three for a triangle and a band; 30 for a vertex; 150 for a
     mesh; `BandDepth.swept` for a band where the next one is asked for at once.
@@ -56,7 +56,7 @@ class DrawUnit(wiring.Component):
     parameters : Drawing
         Bit-accurate model, with all contents of memories.
     setups, compact
-        As `RenderUnit` has them.
+        As for `RenderUnit`.
 
     Members
     -------

@@ -1,4 +1,4 @@
-"""Mesh memory: the vertices of a range, one after the other."""
+"""Mesh memory: gives the vertices of a range, one after the other."""
 
 from amaranth.hdl import Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
@@ -12,11 +12,11 @@ from blysk.hdl.video.vertex_unit import mesh_vertex_shape
 __all__ = ["RANGE_BITS", "MeshMemoryUnit", "range_shape"]
 
 RANGE_BITS = 12
-"""Bits of the first vertex or triangle of a range, and of their number."""
+"""Bits of the index of a range's first vertex or triangle, and of their number."""
 
 
 def range_shape() -> data.StructLayout:
-    """Shape of a range: first vertex or triangle, and how many there are, at least one."""
+    """Shape of a range: first vertex or triangle, and their number, at least one."""
     return data.StructLayout({"first": unsigned(RANGE_BITS), "count": unsigned(RANGE_BITS)})
 
 

@@ -14,13 +14,13 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 __all__ = ["MotionUnit", "entry_shape", "turn_shape"]
 
 _STEPS = 5
-"""Steps of an entry before it is given."""
+"""Steps of an entry before its output."""
 
 _FIRST_OFFSET, _LAST_OFFSET = 9, 11
 
 
 def turn_shape(slots: int) -> data.StructLayout:
-    """Shape of what asks for a matrix: its slot, and the angle."""
+    """Shape of a request for a matrix: its slot, and the angle."""
     return data.StructLayout(
         {"slot": unsigned(max((slots - 1).bit_length(), 1)), "angle": unsigned(ANGLE_BITS)}
     )
@@ -32,7 +32,7 @@ def entry_shape() -> data.StructLayout:
 
 
 class MotionUnit(wiring.Component):
-    """Computes a matrix, an entry after the other: `Motion` is the bit-accurate model.
+    """Computes a matrix, one entry after the other: `Motion` is the bit-accurate model.
 
     A matrix takes three cycles for cosine and sine, then seven an entry. One multiplier.
 
@@ -46,7 +46,7 @@ class MotionUnit(wiring.Component):
     i : :py:`In(stream.Signature(turn_shape(slots)))`
         Requests.
     o : :py:`Out(stream.Signature(entry_shape()))`
-        21 entries of each.
+        21 entries for each request.
 
     Source: docs/theory/video.md#vertices; not in the documents.
     """

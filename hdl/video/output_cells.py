@@ -12,9 +12,9 @@ __all__ = ["OutputCells"]
 class OutputCells(wiring.Component):
     """A cell a lane that sends bit 0 of a pair in the first half of a cycle, bit 1 in the second.
 
-    With ports it is the FPGA's own, by Amaranth's `DDRBuffer`: ``ODDRX1F`` on ECP5. Without, it is the model
-    of one: ``bits`` has on each cycle the pair that the pins send, two cycles after it was given, as
-    ``ODDRX1F`` has it. Its clock is the domain ``serial``.
+    With ports it is the FPGA's own cell, by Amaranth's `DDRBuffer`: ``ODDRX1F`` on ECP5. Without ports it is
+    a model of that cell: ``bits`` has on each cycle the pair that the pins send, two cycles after it was
+    given, as with ``ODDRX1F``. Its clock is the domain ``serial``.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ class OutputCells(wiring.Component):
     Members
     -------
     pairs : :py:`In(data.ArrayLayout(2, lanes))`
-        What to send.
+        Pairs to send.
     bits : :py:`Out(data.ArrayLayout(2, lanes))`
-        What is sent; without ports only.
+        Pairs that are sent; only without ports.
 
     Source: docs/theory/video.md#tmds.
     """

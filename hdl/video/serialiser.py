@@ -12,7 +12,7 @@ __all__ = ["SerialiserUnit"]
 
 
 class SerialiserUnit(wiring.Component):
-    """Five pairs of each word: `Serialiser` is the bit-accurate model.
+    """Sends each word as five pairs of bits: `Serialiser` is the bit-accurate model.
 
     A word every 5 cycles; its first pair leaves a cycle after it was taken in. Its clock is the serial clock.
     No multipliers.

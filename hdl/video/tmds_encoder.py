@@ -9,7 +9,7 @@ from blysk.hdl.core.stream import PipelinedUnit
 __all__ = ["SYMBOL", "TmdsEncoderUnit"]
 
 SYMBOL = data.StructLayout({"data": 8, "control": 2, "active": 1})
-"""A byte, sent where ``active``; elsewhere ``control``, ``c0 + 2 c1``."""
+"""Shape of an input: the byte ``data`` is sent if ``active``, else ``control``, ``c0 + 2 c1``."""
 
 
 class TmdsEncoderUnit(PipelinedUnit):
@@ -25,7 +25,7 @@ class TmdsEncoderUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(SYMBOL))`
-        What to send.
+        Bytes or control bits to send.
     o : :py:`Out(stream.Signature(10))`
         The word; bit 0 is to be sent first.
 

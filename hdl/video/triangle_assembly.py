@@ -1,4 +1,4 @@
-"""Triangle assembly: triangles of a range of the mesh memory that lie in a band, from screen vertices."""
+"""Triangle assembly: the triangles in a band, from ranges of the mesh memory and screen vertices."""
 
 from amaranth.hdl import Array, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
@@ -26,7 +26,7 @@ def band_rows_shape() -> data.StructLayout:
 
 
 class TriangleAssemblyUnit(wiring.Component):
-    """Keeps vertices of a frame, makes triangles of them: `TriangleAssembly` is the bit-accurate model.
+    """Keeps vertices of a frame, makes triangles from them: `TriangleAssembly` is the bit-accurate model.
 
     A triangle takes three cycles, one for each corner that is read, whether it is sent or not; it is offered
     `latency` cycles after its first corner's address. A range is accepted while none is read, and costs two
@@ -42,13 +42,13 @@ class TriangleAssemblyUnit(wiring.Component):
     i : :py:`In(stream.Signature(draw_shape()))`
         Ranges of triangles.
     o : :py:`Out(stream.Signature(triangle_shape(grid)))`
-        Those to be drawn.
+        The triangles to be drawn.
     write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid)}))`
         Vertices of the frame, one a cycle, while no triangle is read.
     constants : :py:`In(band_rows_shape())`
-        The band; stays while triangles are read.
+        The band; constant while triangles are read.
     status : :py:`Out(counters_shape(*COUNTERS))`
-        What was counted since the reset.
+        Counters since the reset.
 
     Attributes
     ----------

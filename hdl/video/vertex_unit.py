@@ -49,7 +49,7 @@ def screen_vertex_shape(grid: Grid = GRID) -> data.StructLayout:
 class VertexUnit(PipelinedUnit):
     """Transforms vertices: `VertexTransform` is the bit-accurate model.
 
-    The latency is `latency`, the initiation interval 30 cycles with one multiplier.
+    The latency is the attribute ``latency``; with one multiplier the initiation interval is 30 cycles.
 
     Parameters
     ----------
@@ -58,16 +58,16 @@ class VertexUnit(PipelinedUnit):
     index_bits : int
         Bits of the index that goes with a vertex.
     initiation_interval : int
-        Cycles from a vertex to the next, 15 or more: half of 30 takes two multipliers.
+        Cycles from a vertex to the next, 15 or more: 15 takes two multipliers.
 
     Members
     -------
     i : :py:`In(stream.Signature(mesh_vertex_shape(index_bits)))`
         Vertices of a mesh.
     o : :py:`Out(stream.Signature(data.StructLayout({"index", "vertex": screen_vertex_shape(grid)})))`
-        The same on the screen.
+        The same vertices on the screen.
     constants : :py:`In(matrix_shape())`
-        The matrix; stays while vertices are inside.
+        The matrix; constant while vertices are inside.
 
     Source: docs/theory/video.md#vertices; not in the documents.
     """
@@ -192,7 +192,7 @@ class VertexUnit(PipelinedUnit):
         return above.any() & ~above.all()
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last words."""
+        """The graph, read at the stage of its last words."""
         self._module = m
         read = self._graph.build(m, self, operands)
         value = {name: read(word, self.latency) for name, word in self._results.items()}

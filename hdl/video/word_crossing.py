@@ -9,7 +9,7 @@ __all__ = ["WordCrossing"]
 
 
 class WordCrossing(wiring.Component):
-    """A word of each cycle of the domain ``pixel`` in the domain ``serial``, valid on every fifth cycle.
+    """Brings a word of each ``pixel`` cycle into the domain ``serial``, where every fifth cycle is valid.
 
     A bit that toggles with each word goes through two flip-flops; its first edge sets a counter of five
     cycles. Later edges may come a cycle early or late, where the edges of both clocks lie close together,
@@ -21,7 +21,7 @@ class WordCrossing(wiring.Component):
     Parameters
     ----------
     shape : ShapeLike
-        Of a word.
+        Shape of a word.
 
     Members
     -------
