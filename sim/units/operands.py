@@ -69,7 +69,7 @@ def component_words(*codes: np.ndarray) -> tuple[Fixed, ...]:
 
 
 def any_codes(rng: np.random.Generator, format: Format, *shape: int) -> np.ndarray:
-    """Codes anywhere in a word; a third of every size; of each 16th row the ends of the word, 0 or 1."""
+    """Codes anywhere in a format; every third row has codes of every size, every 16th ends, 0 or 1."""
     codes = rng.integers(format.min_code, format.max_code, shape, endpoint=True)
     codes[1::3] >>= rng.integers(0, format.width, codes[1::3].shape)
     ends = [format.min_code, format.max_code, 0, 1]
@@ -83,7 +83,7 @@ def word_ends(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 
 def word_corners(*words: int) -> np.ndarray:
-    """Codes of pairs of vectors, each component one of some codes: all combinations, shape (2, count, 3).
+    """Codes of pairs of vectors with components from a few codes: all combinations, shape (2, count, 3).
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def code_pairs_at(
 def pairs_of_length(
     rng: np.random.Generator, count: int, degrees: np.ndarray | float, length: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of pairs of vectors of a given length, without those of components longer than a unit vector."""
+    """Codes of pairs of vectors of a given length; pairs with a component over 1 are left out."""
     pairs = np.stack(pairs_at(rng, count, degrees)) * length
     left, right = np.rint(pairs[:, (np.abs(pairs) <= 1).all(axis=(0, 2))] * ONE).astype(np.int64)
     return left, right
@@ -144,9 +144,9 @@ def pairs_of_length(
 def pairs_chosen(
     left: np.ndarray, right: np.ndarray, choose: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of each vector of codes with each of others whose ``1 - a . b`` is chosen.
+    """Pairs of a vector of ``left`` and one of ``right`` whose ``1 - a . b`` is chosen.
 
-    For the few pairs whose word of ``1 - a . b`` is at the border of a rounding, among many.
+    Finds, among many pairs, the few whose word of ``1 - a . b`` is at the border of a rounding.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def span_ends(rng: np.random.Generator, count: int, widest: float) -> tuple[np.n
 
 
 def any_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of pairs of unit normals at any angle, of any size; of every sixteenth any words."""
+    """Codes of pairs of unit normals at angles of every size; every sixteenth of arbitrary codes."""
     left = sphere(rng, count)
     right = normalise(left + 10.0 ** rng.uniform(-5, 1, (count, 1)) * rng.normal(size=(count, 3)))
     left, right = quantise(left), quantise(right)
@@ -219,7 +219,7 @@ def light_constants(unit: Component, direction: np.ndarray, halfway: np.ndarray)
 
 
 def log_lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndarray:
-    """Lengths of so many spans by their logarithm, the shortest and the longest two among them."""
+    """Lengths of ``count`` spans by their logarithm, the shortest and the longest two among them."""
     lengths = np.floor(least * (4096 / least) ** rng.random(count)).astype(np.int64)
     edges = [least, least + 1, 4094, 4095]
     lengths[: len(edges)] = edges[:count]
@@ -227,19 +227,19 @@ def log_lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndar
 
 
 def span_lengths(rng: np.random.Generator, pixels: int, least: int = 1) -> np.ndarray:
-    """Lengths of spans that have about so many pixels or a few more, in any order."""
+    """Lengths of spans that have about ``pixels`` pixels or a few more in all, in any order."""
     return rng.permutation(log_lengths(rng, max(pixels // 450, 16), least))
 
 
 def any_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Lengths of so many spans, short ones as often as long ones."""
+    """Lengths of ``count`` spans, short ones as often as long ones."""
     lengths = np.floor(4096 ** rng.random(count)).astype(np.int64)
     lengths[:: max(count // 4, 1)] = 4095
     return lengths
 
 
 def short_lengths(rng: np.random.Generator, pixels: int, least: int = 0) -> np.ndarray:
-    """Lengths of spans that have exactly so many pixels; most are short."""
+    """Lengths of spans that have exactly ``pixels`` pixels in all; most are short."""
     longest = min(4096, 2 + pixels // 16)
     lengths = np.floor(longest ** rng.random(max(pixels // 8, 8)) ** 3).astype(np.int64)
     lengths = np.maximum(lengths - (1 - least), least)
@@ -249,7 +249,7 @@ def short_lengths(rng: np.random.Generator, pixels: int, least: int = 0) -> np.n
 
 
 def pixel_of(rng: np.random.Generator, length: np.ndarray) -> np.ndarray:
-    """Offset of a pixel of each span; of every fourth the last."""
+    """Offset of a pixel in each span; in every fourth span that of the last."""
     pixel = np.floor(rng.random(len(length)) * length).astype(np.int64)
     pixel[::4] = length[::4] - 1
     return pixel
@@ -267,9 +267,9 @@ def setup_spans(
     count : int
         Spans, 200 or more.
     widest : float
-        Largest angle in degrees of those that are in range.
+        Largest angle of the spans in range, in degrees.
     out_of_range : float
-        Least angle of those that are not, of which there are 60; opposite normals among them.
+        Least angle of the spans out of range: 60 spans, opposite normals among them.
     """
     angles = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 80), rng.uniform(0, widest, count - 200)]
     angles = np.r_[angles, rng.uniform(out_of_range, 180, 59), 180]
@@ -310,8 +310,9 @@ def highlight_codes(
 ) -> np.ndarray:
     """Operands of a specular unit: most where the term is not 0 or near its end, some at any 1 - cos gamma.
 
-    Of every fourth 1 - cos gamma is drawn by its logarithm, every third is any code, every twelfth off the
-    last lit one by up to 3 of any bit, every sixteenth the code of cos gamma = 1, 0 or -1, or one next to it.
+    In every fourth operand 1 - cos gamma is drawn by its logarithm. Every third operand is any code, every
+    twelfth differs from the last lit one by up to 3 units of any bit, and every sixteenth is the code of
+    cos gamma = 1, 0 or -1, or one next to it.
     """
     format = parameters.operand_format
     reach = 1.25 * parameters.last_lit_arguments[exponent] * 2.0**-25
@@ -334,7 +335,7 @@ def highlight_codes(
 
 
 def exponents(rng: np.random.Generator, count: int) -> Iterator[tuple[int, int]]:
-    """Exponents, and how many of so many samples each has."""
+    """Exponents, and how many of the samples each has."""
     chosen = [1, 2, 3, 10, 100, 500, 999, MAX_EXPONENT]
     chosen += rng.integers(1, MAX_EXPONENT + 1, 32).tolist()
     for exponent in chosen:

@@ -49,17 +49,17 @@ from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 __all__ = ["DESIGNS", "LONG_DESIGNS", "RECORD", "case_of", "spans_of"]
 
 _GROUPS = 8
-"""Exponents of a measurement: so many parts of the spans have one each."""
+"""Exponents of a measurement: the spans are divided into as many parts, with an exponent each."""
 
 _COUNTED = (1 << 16) + 2
-"""Spans that a counter of 16 bits does not hold."""
+"""Number of spans that is over the range of a counter of 16 bits."""
 
 
 # Errors.
 
 
 def _measure(rng, count, design):
-    """A channel of grey pixels, of 255."""
+    """A channel of grey pixels, 0 to 255."""
     interpolator, model = design.interpolator, design.specular.model
     reflection = {"ambient": 0.1, "diffuse": 0.5, "specular": 0.4}
     ambient, k_d, k_s = reflection.values()
@@ -141,7 +141,7 @@ def _status(unit, case):
 
 
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
-    """Spans under the constants of each material, which are written over others of these codes."""
+    """Input of spans, and the constants of each material, written over constants of the codes ``before``."""
     write = writes_of(constants if isinstance(constants, list) else [constants])
     # Tables have an order of their own.
     kept = np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS))
@@ -285,7 +285,7 @@ DESIGNS: dict[str, Design] = {
     "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
     "without lights": preset(model="cosquad", lights=0, materials=2),
 }
-"""Pipelines by name that differ from those of the methods and models in what they have."""
+"""Further pipelines by name: with other numbers of lights and materials, styles, gates or formats."""
 
 LONG_DESIGNS: dict[str, Design] = {
     "16 lights": preset(model="cosquad", lights=16),
@@ -317,7 +317,7 @@ LONG_DESIGNS: dict[str, Design] = {
     "grey": preset("chord", None, grey=True),
     "few bits": replace(_FULL, **_LESS),
 }
-"""Further ones, of the long run."""
+"""Further pipelines by name, for the long run."""
 
 
 def _variants():

@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 _LONG_AND_SHORT = ((200, 4095), (3000, 12))
-"""Numbers of spans, and their longest."""
+"""Number of spans and their largest length, for long and for short spans."""
 
 
 # Constants.
@@ -89,7 +89,7 @@ def tabled(
 
 
 def _tables_written(design: Design, write: dict[str, np.ndarray]) -> list[LobeTable]:
-    """Table of each bank after so many writes."""
+    """Table of each bank after the writes."""
     lobe = design.specular
     if lobe.fixed is not None:
         return lobe.fixed_tables
@@ -102,7 +102,7 @@ def _tables_written(design: Design, write: dict[str, np.ndarray]) -> list[LobeTa
 
 
 def constants_written(design: Design, write: dict[str, np.ndarray]) -> list[FrameConstants]:
-    """Constants of each material after so many writes, of a pipeline in which all were 0."""
+    """Constants of each material after the writes to a pipeline in which all were 0."""
     words = np.zeros((design.materials, (design.lights + 1) * LIGHT_STRIDE), dtype=np.int64)
     index = 0
     for address, data in zip(write["address"].tolist(), write["data"].tolist(), strict=True):
@@ -139,7 +139,7 @@ def constants_written(design: Design, write: dict[str, np.ndarray]) -> list[Fram
 
 
 def any_spans(rng: np.random.Generator, design: Design, length: np.ndarray) -> Spans:
-    """Spans of such lengths; some flat, some of a larger angle than the method serves; by material."""
+    """Spans of given lengths; some flat, some of a larger angle than the method serves; by material."""
     count = len(length)
     largest = min(design.interpolator.MAX_ANGLE, 179.0)
     angles = np.where(rng.random(count) < 0.1, rng.uniform(largest, 180, count), largest * rng.random(count))
@@ -193,9 +193,9 @@ def spans_about(
     middles : array, shape (spans, 3)
         Unit vectors.
     longest : int
-        Pixels.
+        Largest length in pixels.
     decades : int
-        Of the angles.
+        Decades of the angles.
     """
     count = len(middles)
     across = normalise(np.cross(middles, rng.normal(size=middles.shape)))
@@ -210,9 +210,9 @@ def spans_about(
 def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.ndarray) -> Spans:
     """Spans on the terminator, the border of light and shade, of a light with a vector of this code.
 
-    Among them those that start within some last bits of it, as whether there is a highlight depends on the
-    sign of N.L, of 34 bits or rounded to 25; those that cross it as slowly as they can; and those along which
-    N.L rises by half a step of 18 bits more than a whole number of them, to which the chord method rounds.
+    Some start within a few last bits of it, as the sign of N.L, of 34 bits or rounded to 25, decides whether
+    there is a highlight. Some cross it as slowly as they can. Along some N.L rises by a whole number of steps
+    of 18 bits and half a step, where the chord method rounds.
     """
     light = normalise(code)
 
@@ -243,8 +243,8 @@ def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.nda
 def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarray) -> Spans:
     """Spans along the terminator whose 1 - cosine depends on its last bits.
 
-    Either it is at the border of its rounding, or the number of segments into which bisection divides the
-    span is about to change.
+    Either this word is at the border of its rounding, or the number of segments into which bisection divides
+    the span is about to change.
     """
     normaliser = AdaptiveNormaliser()
     across = normalise(np.cross(light, rng.normal(size=3)))
@@ -283,7 +283,7 @@ def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.nda
 
 
 def axes_about(rng: np.random.Generator, largest: float) -> Spans:
-    """Spans whose normals are components of 1, which are rounded to the largest word."""
+    """Spans about the axes, where a component of a normal is 1, which is rounded to the largest code."""
     axes = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
     return spans_about(rng, largest, axes, 60)
 

@@ -20,12 +20,12 @@ from blysk.sim.units.record import Case, Record, Stimulus, Variant
 __all__ = ["RECORD"]
 
 _COUNTED = (1 << 16) + 2
-"""Spans that a counter of 16 bits does not hold."""
+"""Number of spans that is over the range of a counter of 16 bits."""
 
 _DEFAULT = "2 pipelines, without lights"
 
 _MOST = 65535
-"""Of a counter."""
+"""Largest value of a counter."""
 
 
 def _pixels(unit, case):

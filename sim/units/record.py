@@ -35,10 +35,10 @@ Beats = np.ndarray | Mapping[str, Any]
 """Beats of a stream: a structured array, or (nested) mappings of field names to arrays of codes."""
 
 PAUSE, PAUSED = 61, 40
-"""Cycles from a beat to the next, and how many beats come so, in a run that ends each stimulus."""
+"""Cycles from a beat to the next, and number of beats, in the run with pauses that ends each stimulus."""
 
 STALLS = ((0.0, 0.0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9))
-"""Shares of the cycles on which the input and the output are stalled, a run each."""
+"""Shares of the cycles on which the input and the output are stalled, a pair for each run."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Sample:
     exact : array, same shape
         The exact function of the same operands in float64.
     formula : array, same shape, optional
-        The formula that the unit approximates it by, in float64; ``None`` where its tables cannot be told
-        from its arithmetic.
+        The unit's approximate formula in float64; ``None`` where its tables cannot be separated from its
+        arithmetic.
     at : array, broadcast to the same shape, optional
         The operand that an error is drawn against, named by the variant's ``axis``.
     """
@@ -103,8 +103,8 @@ class Sample:
 class Decisions(Sample):
     """Decisions, 1 for yes and 0 for no, and what they should have been. Errors are their share of all.
 
-    The formula is yes where either is: a model error is a yes for nothing, a waste; an arithmetic one a no
-    by mistake.
+    The formula is yes where ``found`` or ``exact`` is: a model error is a yes that was not needed, an
+    arithmetic error a wrong no.
     """
 
     @classmethod
@@ -125,7 +125,7 @@ class Decisions(Sample):
 
 @dataclass(frozen=True)
 class Variant:
-    """A structure of a unit: how it is made, and what it errs by.
+    """A structure of a unit: how it is made, and how its errors are measured.
 
     Parameters
     ----------
@@ -145,9 +145,9 @@ class Variant:
         Fields of the input beats of the simulation that finds the times, where the unit does not state
         them; others are 0.
     note : str
-        What else there is to say.
+        Further remark.
     source : str
-        Where it differs from the record's.
+        Document and figure, if they differ from the record's.
     as_published : bool
         With the constants or in the form that a document prints.
     long : bool
@@ -249,14 +249,14 @@ class UnitRun:
 
 @dataclass(frozen=True)
 class Record:
-    """A unit.
+    """Facts of a unit that tools and tests need.
 
     Parameters
     ----------
     name : str
-        Of its files in `golden` and `hdl`.
+        Name of its files in `golden` and `hdl`.
     title : str
-        What it computes, in some words.
+        What the unit computes, in some words.
     source : str
         Document and figure.
     variants : dict
@@ -264,12 +264,13 @@ class Record:
     expect : callable
         Takes the component and a `Case`; gives the output beats by the bit-accurate model.
     stimuli : dict
-        By name; the first serves for any number of beats, in other simulators too.
+        Stimuli by name; the first serves for any number of beats, in other simulators too.
     status : callable, optional
         Takes the component and a `Case`; gives expected members of the port ``status`` after a run, by name.
-        Of a component without that port: ``out_of_range`` and ``wide``, on how many cycles each port is high.
+        For a component without that port: the number of cycles on which each of the ports ``out_of_range``
+        and ``wide`` is high.
     axis : str
-        What errors are drawn against; empty for nothing.
+        Quantity that errors are drawn against; empty for no drawing.
     logarithmic : bool
         That axis is logarithmic.
     waivers : dict
@@ -277,7 +278,7 @@ class Record:
     still : dict
         Register bits of the default variant that cannot toggle: signals with their bits by reason.
     remembers : bool
-        It has a memory of what came before, which a reset does not clear.
+        It has a memory of earlier beats, which a reset does not clear.
     """
 
     name: str
@@ -317,16 +318,16 @@ class Record:
         }
 
     def example(self, variant: str, unit: Component, results: int = 3) -> UnitRun:
-        """As few beats of a variant's first stimulus as have some results: what shows the unit's times.
+        """Run of the first few beats of a variant's first stimulus, which shows the unit's times.
 
         Parameters
         ----------
         variant : str
             Its name.
         unit : Component
-            Of that variant.
+            Component of that variant.
         results : int
-            Output beats, at least, if `PAUSED` beats have so many.
+            Output beats at least, if `PAUSED` input beats give as many.
         """
         make = next(iter(self.stimuli_of(variant).values())).make
         case = make(unit, np.random.default_rng(2026), 200)
@@ -343,7 +344,7 @@ class Record:
         Parameters
         ----------
         unit : Component
-            Of one of the variants.
+            Component of one of the variants.
         stimulus : str
             Its name.
         seed : int

@@ -3,9 +3,9 @@
 A file without a record holds parts that records share. Components without a record: the frame constants, the
 pixel assembler and the pixel merger, whose ports are not a stream ``i`` to a stream ``o``, and the
 accumulator of the chord method. The records of the pipelines and of the chord interpolators, of which they
-are parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own; so have
-band depths, controls and the draw unit, and the units of the display with two clocks or none that waits,
-whose ports are others.
+are parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own. So have
+units with other ports: band depths, controls, the draw unit, and the units of the display that have two
+clocks or never wait.
 """
 
 import pkgutil
@@ -16,7 +16,7 @@ from blysk.sim.units.record import Record
 __all__ = ["RECORDS", "ROOMS"]
 
 ROOMS = ("geometry", "normals", "cosines", "methods", "lighting", "video", "bus", "")
-"""Rooms on the data's way; last those that stand in none."""
+"""Rooms in the order in which data pass them; the last is for records outside a room."""
 
 HELPERS = ("operands", "record", "registry", "triangles")
 """Modules beside the rooms that are no records."""

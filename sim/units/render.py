@@ -1,4 +1,4 @@
-"""Record of the whole: triangles to pixels."""
+"""Record of the render unit: triangles to pixels."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""Operands for units of geometry: triangles of all kinds, and what the units before make of them."""
+"""Operands for units of geometry: triangles of all kinds, and the results of the units before."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -42,12 +42,12 @@ WHOLE = Frame(-2048, -2048, 2047, 2047)
 
 
 def frame_of(constants: Mapping) -> Frame:
-    """The frame of constants."""
+    """Frame that the constants of a run describe."""
     return Frame(**dict(constants) | {"back_faces": BACK_FACES[constants["back_faces"]]})
 
 
 def triangles_with(**members: np.ndarray) -> Triangles:
-    """Triangles of some members, the others 0."""
+    """Triangles with the given members; the other members are 0."""
     count = len(next(iter(members.values())))
     shapes = {"x": (3,), "y": (3,), "depth": (3,), "normal": (3, 3), "material": (), "two_sided": ()}
     zeros = {name: np.zeros((count, *shape), dtype=np.int64) for name, shape in shapes.items()}
@@ -55,7 +55,7 @@ def triangles_with(**members: np.ndarray) -> Triangles:
 
 
 def sorted_of(beats: Mapping) -> SortedTriangles:
-    """Sorted triangles of beats, those that have no such member with zeros."""
+    """Sorted triangles from beats; members that the beats do not have are 0."""
     members = {name: beats[name] for name in ("x", "y", "material") if name in beats}
     # Columns of edges are no corners.
     members = {name: value for name, value in members.items() if name != "x" or "height" not in beats}
@@ -68,13 +68,13 @@ def sorted_of(beats: Mapping) -> SortedTriangles:
 
 
 def edges_of(beats: Mapping) -> Edges:
-    """Edges of beats; what the walk does not read is 0."""
+    """Edges from beats; members that the beats do not have are 0."""
     zeros = np.zeros(len(beats["first"]), dtype=np.int64)
     return Edges(**{field.name: beats.get(field.name, zeros) for field in fields(Edges)})
 
 
 def plane_corners(stages: "Stages") -> dict[str, np.ndarray]:
-    """What the plane setup is given."""
+    """Input beats of the plane setup."""
     edges, y = stages.edges, stages.drawn.triangles.y
     heights = {"long_height": edges.height[:, 0], "knee": y[:, 1] - y[:, 0]}
     walk = {name: getattr(edges, name) for name in ("fraction", "down", "along")}
@@ -82,7 +82,7 @@ def plane_corners(stages: "Stages") -> dict[str, np.ndarray]:
 
 
 def scales_of_corners(beats: Mapping, grid: Grid) -> PlaneScales:
-    """Scales of `plane_corners`."""
+    """Scales from the beats of `plane_corners`."""
     knee, height = beats["knee"], beats["long_height"]
     y = np.stack([np.zeros_like(knee), knee, height], axis=1)
     drawn = sorted_of({"y": y, "area": beats["area"], "right": beats["right"]})
@@ -94,7 +94,7 @@ def scales_of_corners(beats: Mapping, grid: Grid) -> PlaneScales:
 
 
 def scales_of(beats: Mapping) -> PlaneScales:
-    """Scales of an attribute's beats."""
+    """Scales from the beats of an attribute."""
     formats = {
         "height_reciprocal": Reciprocal.FORMAT,
         "knee": PlaneSetup.HEIGHT_FORMAT,
@@ -108,12 +108,12 @@ def scales_of(beats: Mapping) -> PlaneScales:
 
 @dataclass(frozen=True)
 class Stages:
-    """What the models of the units make of triangles, one after the other.
+    """Results of the units' models for triangles, one model after the other.
 
     Parameters
     ----------
     triangles : Triangles
-        What comes.
+        Input.
     frame : Frame
         The picture.
     grid : Grid
@@ -183,7 +183,7 @@ def corners(rng: np.random.Generator, count: int, grid: Grid = GRID, size: float
     grid : Grid
         Fraction bits of the coordinates.
     size : float
-        Pixels from a middle, at most, of most of them.
+        Largest distance of most corners from a triangle's middle, along x and y, in pixels.
     """
     step, reach = grid.steps, int(size * grid.steps)
     middle = rng.integers(-20 * step, 20 * step, (count, 1, 2))
@@ -223,7 +223,7 @@ def random_triangles(
     rng, count, grid, size
         As for `corners`.
     spread : float
-        How far the normals are from a common one.
+        Standard deviation of the normals' components about a common normal.
     """
     points = corners(rng, count, grid, size)
     common = rng.normal(size=(count, 1, 3))
@@ -246,9 +246,9 @@ def random_triangles(
 
 
 def ended(triangles: Triangles, grid: Grid = GRID) -> Triangles:
-    """The same, two of them over all of a small picture, before a run's end: what they give comes last.
+    """Triangles, two of which now cover all of a small picture, so that their output ends a run.
 
-    That is the last, in front of all, and the last of the run with pauses, in front of most.
+    The last triangle is in front of all; the last one of the run with pauses is in front of most.
     """
     far = 100 * grid.steps
     for index, depth in ((PAUSED - 1, 1 << 21), (-1, 0)):

@@ -19,7 +19,7 @@ _RECORDS = {"span": SHADER, "frame": GEOMETRY, "run": RENDER}
 
 
 def _columns(layout: ByteLayout, beats) -> dict:
-    """Beats of a core, with the names of a layout: members of structures, and structures in arrays."""
+    """Beats of a core as columns with the names of a layout; members of nested structures join names."""
     found = {}
 
     def add(name, value):
@@ -40,13 +40,13 @@ def _columns(layout: ByteLayout, beats) -> dict:
 
 
 def _core_case(unit, case) -> Case:
-    """The case of the core in a unit."""
+    """Input of the core inside a unit."""
     data = np.asarray(case.beats["data"], dtype=np.uint8)
     return Case(unit.parameters.given.unpack(data), case.constants, case.write)
 
 
 def _frame_of(unit, case) -> np.ndarray:
-    """Frame of each output beat: how many beats come of each input beat, by cases that are one longer."""
+    """Frame of each output beat, from the numbers of output beats up to the end of each input frame."""
     record, inner = _RECORDS[unit.packets], _core_case(unit, case)
     begins = np.flatnonzero(np.r_[True, case.beats["last"][:-1]])
     counts = [
@@ -86,7 +86,7 @@ def _case(unit, rng, count, length):
 
 
 def _frames(unit, rng, count):
-    """Frames of some beats each, some of which give nothing."""
+    """Frames of some beats each, some frames without output."""
     return _case(unit, rng, count, 24)
 
 
@@ -96,7 +96,7 @@ def _short(unit, rng, count):
 
 
 def _misfits(unit, rng, count):
-    """Frames with beats in which bits of any byte are turned round."""
+    """Frames with beats in which a bit of any byte is inverted."""
     case = _frames(unit, rng, count)
     # Not of the last ones, so that every run ends with a beat.
     data = case.beats["data"]

@@ -32,7 +32,7 @@ def _expect(unit, case):
 
 
 def _accesses(unit, rng, count, busy=0):
-    """Reads and writes of every register and of none, of values that fit and others; what is held is read."""
+    """Reads and writes at registers and elsewhere, of values that fit and others; values are read back."""
     registers = unit.parameters.registers
     chosen = rng.integers(0, len(registers), count)
     address = np.array([register.address for register in registers])[chosen]
@@ -61,7 +61,7 @@ def _accesses(unit, rng, count, busy=0):
 
 
 def _busy(unit, rng, count):
-    """The same while a frame is inside."""
+    """Reads and writes of the same kinds while a frame is inside."""
     return _accesses(unit, rng, count, 1)
 
 

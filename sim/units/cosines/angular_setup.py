@@ -77,7 +77,7 @@ def _case(left, right, vector, length):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any distance, every sixteenth of any words; any vector and length."""
+    """Pairs of normals at any distance, every sixteenth of arbitrary codes; any vector and length."""
     return _case(*any_pairs(rng, count), unit_codes(rng, count), any_lengths(rng, count))
 
 

@@ -127,7 +127,7 @@ def _expect(unit, case):
 
 
 def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
-    """Three values of each function: of every eighth span any codes, else on curves of every size."""
+    """Three values of each function, on curves of every size; every eighth span has arbitrary codes."""
     values = []
     for format in FORMATS.values():
         codes = any_codes(rng, format, count, lights, 3)
@@ -138,7 +138,7 @@ def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
 
 
 def any_factors(rng: np.random.Generator, count: int, factors: int) -> np.ndarray:
-    """Codes of factors on curves of every size, most of them in 0 to 1; of every eighth span any codes."""
+    """Codes of factors on curves of every size, most in 0 to 1; every eighth span has arbitrary codes."""
     format = FORMATS["diffuse"]
     codes = any_codes(rng, format, count, factors, 3)
     start = rng.uniform(0, 1, (count, factors, 1))
@@ -166,7 +166,7 @@ def _lengths(unit, rng, count):
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, every eighth span of any words; lengths by their logarithm."""
+    """Curves of every size, every eighth span of arbitrary codes; lengths by their logarithm."""
     return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
 
 

@@ -19,7 +19,7 @@ LARGEST = 1 << 35
 
 
 def chord_of(left: np.ndarray, right: np.ndarray) -> tuple[Fixed, np.ndarray]:
-    """Squared chord of vectors of codes, or to the opposite vector if that is smaller; whether it is."""
+    """Squared chord between vectors, or to the opposite vector if that is shorter; and whether it is."""
     obtuse = dot(left, right) < 0
     chord = np.where(obtuse[:, np.newaxis], left + right, left - right)
     return Fixed(FORMAT, np.minimum(dot(chord, chord), LARGEST)), obtuse

@@ -57,7 +57,7 @@ def _expect(unit, case):
 
 
 def _spans(unit, rng, count):
-    """Spans of any words; most are short, some have no pixel."""
+    """Spans of arbitrary codes; most are short, some have no pixel."""
     length = short_lengths(rng, count)
     beats = {name: any_codes(rng, format, len(length)) for name, format in FORMATS.items()}
     return Case({**beats, "length": length})

@@ -80,7 +80,7 @@ def _spans(unit, rng, count):
 
 
 def _words(unit, rng, count):
-    """Cosines, every third span of any words, every fifteenth of ends of words; no pixel to 39."""
+    """Cosines; every third span of arbitrary codes, every fifteenth of ends of words; lengths 0 to 39."""
     beats = spans_of(unit, rng, rng.integers(0, 40, count // 20)).beats
     any_size = np.arange(0, len(beats["length"]), 3)
     p = unit.parameters

@@ -22,7 +22,7 @@ from blysk.sim.units.record import Case, Decisions, Record, Stimulus, Variant
 __all__ = ["RECORD"]
 
 EXPONENT = 60
-"""Exponent of a run that needs but one."""
+"""Exponent of a run that needs only one."""
 
 
 def _measure(rng, count):
@@ -53,7 +53,7 @@ def _case(unit, exponent, left, right):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Pairs of unit normals at any angle, of any size; of every sixteenth any words, ends of words."""
+    """Pairs of unit normals at angles of every size, every sixteenth of arbitrary codes; ends of words."""
     left, right = any_pairs(rng, count)
     for ends in (left, right):
         ends[7::32] = word_ends(rng, len(ends[7::32]), 3)

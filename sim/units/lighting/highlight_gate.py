@@ -78,11 +78,11 @@ def spans_about(rng, halfway, cosine, degrees, spread):
     halfway : array, shape (spans, 3)
         Unit vector H of each span.
     cosine : array, shape (spans,)
-        That N·H.
+        The largest N·H.
     degrees : array, shape (spans,)
         Angles of the spans.
     spread : float
-        By how much N·H is off, on average.
+        Mean deviation of N·H from it.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def _spans(unit, rng, count, exponent=EXPONENT):
 
 
 def _any(unit, rng, count):
-    """The same under exponents that are powers of two, the largest, or any: of each run another."""
+    """Such spans under another exponent in each run: a power of two, the largest, or any."""
     return _spans(unit, rng, count, any_exponent(rng))
 
 

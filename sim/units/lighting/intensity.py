@@ -50,7 +50,7 @@ def _case(unit, terms, ambient, colors):
 
 
 def _terms(unit, rng, count, brightness=1):
-    """Terms of which any part is 0, all of them are, or all are the largest; colours up to a full channel."""
+    """Terms of which some or all are 0, or all are the largest; colours up to a full channel."""
     lights = unit.parameters.lights
     terms = rng.integers(0, _TERM.max_code, (2, count, lights), endpoint=True)
     terms *= rng.random(terms.shape) < rng.random((1, count, 1))
@@ -62,7 +62,7 @@ def _terms(unit, rng, count, brightness=1):
 
 
 def _bright(unit, rng, count):
-    """The same with colours up to eight full channels: saturation, and every bit of a colour."""
+    """Such terms with colours up to eight full channels: saturation, and every bit of a colour."""
     return _terms(unit, rng, count, 8)
 
 

@@ -78,7 +78,7 @@ def _operands(unit, rng, count, exponent=None):
 
 
 def _exponents(unit, rng, count):
-    """The same under exponents that are powers of two, the largest, or any: of each run another."""
+    """Such beats under another exponent in each run: a power of two, the largest, or any."""
     return _operands(unit, rng, count, any_exponent(rng))
 
 
@@ -97,7 +97,7 @@ def _black(unit, rng, count):
 
 
 _CHORD = Diffuse(SQ(2, 25))
-"""Of the methods that give 1 - N·H, the format of N·L."""
+"""Diffuse model with the format that N·L has in methods that give 1 - N·H."""
 
 
 def _variants():

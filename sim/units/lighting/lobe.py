@@ -18,14 +18,14 @@ from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 __all__ = ["RECORD"]
 
 _USUAL = {"exponent": 60, "roughness": 0.4, None: None}
-"""Parameter of a run that needs but one."""
+"""Parameter of a run that needs only one."""
 
 _TENT = TabulatedModel.of_points("tent", [0, 0.3, 0.9, 1], [0.2, 1, 0.1, 0.6])
 _STEP = TabulatedModel("step", function=lambda cosine: (cosine > 0.7).astype(float))
 
 
 def _parameters(rng, model, count):
-    """Parameters over the range of a model, and how many of so many samples each has."""
+    """Parameters over the range of a model, and how many of the samples each has."""
     if model.PARAMETER == "exponent":
         yield from exponents(rng, count)
     else:
@@ -51,7 +51,7 @@ def _measure(rng, count, lobe):
 
 
 def _operands(parameters, rng, count):
-    """Corner cases, any codes, ends of every step of the table, codes of every octave; the first so many."""
+    """The first ``count`` of corner cases, any codes, ends of every table step, and codes of every octave."""
     format, bits = parameters.operand_format, parameters.fraction_bits
     knots = np.ldexp(parameters.knots, bits).astype(np.int64)
     u = np.r_[knots, knots - 1, (2.0 ** (bits - rng.uniform(-1, bits, count))).astype(np.int64)]
@@ -89,7 +89,7 @@ def _highlights(unit, rng, count):
 
 
 def _tables(unit, rng, count):
-    """Tables of any curve, of each run others, one of them replaced; values that are lost; single values."""
+    """Tables of any curve, others in each run, one of them replaced; values that are lost; single values."""
     p = unit.parameters
     tables = []
     for _ in range(p.banks):

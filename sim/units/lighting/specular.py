@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 EXPONENT = 60
-"""Exponent of a run that needs but one."""
+"""Exponent of a run that needs only one."""
 
 HIGHLIGHTS = "n 1 to 1000, N.H 0 to 1"
 
@@ -48,12 +48,12 @@ def measure_highlights(rng, count, parameters):
 
 
 def any_exponent(rng) -> int:
-    """A power of two, the largest, or any."""
+    """An exponent: a power of two, the largest, or any."""
     return int(rng.choice([1 << rng.integers(10), 1000, rng.integers(1, 1001)], p=[0.45, 0.1, 0.45]))
 
 
 def exponent_of(unit, constants) -> int:
-    """Exponent of a run: fixed at build time, a constant, or one of the slope that is given."""
+    """Exponent of a run: fixed at build time, a constant, or one that has the given slope."""
     if constants is None:
         return unit.exponent
     if "exponent" in constants:
@@ -80,7 +80,7 @@ def highlights(unit, rng, count, exponent=None):
 
 
 def exponent_bits(unit, rng, count):
-    """The same under exponents that are powers of two, the largest, or any: of each run another."""
+    """Such beats under another exponent in each run: a power of two, the largest, or any."""
     return highlights(unit, rng, count, any_exponent(rng))
 
 
@@ -94,7 +94,7 @@ def expect(unit, case):
 _SERVED = tuple(model for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED))
 _PUBLISHED = ("cosquad", "cosquad7", "cosquad_lin")
 _QUICK = ("cosquad", "exp")
-"""A model of each structure; another number of squares is that of a variant below."""
+"""Models of the short run, one for each structure; a variant below has another number of squares."""
 
 
 def _models():

@@ -20,7 +20,7 @@ from blysk.sim.units.record import Case, Decisions, Record, Stimulus, Variant
 __all__ = ["RECORD", "parabolas_near"]
 
 EXPONENT = 60
-"""Exponent of a run that needs but one."""
+"""Exponent of a run that needs only one."""
 
 THRESHOLD = "2 lights, threshold"
 """Variant that takes a threshold in place of the exponent."""
@@ -98,14 +98,14 @@ def _near(unit, rng, count, exponent, spread, largest_bulge=2.0**-5):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Parabolas of every size with the least u about the threshold; of every eighth any words."""
+    """Parabolas of every size with the least u about the threshold; every eighth of arbitrary codes."""
     values, exponent = _near(unit, rng, count, exponent, 1e-3, 2.0**-4)
     values[::8] = any_codes(rng, FORMAT, *values[::8].shape)
     return _case(unit, values, exponent)
 
 
 def _exponents(unit, rng, count):
-    """The same under exponents that are powers of two, the largest, or any: of each run another."""
+    """Such spans under another exponent in each run: a power of two, the largest, or any."""
     return _spans(unit, rng, count, any_exponent(rng))
 
 
@@ -116,7 +116,7 @@ def _last_bits(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Far from every highlight, with a bulge or a rise off the largest that is held by up to 3 of any bit."""
+    """Spans far from every highlight, with a bulge or a rise up to 3 units of any bit off its limit."""
     p, shape = unit.parameters, (count, unit.lights)
     left = rng.integers(FORMAT.max_code // 2, FORMAT.max_code // 4 * 3, shape)
     off = rng.integers(-3, 4, (2, *shape)) << rng.integers(0, 22, (2, *shape))
@@ -129,7 +129,7 @@ def _borders(unit, rng, count):
 
 
 def _thresholds(unit, rng, count):
-    """Thresholds of no exponent, the least and the largest word among them, and the least u about them."""
+    """Thresholds that no exponent has, the least and the largest code among them; the least u about them."""
     format = unit.parameters.THRESHOLD_FORMAT
     code = rng.choice([0, 1, format.max_code, rng.integers(format.max_code), 1 << rng.integers(format.width)])
     nearest = min(code * format.step / 2, 2.0)

@@ -14,7 +14,7 @@ _ANGULAR = AngularInterpolator()
 
 
 def _pole(unit, rng, count):
-    """Spans on the great circle that is 90 degrees from L or H: they have no cosine to work out."""
+    """Spans on the great circle that is 90 degrees from L or H, where every cosine is 0."""
     left = rng.uniform(0, 360, count)
     around = np.radians([left, left + rng.uniform(-149, 149, count)])
     ends = quantise(np.stack([np.cos(around), np.sin(around), 0 * around], axis=-1))

@@ -37,7 +37,7 @@ from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 __all__ = ["EXPONENT", "RECORD", "STILL_SPANS", "gated", "gated_beats", "mixed_lengths"]
 
 EXPONENT = 60
-"""Exponent of a run that needs but one."""
+"""Exponent of a run that needs only one."""
 
 STILL_SPANS = {
     "twice a number is even": "{diffuse,highlight}_0_second_difference[0]",
@@ -49,7 +49,7 @@ STILL_SPANS = {
 
 _CHORD = ChordInterpolator()
 _GROUPS = 32
-"""Lights of a measurement: so many parts of the spans have one each."""
+"""Lights of a measurement: the spans are divided into as many parts, with a light each."""
 
 
 # Variants.
@@ -132,8 +132,8 @@ def gated_beats(
 ) -> np.ndarray:
     """Output beats of a unit with these operands, and the decisions of its gate, if it has one.
 
-    A pixel of a span of one or two is decided by its own u, those of a longer span together; by the
-    threshold's code in place of the exponent, if there is one.
+    The gate decides a pixel of a span of one or two pixels by its own u, the pixels of a longer span
+    together. It uses the threshold's code, if there is one, in place of the exponent.
     """
     if unit.gate is None:
         return operand_beats(unit, operands)
@@ -206,7 +206,7 @@ def _middles(rng, left, right):
 
 
 def _case(unit, rng, left, right, length, exponent=None):
-    """Under lights from anywhere; H of every second is near one of the normals."""
+    """Input of spans under lights from anywhere; every second light has an H that is one of the normals."""
     length = np.maximum(length % (1 << unit.length_bits), 1)
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[::2] = left[rng.integers(0, len(left), len(halfway[::2]))]
@@ -221,7 +221,7 @@ def _case(unit, rng, left, right, length, exponent=None):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any angle, any middles, every sixteenth of any words; most spans are short."""
+    """Pairs of normals at any angle, any middles, every sixteenth of arbitrary codes; most spans short."""
     length = short_lengths(rng, count, 1)
     return _case(unit, rng, *any_pairs(rng, len(length)), length)
 

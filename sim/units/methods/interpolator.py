@@ -45,7 +45,7 @@ SPAN = {"normal_left": AXIS, "normal_right": AXIS, "length": 64}
 """Beat for the simulation that finds the times."""
 
 _GROUPS = 32
-"""Lights of a measurement: so many parts of the spans have one each."""
+"""Lights of a measurement: the spans are divided into as many parts, with a light each."""
 
 
 # Variants.
@@ -94,7 +94,7 @@ def measured(method: Interpolator, note: str = "", **facts) -> Variant:
     method : Interpolator
         Bit-accurate model.
     note : str
-        What else there is to say.
+        Further remark.
     **facts
         Further fields of `Variant`.
     """
@@ -130,7 +130,7 @@ def options(method: Interpolator, lights: int = 1, *, as_published: bool = False
 
 
 def operand_beats(unit: Component, operands: Operands, **others: np.ndarray) -> np.ndarray:
-    """Output beats of a unit with these operands, and with codes of fields that are none."""
+    """Output beats of a unit with these operands, and with codes of the fields that are no operands."""
     beats = np.zeros(operands.cosine.codes.shape, dtype_of(unit.o.payload.shape().elem_shape))
     for name in beats.dtype.names:
         if name == "factor":
@@ -164,7 +164,7 @@ def status(unit: Component, case: Case) -> dict[str, int]:
 def case_of(
     unit: Component, rng: np.random.Generator, left: np.ndarray, right: np.ndarray, length: np.ndarray
 ) -> Case:
-    """Spans between normals of these codes, under lights from anywhere; of the first, H is a normal."""
+    """Spans between normals of these codes, under lights from anywhere; H of the first light is a normal."""
     length = np.maximum(length % (1 << unit.length_bits), 1)
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[0] = left[len(left) // 2]
@@ -173,7 +173,7 @@ def case_of(
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any angle, of any size, every sixteenth of any words; most spans are short."""
+    """Pairs of normals at angles of every size, every sixteenth of arbitrary codes; most spans are short."""
     length = short_lengths(rng, count, 1)
     return case_of(unit, rng, *any_pairs(rng, len(length)), length)
 
@@ -186,7 +186,7 @@ def _angles(unit, rng, count):
 
 
 def long_lengths(rng: np.random.Generator, pixels: int) -> np.ndarray:
-    """Lengths of spans of about so many pixels: 3000 to 4095, each before a shorter one."""
+    """Lengths of spans of about ``pixels`` pixels in all: 3000 to 4095, each before a shorter one."""
     length = rng.integers(3000, 4096, (pixels // 3800, 2))
     length[:, 1] = np.floor(2000 ** rng.random(len(length)))
     length[:2, 0] = 4095

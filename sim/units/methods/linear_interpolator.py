@@ -14,7 +14,7 @@ _LINE = LinearInterpolator()
 
 
 def _flags(unit, rng, count):
-    """Spans out of range and in range: of a kind, then mixed."""
+    """Spans out of range, spans in range, then both kinds mixed."""
     left, right = code_pairs_at(rng, 8 * count, rng.uniform(0, 180, 8 * count))
     some = rng.random(8 * count) < 0.4
     left[some], right[some] = rng.choice([0, 1, -1, ONE // 2, ONE], (2, np.count_nonzero(some), 3))

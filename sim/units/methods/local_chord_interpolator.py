@@ -78,12 +78,12 @@ def _case(unit, rng, length, values=None, exponent=EXPONENT):
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, every eighth span of any words; most spans are short."""
+    """Curves of every size, every eighth span of arbitrary codes; most spans are short."""
     return _case(unit, rng, short_lengths(rng, count, 1))
 
 
 def _short_spans(unit, rng, count):
-    """Spans of 1 to 4 pixels in runs and mixed, any values of which those of every second fit."""
+    """Spans of 1 to 4 pixels in runs and mixed; u fits in every second span, and is arbitrary in others."""
     values = any_values(rng, count, unit.lights)
     values.highlight[::2] = any_codes(rng, FORMATS["highlight"], *values.highlight[::2].shape)
     return _case(unit, rng, mixed_lengths(rng, count), values)

@@ -75,7 +75,7 @@ def spans_of(ends, length):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any angle, of any size, any words; short spans, some without a pixel."""
+    """Pairs of normals at angles of every size, and of arbitrary codes; short spans, some without a pixel."""
     length = short_lengths(rng, count)
     return spans_of(any_pairs(rng, len(length)), length)
 

@@ -32,7 +32,7 @@ def factor_of(model: Bisection, cosine: np.ndarray, first_step: np.ndarray) -> n
     cosine : array
         r, of unit vectors of length 1.
     first_step : bool array, same shape
-        Whether by the polynomial of the first step.
+        Whether to use the polynomial of the first step.
     """
     results = []
     for first in (False, True):
@@ -65,7 +65,7 @@ def _case(a, b):
 
 
 def _pairs(unit, rng, count):
-    """Pairs of normals at any angle, of any size, any words."""
+    """Pairs of normals at angles of every size, and of arbitrary codes."""
     return _case(*any_pairs(rng, count))
 
 
@@ -85,7 +85,7 @@ def _corners(unit, rng, count):
 def _last_bits(unit, rng, count):
     """The last bits of products and sums, which are rounded off; u at the border of its rounding.
 
-    Of the first pairs any, of the others the nearer to the border the later: some are on it.
+    The first pairs are any; later ones lie within a shrinking distance of the border, some on it.
     """
     a, b = code_pairs_at(rng, count, rng.uniform(0, 100, count))
     border = (ONE_SQUARED.codes - dot(a, b)) % (1 << 17) - (1 << 16)

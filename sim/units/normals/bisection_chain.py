@@ -83,7 +83,7 @@ def _case(ends, level):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any angle, of any size, any words; most chains are short."""
+    """Pairs of normals at angles of every size, and of arbitrary codes; most chains are short."""
     # A level takes 17 cycles.
     return _case(any_pairs(rng, count), 1 + (rng.zipf(2, count) - 1) % _LEVELS)
 

@@ -47,7 +47,7 @@ def _case(left, right):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any angle, of any size, any words."""
+    """Pairs of normals at angles of every size, and of arbitrary codes."""
     return _case(*any_pairs(rng, count))
 
 

@@ -39,7 +39,7 @@ def _case(rng, vector):
 
 
 def _lengths(unit, rng, count):
-    """Vectors of lengths 1/256 to 1, and any words."""
+    """Vectors of lengths 1/256 to 1, and arbitrary codes."""
     vector = _vectors(rng, count)
     vector[::8] = any_codes(rng, _FORMAT, *vector[::8].shape)
     return _case(rng, vector)

@@ -16,7 +16,7 @@ __all__ = ["RECORD", "any_matrix"]
 
 
 def any_matrix(rng: np.random.Generator, distance: float = 1.4, size: float = 0.4) -> Matrix:
-    """A rotation before a camera, an object of some near planes' size at a distance in near planes."""
+    """Matrix of any rotation before a camera; distance and size of the object are in near-plane distances."""
     turn = rotation(rng.normal(size=3), rng.uniform(0, 6.3))
     rows = size * np.array([[1.7], [1.7], [1.0]]) * turn
     position, normal = (Fixed.round(ENTRY, values).codes for values in (rows, turn))
@@ -47,7 +47,7 @@ def _inside(unit, rng, count):
 
 
 def _around(unit, rng, count):
-    """An object of which most is nearer, farther or beside what is inside."""
+    """An object that is mostly nearer than, farther than or beside the visible space."""
     matrix = any_matrix(rng, distance=rng.choice([0.5, 1.5, 15.5]), size=1.1)
     return _case(rng, count, matrix, len(unit.i.payload.index))
 
