@@ -157,7 +157,7 @@ class FrameConstantsUnit(wiring.Component):
             index = Signal(range(self.materials))
             with m.If(accepted & (self.write.payload.address == MATERIAL_ADDRESS)):
                 m.d.sync += index.eq(self.write.payload.data)
-        # Of the light, or the frame, and of the word within it.
+        # The upper address selects a light or the frame, the lower one a word of it.
         address, decoded = self.write.payload.address, {}
         for kind, digits, part in (
             ("light", {word // LIGHT_STRIDE for word in words}, address[LIGHT_STRIDE.bit_length() - 1 :]),

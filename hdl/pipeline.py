@@ -349,7 +349,7 @@ class ShadingPipelineUnit(wiring.Component):
                     m.d.sync += frame.material.eq(material)
             with m.Elif(~waited.all()):
                 m.d.sync += waited.eq(waited + 1)
-            # Of no payload that is not valid: its bits may be unknown.
+            # Independent of a payload that is not valid: its bits may be unknown.
             same = (material == frame.material) & waited.all()
             m.d.comb += settled.eq(~self.i.valid | same)
         else:

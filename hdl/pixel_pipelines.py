@@ -143,11 +143,11 @@ class PixelPipelinesUnit(wiring.Component):
             idle.append(empty & pipeline.write.ready)
             room.append(given.ready | (pipe != k))
         m.d.comb += [
-            # Of no payload that is not valid: its bits may be unknown.
+            # Independent of a payload that is not valid: its bits may be unknown.
             span.ready.eq(~write.valid & (~span.valid | reduce(and_, room))),
             write.ready.eq(drained),
         ]
-        # While a write waits no span comes: what is drained stays so.
+        # While a write waits no span comes: a drained pipeline stays drained.
         m.d.sync += drained.eq(write.valid & reduce(and_, idle))
         self._count(m)
         return m
@@ -188,7 +188,7 @@ class _JoinedPipelines(wiring.Component):
         self.parameters = p = self.pipelines.parameters
         size = p.pipes, p.design.x_bits, p.design.y_bits
         self._join = joins(*size)
-        # Of a merger: a turn is in its FIFO before the first pixel of its span is there.
+        # With a merger no cycle more: a turn is in its FIFO before the first pixel of its span comes.
         self.latency = self.pipelines.latency + self._join.latency
         members = dict(self.pipelines.signature.members)
         super().__init__(members | {"o": Out(stream.Signature(shape(*size)))})

@@ -267,7 +267,7 @@ class Dataflow:
         def trace(x, y):
             factors = [formula_of(side, (symbol,)) for side, symbol in ((left, x), (right, y))]
             if a is not b:
-                # Some bits of a word are called as it is.
+                # A factor that is some bits of a word has the word's symbol.
                 factors = [own or symbol for own, symbol in zip(factors, (x, y), strict=True)]
             return formula_of(mul, factors), factors
 

@@ -79,7 +79,7 @@ def connect_late_fifo(
     payload = Signal(width, name=f"{name}_payload", reset_less=True)
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
     level = Signal(range(depth + 1), name=f"{name}_level")
-    # Whether the memory's word and the one behind it count.
+    # Whether the memory's word, and the one behind it, are valid.
     read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
     address, reads = Signal((depth - 1).bit_length(), name=f"{name}_address"), Signal(name=f"{name}_reads")
     m.submodules[name] = memory = Memory(shape=width, depth=1 << len(address), init=[])
@@ -136,7 +136,7 @@ def connect_wide_fifo(
         write.data.eq(source.payload),
         write.addr.eq(free),
         read.addr.eq(first),
-        # What is written without a payload is written again.
+        # A word written without a payload is overwritten later.
         write.en.eq(room),
         Value.cast(sink.payload).eq(read.data),
         following.eq(level + comes - goes),

@@ -78,7 +78,7 @@ def reciprocal_words(
     top = length_bits - 1
 
     def leading(steps):
-        # Of a span of one pixel there is none.
+        # A span of one pixel has no leading one.
         position, below_top = Const(0, range(length_bits)), Const(top, range(length_bits))
         for bit in range(length_bits):
             position = Mux(steps[bit], Const(bit, range(length_bits)), position)

@@ -220,7 +220,7 @@ def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
             if left == 0:
                 yield ()
             return
-        # The others take one each at least, an interval at most.
+        # Each other run takes one use at least, and as many as the interval at most.
         for size in range(min(interval, left - count + 1), max(1, left - interval * (count - 1)) - 1, -1):
             for rest in parts(left - size, count - 1):
                 yield size, *rest

@@ -204,7 +204,7 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
         Value.cast(output.payload).eq(Mux(held, spare, Value.cast(payload))),
     ]
     waits = output.valid & ~output.ready
-    # Two registers, so that what drives all enables is not what chooses the payload.
+    # Two registers: one drives all enables, the other one selects the payload.
     m.d.sync += [held.eq(waits), moves.eq(~waits)]
     with m.If(moves):
         m.d.sync += spare.eq(Value.cast(payload))

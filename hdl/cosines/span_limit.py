@@ -34,7 +34,7 @@ def octave_limit(m: Module, name: str, exponent: Value, limits: Fixed) -> FixedV
     octave = Signal(range(len(exponent) + 1), name=f"{name}_octave", reset_less=True)
     register = Signal(FixedShape(limits.format), name=name, reset_less=True)
     m.d.sync += octave.eq(count)
-    # Bit by bit: of a choice among constants a mapper makes resets of registers.
+    # Bit by bit: from a choice among constants a mapper would make resets of the registers.
     codes = limits.codes.tolist()
     for place, bit in enumerate(Value.cast(register)):
         m.d.sync += bit.eq(Cat(octave == k for k, code in enumerate(codes) if code >> place & 1).any())

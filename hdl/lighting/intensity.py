@@ -109,7 +109,7 @@ class IntensityUnit(PipelinedUnit):
                     factor = register(m, operands[kind][light], f"factor_{kind}_{light}_{name}")
                     product = factor * self.constants[kind][light][channel]
                     terms.append(register(m, product, f"{kind}_{light}_{name}"))
-            # A constant needs no registers by which to wait for the others.
+            # A constant needs no registers that delay it to the other terms.
             constant = self.constants.ambient[channel]
             terms.append(constant)
             level = 0

@@ -239,7 +239,7 @@ class LightUnit(wiring.Component):
     ) -> None:
         """Diffuse terms wait for the specular terms of their beats; a dark beat has none."""
         depth = self._depth
-        # A term is under way while its mark waits.
+        # A mark waits as long as its term is in the diffuse unit or its FIFO.
         m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)
         terms = diffuse.o.signature.create(path=("terms",))
         connect_fifo(m, "waiting", diffuse.o, terms, depth)

@@ -110,7 +110,7 @@ class LobeMemory(wiring.Component):
         follows, begins, holds, active = (
             Signal(name=name) for name in ("follows", "begins", "holds", "active")
         )
-        # A register beside the memory: whether it is written decides whether it is read.
+        # A register close to the memory, as the write enable also decides whether the memory is read.
         m.d.sync += [
             value.eq(write.value),
             follows.eq(self.write.valid & ~write.begins),
@@ -251,7 +251,7 @@ class LobeUnit(PipelinedUnit):
             return Mux(lit, Value.cast(wide.saturate(p.argument_format))[:bits], 0)[:bits]
 
         def coarse(argument, zeros):
-            # By all but a few, then the rest.
+            # Shift by all but the last bits of the amount here; the second stage shifts by these.
             shift = Cat(Mux(zeros == p.octaves, p.octaves - 1, zeros), Const(0, _FINE))
             normal = (argument << Cat(Const(0, _FINE), shift[_FINE:]))[:top]
             row = (self._base + p.octaves - zeros)[: len(self._read.address) - p.step_bits]
@@ -294,7 +294,7 @@ class LobeUnit(PipelinedUnit):
             first += format.width
         value, difference, fraction = parts
         if g.interval == 1:
-            # Registers of the multiplier's own.
+            # Registers that the multiplier block can take in.
             difference = g.register("difference", lambda x: x, difference)
             fraction = g.register("fraction", lambda x: x, fraction)
             product = g.register("product", lambda x, y: x * y, difference, fraction)
@@ -302,7 +302,7 @@ class LobeUnit(PipelinedUnit):
             product = g.multiply("product", difference, fraction)
 
         def term(value, product, lit):
-            # Between two entries.
+            # The term lies between two entries, so that it does not wrap.
             total = (value + product.truncate(17)).wrap(p.RESULT_FORMAT)
             return FixedValue(p.RESULT_FORMAT, Mux(lit, Value.cast(total), 0))
 

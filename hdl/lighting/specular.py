@@ -96,7 +96,7 @@ class SlopeUnit(wiring.Component):
             read, boundary = (
                 Signal(p.SHIFTED_FORMAT.width, name=name, reset_less=True) for name in ("read", "boundary")
             )
-            # The first of them is inside an FPGA's memory, far from what the second serves.
+            # The first register is inside an FPGA's memory, far from the logic that the second one drives.
             m.d.sync += [read.eq(word), boundary.eq(read)]
         m.d.comb += [
             self.slope.scale.eq(scale),
@@ -245,7 +245,7 @@ class SpecularUnit(PipelinedUnit):
             return FixedValue(UQ(10, 26), (Value.cast(argument) << self._slope[1])[:36]).truncate(16)
 
         def is_lit(wide, dark):
-            # The saturated argument is at most the boundary; so it is where the boundary is the largest code.
+            # Whether the saturated argument is at most the boundary: always if that is the largest code.
             boundary = self._slope[2]
             return ((wide <= boundary) | Value.cast(boundary).all()) & ~dark
 

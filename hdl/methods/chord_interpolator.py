@@ -181,7 +181,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
                 word.length.eq(Mux(is_long, length, 1)),
             ]
         with m.If(idle):
-            # Of the span that is accepted, and of any before it.
+            # Loaded on every idle cycle: the span that is accepted overwrites those that were not.
             m.d.sync += [
                 Value.cast(right).eq(Value.cast(span.normal_right)),
                 Value.cast(middle).eq(Value.cast(span.normal_middle)),
@@ -205,7 +205,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         m.d.comb += [
             spans.i.valid.eq(values.o.valid & complete),
             spans.i.payload.length.eq(word.length),
-            # Read only of a complete span.
+            # Read only with a complete span.
             spans.long.eq(is_middle),
             values.o.ready.eq(spans.i.ready | ~complete),
         ]

@@ -288,7 +288,7 @@ class ChordSpansUnit(wiring.Component):
         waits, room = Signal(name="waits"), Signal(name="room", init=1)
         m.d.sync += [
             behind.eq(behind + setup.o.valid - went[1]),
-            # What went is among those behind, so that the sum need not be known.
+            # A span that left is counted in ``behind``, so that the new sum is not needed.
             waits.eq(setup.o.valid | behind[1:].any() | (behind[0] & ~went[1])),
             room.eq(Cat(is_room).all()),
         ]
@@ -312,7 +312,7 @@ class ChordSpansUnit(wiring.Component):
         with m.If(accumulator.i.valid & accumulator.i.ready):
             m.d.sync += takes_long.eq(lengths.r_data[-1])
         taken = accumulator.taken
-        # A cycle late, as what is accepted is known late.
+        # A cycle late, as the handshake is known late.
         kept, entered = Signal.like(start, name="kept", reset_less=True), Signal(name="entered")
         length = Signal(len(lengths.w_data), name="length", reset_less=True)
         m.d.sync += [
@@ -340,7 +340,7 @@ class ChordSpansUnit(wiring.Component):
             m.d.comb += given[0].as_value().eq(first)
             m.d.comb += [given[k].as_value().eq(Mux(long, u, first)) for k, u in enumerate(others, 1)]
         m.d.comb += [
-            # Of what every span goes to, the starts and the gate, each waits for the other.
+            # Every span goes to the starts and to the gate: each of them waits for the other.
             gate.i.valid.eq(self.i.valid & self.i.ready),
             ready.eq(gate.i.ready),
             decisions.w_data.eq(gate.o.payload),

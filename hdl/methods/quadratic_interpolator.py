@@ -79,7 +79,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
         differences = self.parameters.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload
-        # Written a cycle late, as what is accepted is known late.
+        # Written a cycle late, as the handshake is known late.
         m.d.sync += [lengths.w_en.eq(self.i.valid & self.i.ready), lengths.w_data.eq(span.length)]
         m.d.comb += [
             self.i.ready.eq(middle.i.ready),

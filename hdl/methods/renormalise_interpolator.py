@@ -116,7 +116,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
             normals.valid.eq(renormaliser.o.valid),
             renormaliser.o.ready.eq(normals.ready),
         ]
-        # Spans alternate in the bit, from 0 on: before the first there was one of 1.
+        # The bit alternates from span to span, 0 in the first: the state starts as after a span with 1.
         last, flagged, out_of_range = Signal(init=1), Signal(), Signal()
         before = flagged & (last == result.span)
         m.d.sync += out_of_range.eq(0)

@@ -115,7 +115,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         m.d.sync += ready_spans.eq(ready_spans + s.through - begun)
         m.submodules.ends = ends = Memory(shape=normal_shape(), depth=4 << p.depth, init=[])
         multiplier = SteppedMultiplier(m, s.step)
-        # Before the levels, which take the multiplier at other steps than the segments.
+        # Before the levels, which use the multiplier on steps on which the segments do not.
         self._divide(m, r, s, ends, multiplier, fifo, segment_shape)
         self._count(m, r, s, ends, multiplier)
         self._back(m, fifo, segment_shape, ready_spans, begun)
@@ -270,7 +270,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         with m.If(r.step == 3):
             m.d.sync += r.levels.eq(0)
             for k, code in enumerate(p.limits.codes.tolist()):
-                # One pixel or two are the ends, and the middle one of three is the first level's.
+                # One pixel or two are at the ends; the middle one of three comes from the first level.
                 with m.If((sagitta.as_value() > code) & ~r.out_of_range & (r.steps > min(k + 1, 2))):
                     m.d.sync += r.levels.eq(k + 1)
         with m.If(r.step == 4):

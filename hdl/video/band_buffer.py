@@ -88,8 +88,8 @@ class BandBufferUnit(wiring.Component):
         m = Module()
         given, width = self.parameters, sum(self.parameters.colour_bits)
         m.submodules.colours = memory = Memory(shape=width, depth=2 * given.pixels, init=[])
-        # Written by `sync`: a buffer is filled, its band. By `pixel`: it is free; it was not shown; the slot,
-        # that it begins.
+        # Written in `sync`: a buffer is filled, and its band. Written in `pixel`: it is free, and it was not
+        # shown; the slot, and its beginning.
         self._filled, self._bands = Signal(2, name="filled"), [self._number(f"band_{k}") for k in range(2)]
         self._freed, self._slot = Signal(2, name="freed"), self._number("slot", given.bands - 1)
         self._unseen = Signal(2, name="unseen", init=0b11)

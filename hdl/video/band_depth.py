@@ -49,7 +49,7 @@ class BandDepthUnit(wiring.Component):
         bits = given.tag_bits
         m.submodules.depths = memory = Memory(shape=DEPTH.width + bits, depth=given.words, init=[])
         read, write = memory.read_port(), memory.write_port()
-        # Of what a reset found in the memory nothing counts.
+        # After a reset no word in the memory is valid.
         fresh = Signal(name="fresh", init=1)
         tag, before = Signal(bits, name="tag"), Signal(bits, name="tag_before")
         place, left = Signal(range(given.words), name="place"), Signal(range(given.words + 1), name="left")

@@ -80,7 +80,7 @@ class DrawCommandsUnit(wiring.Component):
             with m.If(walks):
                 m.d.sync += address.eq(address + 1)
             with m.If(ends):
-                # What was read behind the end is no command.
+                # A word read behind the end is no command.
                 m.d.sync += [walks.eq(0), waits.eq(1)]
         with m.If(waits & ~self.o.valid):
             m.d.sync += waits.eq(0)

@@ -164,7 +164,7 @@ class DrawUnit(wiring.Component):
             self.done.payload.eq(band),
         ]
         idle = Signal(name="idle")
-        # A cycle late, which is before the command behind a draw is there.
+        # A cycle late, but before the command behind a draw comes.
         m.d.sync += idle.eq(self.assembly.idle & render.idle)
         with m.FSM(name="state") as state:
             with m.State("clear"):

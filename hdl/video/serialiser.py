@@ -48,7 +48,7 @@ class SerialiserUnit(wiring.Component):
         """A shift register a lane, and one bit that goes with the last pair."""
         m = Module()
         pairs = self.parameters.PAIRS
-        # One bit a pair that is left; a register that is empty takes a word as well as one at its last pair.
+        # One bit for each pair that is left; a word is taken in by an empty register, or at the last pair.
         left = Signal(pairs, name="left")
         lanes = [Signal(BITS, name=f"lane_{k}", reset_less=True) for k in range(self.parameters.lanes)]
         payload = Signal(self.o.payload.shape(), name="pair")

@@ -57,7 +57,7 @@ class TmdsEncoderUnit(PipelinedUnit):
         symbol = self.register(m, Cat(operands.control, operands.active), "symbol_1")
         half = Signal(signed(4), name="half")
         m.d.comb += half.eq(sum(first) - 4)
-        # The excess is even, and so is the disparity: both by halves.
+        # The excess and the disparity are even: registers hold half of each.
         excess = self.register(m, half, "excess")
         word, xor = self.register(m, first, "chain_2"), self.register(m, xor, "xor_2")
         symbol = self.register(m, symbol, "symbol_2")

@@ -93,7 +93,7 @@ class TriangleAssemblyUnit(wiring.Component):
             write.data.eq(Value.cast(self.write.payload.vertex)),
             write.en.eq(self.write.valid),
             self.write.ready.eq(1),
-            # A skid buffer would hold 400 bits more, where what follows takes five cycles or more a triangle.
+            # A skid buffer would cost 400 bits for nothing: the next unit takes 5 cycles or more a triangle.
             advance.eq(~valid | self.o.ready),
             self.o.valid.eq(valid),
             self.o.payload.eq(result),
@@ -186,7 +186,7 @@ class TriangleAssemblyUnit(wiring.Component):
         judged, outside = found["valid"], found["outside"]
         with m.If(advance):
             m.d.sync += valid.eq(judged & covered & ~outside)
-            # The corners are whole a cycle before it is known whether they count.
+            # All corners are there a cycle before the test of the band has a result.
             with m.If(found["whole"]):
                 for k, corner in enumerate(found["corners"]):
                     m.d.sync += [result[name][k].eq(corner[name]) for name in ("x", "y", "depth", "normal")]

@@ -133,7 +133,7 @@ class VertexUnit(PipelinedUnit):
         )
 
         def mantissa(c, shift, outside):
-            # The first bit is 1 whatever the vertex: one outside counts as W = 1.
+            # The first bit is 1 for every vertex: one that is outside gets W = 1.
             moved = (c >> Mux(outside, 0, shift))[:places]
             return FixedValue(Reciprocal.FORMAT, Cat(Mux(outside, 0, moved), Const(1, 1)))
 

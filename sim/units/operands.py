@@ -319,7 +319,7 @@ def highlight_codes(
     distance = rng.uniform(0, min(reach, 2), count)
     distance[1::4] = 10.0 ** rng.uniform(-9, 0.3, len(distance[1::4]))
     border = rng.integers(-3, 4, len(distance[3::12])) << rng.integers(0, 12, len(distance[3::12]))
-    # In the middle of a step, of which the cosine has the more bits.
+    # In the middle of a step, as the cosine has more fraction bits.
     distance[3::12] = (parameters.last_lit_arguments[exponent] + border + 0.5) * 2.0**-25
     if parameters.operand == "cosine":
         one = ONE_SQUARED.codes.item()

@@ -97,7 +97,7 @@ def _measure(rng, count, design):
                 cosine = normal @ light[0] / ONE
                 highlight = reflect(normal @ halfway[0] / ONE, exponent) * (cosine > 0)
                 shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
-            # Behind the light the highlight is cut off at once, wherever rounding puts that.
+            # The highlight is cut off where N.L changes its sign, and rounding decides where that is.
             kept = cosine > 1 / 16
             angle = degrees_between(left, right)[span[kept], 0]
             yield Sample(found[kept].astype(np.float64), shades[0][kept], shades[1][kept], angle)

@@ -73,7 +73,7 @@ def _constants(unit, rng, count):
     ]
     write = writes_of(constants)
     others = rng.integers(0, 1 << 18, (6, len(write["data"])))
-    # The index of a material is that of one.
+    # An index of a material is never changed: it must exist.
     others = np.where(write["address"] == MATERIAL_ADDRESS, write["data"], others)
     address = np.tile(write["address"], len(others) + 1)
     beats = beats_of(unit, ends_for(design, spans))

@@ -74,13 +74,13 @@ def _status(unit, case):
 
 def _case(unit, rng, count, length):
     record = _RECORDS[unit.packets]
-    # Of spans the count is that of pixels.
+    # For spans the stimulus counts pixels.
     count *= 10 if unit.packets == "span" else 1
     inner = next(iter(record.stimuli.values())).make(unit.core, rng, count)
     data = unit.parameters.given.pack(_columns(unit.parameters.given, inner.beats))
     ends = np.cumsum(rng.integers(1, 2 * length, len(data) + 1)) - 1
     last = np.isin(np.arange(len(data)), ends)
-    # Also those with which the run, and the one with pauses, ends.
+    # Also the beats that end the run, and the run with pauses.
     last[[-1, min(PAUSED, len(last)) - 1]] = True
     return Case({"data": data, "last": last.astype(int)}, inner.constants, inner.write)
 

@@ -110,7 +110,7 @@ def _tables(unit, rng, count):
         # A table is replaced by one that is written later.
         tables[0].writes(),
         case.write,
-        # Values past the end of a table are lost, however many, and so are those of a bank that there is not.
+        # Values past the end of a table are lost, however many; those of a bank that does not exist, too.
         {"value": np.r_[lost, p.banks, lost], "begins": np.arange(1401) == 700},
         # Two values make a word, one none.
         {"value": np.r_[0, lost[:1]], "begins": [1, 0]},

@@ -33,7 +33,7 @@ def _longest_words(unit, rng, count):
 
     vector = rounded(np.sqrt(1 / 3))[0]
     about = normalise(vector)
-    # Of a step by one in each component at most one end is a unit vector's code but for its last bits.
+    # Steps by one in each component: at most one end is the code of a unit vector, but for its last bits.
     step = np.floor(normalise(vector + rng.integers(-100, 101, (200_000, 3))) * ONE).astype(int)
     excess = np.linalg.norm(step, axis=-1) - ONE
     step = step[np.argsort(np.abs(excess + np.sqrt(3) / 2))[:40]]

@@ -65,7 +65,7 @@ def _measure(rng, count):
             around = np.repeat(normalise(halfway / ONE), spans, axis=0)
             left = turned(rng, around, rng.permutation(spread_angles(rng, spans, 180.0)))
             right = turned(rng, left, rng.permutation(spread_angles(rng, spans, 15.0)))
-            # Of the lengths of interpolated normals at the two ends.
+            # The ratio of the lengths of the interpolated normals at the two ends.
             ends = left, right * 1.05 ** rng.uniform(-1, 1, (spans, 1))
             codes = [quantise(v) for v in (left, normalise(ends[0] + ends[1]), right)]
             values = _CHORD.values(*component_words(*codes, light, halfway))
@@ -174,7 +174,7 @@ def _status(unit, case):
         threshold = Fixed(ValueGate.THRESHOLD_FORMAT, np.full(len(length), case.constants["threshold"]))
     wide = SpanLimit().compute(*ends, values, length, exponent, unit.highlights, threshold)
     if not unit.highlights:
-        # Without words of u there is none that does not fit.
+        # Without highlights there is no word of u that could be out of range.
         values = SpanValues(values.diffuse, 0 * values.highlight)
     flags = {"out_of_range": unit.parameters.compute_values(values, length).out_of_range, "wide": wide}
     return {name: int(np.count_nonzero(flag)) for name, flag in flags.items()}
@@ -238,7 +238,7 @@ def _limits(unit, rng, count):
     """Angles about the limits of the exponent, H at the edge of what is lit, lights behind and in front."""
     limit, exponent = SpanLimit(), any_exponent(rng)
     halfway = sphere(rng, 1).repeat(count, axis=0)
-    # From the angle of which u is that at which a highlight ends.
+    # The angle to H at which a highlight ends.
     edge = np.degrees(np.arccos(np.clip(1 - limit.lit(exponent), -1, 1)))
     left = turned(rng, halfway, edge * rng.uniform(0.8, 1.2, count))
     degrees = rng.choice([limit.angle(exponent), limit.WIDEST], count) + 0.1 * rng.normal(size=count)

@@ -103,7 +103,7 @@ def _last_bits(unit, rng, count):
     """Spans of one level at the borders of roundings, where a single step of a product decides."""
 
     def at_border(u):
-        # Of both roundings of u, to 20 and to 17 fraction bits.
+        # At the borders of both roundings of u, to 20 and to 17 fraction bits.
         return (abs((u - (7 << 13) + 20) % (1 << 17) - 20) < 20) & (u < ONE_SQUARED.codes)
 
     first = pairs_chosen(*code_pairs_at(rng, 2000, 90), at_border)
