@@ -264,7 +264,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     @property
     def spans_inside(self) -> int:
-        """Most spans inside at a time."""
+        """Largest number of spans inside."""
         # Two more wait behind the memory of the coordinates.
         return self._waiting_spans + 2 + self._assembler.SPANS_INSIDE
 

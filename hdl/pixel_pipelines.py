@@ -120,7 +120,7 @@ class PixelPipelinesUnit(wiring.Component):
 
     @property
     def spans_inside(self) -> int:
-        """Most spans inside one pipeline and its FIFO at a time."""
+        """Largest number of spans inside one pipeline and its FIFO."""
         return self.pipelines[0].spans_inside + self._waiting + _BEHIND
 
     def elaborate(self, platform):

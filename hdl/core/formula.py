@@ -31,7 +31,7 @@ SYMBOLS = {
 """Symbols of a beat's fields in formulas; other fields appear by their names."""
 
 LONGEST = 14
-"""Most characters of a formula that other formulas repeat; a longer one they replace by its word's name."""
+"""Largest length of a formula that other formulas repeat; a longer one they replace by its word's name."""
 
 _SUM, _PRODUCT, _ATOM = range(3)
 

@@ -22,7 +22,7 @@ from math import prod
 __all__ = ["Operation", "Placement", "Schedule", "place"]
 
 _MOST_SEARCHED = 500
-"""Most ways to share instances that are tried, for beats at any distance."""
+"""Largest number of ways to share instances that are tried, for beats at any distance."""
 
 
 @dataclass(eq=False)

@@ -222,7 +222,7 @@ class LightUnit(wiring.Component):
 
     @property
     def _depth(self) -> int:
-        """Most terms that wait for the specular unit.
+        """Largest number of terms that wait for the specular unit.
 
         As many as it has inside, one that it is about to take, and one for the output.
         """

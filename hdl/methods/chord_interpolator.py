@@ -268,7 +268,7 @@ class ChordInterpolatorUnit(InterpolatorUnit, parameters=ChordInterpolator):
         m.d.comb += self.wide.eq(wide_now)
 
     _LIMITS_INSIDE = 8
-    """Most results of the limit that wait for the values of their spans."""
+    """Largest number of results of the limit that wait for the values of their spans."""
 
     def _is_lit(self, m: Module, name: str, values: stream.Interface, word, first, light, level) -> Value:
         """Whether a light is not behind a span and may have a highlight there, three cycles after it.

@@ -366,7 +366,7 @@ def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, d
     written, taken : Value
         Whether a word comes, and whether the first is taken.
     depth : int
-        Most words inside, a power of two.
+        Largest number of words inside, a power of two.
     """
     word = Value.cast(word)
     m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])

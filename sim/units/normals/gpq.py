@@ -39,7 +39,7 @@ def _expect(unit, case):
 
 
 def _normals(unit, rng, count):
-    """Ends at angles of every size, or any codes; the middle is that of `MiddleNormal`, or any code."""
+    """Ends at angles of every size, or any codes; the middle is their middle normal, or any code."""
     left, right = any_pairs(rng, count)
     middle = any_codes(rng, MiddleNormal.FORMAT, count, 3)
     middle[::2] = MiddleNormal().compute(*component_words(left, right))[0].codes[::2]
