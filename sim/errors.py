@@ -6,14 +6,15 @@ __all__ = ["InputError", "OptionError", "one_line"]
 def one_line(text: str, most: int = 1000) -> str:
     """Text of a user, a file or another program, fit for a message: in one line, and not too long.
 
-    What cannot be printed (line breaks, a terminal's escape sequences, bytes that are no text) becomes ``?``.
+    Characters that cannot be printed (line breaks, escape sequences of a terminal, bytes that are no text)
+    become ``?``.
 
     Parameters
     ----------
     text : str
         The text.
     most : int
-        Characters, of which the last three become ``...`` where there are more.
+        Largest number of characters; a longer text is cut to it and ends with ``...``.
     """
     text = "".join(c if c.isprintable() else "?" for c in text[: most + 1])
     return text if len(text) <= most else f"{text[: most - 3]}..."
@@ -41,23 +42,23 @@ class InputError(Exception):
         super().__init__(f"{self.thing}: {self.reason}; {self.remedy}")
 
     def __reduce__(self):
-        """How it crosses from one process to another."""
+        """How pickle rebuilds the error in another process."""
         return InputError, (self.thing, self.reason, self.remedy)
 
 
 class OptionError(InputError):
     """Bad value of an option, by the option's name in Python.
 
-    The value may come from a scene file or from the command line, which `at` makes the message name.
+    The value may come from a scene file or from the command line; `at` makes the error that names that place.
 
     Parameters
     ----------
     option : str
         Name of the option.
     value : object
-        Its value; of an empty text only the name is shown.
+        Its value; if it is an empty text, the message shows the name alone.
     reason, remedy : str
-        As of `InputError`.
+        As in `InputError`.
     """
 
     def __init__(self, option: str, value: object, reason: str, remedy: str):
@@ -68,5 +69,5 @@ class OptionError(InputError):
         super().__init__(f"{option} {self.value}".strip(), reason, remedy)
 
     def at(self, place: str) -> InputError:
-        """The same error of a thing with another name."""
+        """The same reason and remedy as an `InputError` whose thing is ``place``."""
         return InputError(place, self.reason, self.remedy)

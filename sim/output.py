@@ -47,8 +47,8 @@ def _unwritable(path: Path, error: OSError) -> InputError:
 def check_writable(path: str | os.PathLike) -> None:
     """Check, before long work, that a file can be written; leaves nothing behind.
 
-    A temporary file in its folder is made and removed: permissions alone do not tell of file systems that are
-    read-only or take no files, nor anything to the superuser.
+    A temporary file is made in its folder and removed: permissions alone do not show that a file system is
+    read-only or takes no files, and they do not restrict the superuser.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def check_writable(path: str | os.PathLike) -> None:
 
 
 def files_within(folder: str | os.PathLike, first: str) -> list[str]:
-    """Check, before long work, that files can be written into a folder, and list what it holds already.
+    """Check, before long work, that files can be written into a folder, and list the files in it.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def files_within(folder: str | os.PathLike, first: str) -> list[str]:
     Raises
     ------
     InputError
-        If it is a file, or it or ``first`` may not be written.
+        If the folder is a file, or the folder or ``first`` may not be written.
     """
     folder = Path(folder)
     if not folder.exists():
@@ -119,13 +119,13 @@ def files_within(folder: str | os.PathLike, first: str) -> list[str]:
 
 @contextmanager
 def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
-    """Path of a temporary file beside ``path``, which takes its name when the block ends without an error.
+    """Path of a temporary file that is renamed to ``path`` when the block ends without an error.
 
-    Within `all_or_none` it takes it when that ends. Until then a file that was there stays as it was;
-    whatever ends the block early (an interrupt, too) removes the temporary file. The file's permissions are
-    those of the one it replaces, or those that the umask gives a new file. A link is followed: its target is
-    replaced. A path that is no regular file (``/dev/stdout``, a pipe) is given as it is, and written
-    directly.
+    Within `all_or_none` it is renamed when that block ends. Until then an older file at ``path`` stays as it
+    was; an exception in the block (an interrupt, too) removes the temporary file. The new file has the
+    permissions of the file that it replaces, or those that the umask gives a new file. A link is followed:
+    its target is replaced. A path that is no regular file (``/dev/stdout``, a pipe) is yielded itself, and
+    written directly.
 
     Parameters
     ----------
@@ -180,8 +180,8 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
 def all_or_none() -> Iterator[None]:
     """Within the block, files of `atomic_writer` take their names when the block ends, all of them together.
 
-    If it ends with an error there is none of them, and those that were there stay as they were. Paths that
-    are no regular files are written at once.
+    If the block ends with an error, no new file is left, and older files stay as they were. Paths that are
+    no regular files are written at once.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def write_json(path: str | os.PathLike, value: Any) -> None:
     InputError
         If the file cannot be written.
     TypeError
-        If the value holds something that JSON cannot.
+        If the value holds an object that JSON has no form for.
     """
     write_text(path, json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 

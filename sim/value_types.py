@@ -26,7 +26,7 @@ __all__ = [
 
 
 class Value(click.ParamType):
-    """A type whose values come as text from the command line, and as numbers, lists and texts from a file.
+    """Type of an option: text on the command line; numbers, lists and texts in a file and in Python.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Value(click.ParamType):
     remedy: str
 
     def parse(self, text: str) -> Any:
-        """Value of a text of the command line, not yet checked; `ValueError` if it is none."""
+        """Value of a text of the command line, not yet checked; `ValueError` if the text has no such form."""
         return text
 
     def check(self, value: Any) -> Any:
@@ -49,7 +49,7 @@ class Value(click.ParamType):
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Checked value of a text; `InputError` with the option and the text."""
+        """Checked value of a text; `InputError` with the option and the text if it is not accepted."""
         try:
             return self.check(self.parse(value) if isinstance(value, str) else value)
         except ValueError as error:
@@ -60,7 +60,7 @@ class Value(click.ParamType):
 
 
 def shown(value: Any) -> str:
-    """A value in a message: in one line, and not too long."""
+    """Text of a value for a message: in one line, and at most 40 characters."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list | tuple):
@@ -100,7 +100,7 @@ class Whole(Value):
         self.remedy = f"give a whole number from {least} to {most}"
 
     def parse(self, text):
-        """Digits and a sign, nothing else."""
+        """Number of a text of up to 18 digits, with a sign or without; other texts unchanged."""
         return int(text) if re.fullmatch(r"[+-]?[0-9]{1,18}", text) else text
 
     def check(self, value):
@@ -121,7 +121,7 @@ class Few(Whole):
         self.remedy = f"give one of {', '.join(map(str, numbers))}"
 
     def get_metavar(self, param, ctx=None):
-        """The numbers."""
+        """Placeholder in the help text: the numbers."""
         return f"[{'|'.join(map(str, self.numbers))}]"
 
     def check(self, value):
@@ -141,7 +141,7 @@ class Number(Value):
         self.remedy = f"give {least:g} to {most:g}{unit and f' {unit}'}"
 
     def parse(self, text):
-        """As Python reads a `float`."""
+        """Number of a text, by the rules of Python's `float`."""
         return _floats(text, "not a number")[0] if "," not in text else text
 
     def check(self, value):
@@ -150,7 +150,7 @@ class Number(Value):
 
 
 class Vector(Value):
-    """Finite numbers, as many as one of the counts; a direction is not 0."""
+    """A tuple of finite numbers whose length is one of ``counts``; a direction is not 0."""
 
     def __init__(
         self, kind: str, counts: tuple[int, ...] = (3,), metavar: str = "X,Y,Z", direction: bool = False
@@ -173,7 +173,7 @@ class Vector(Value):
 
 
 class Color(Value):
-    """``#rrggbb``, three numbers or one: as three numbers."""
+    """A colour: ``#rrggbb``, three numbers, or one number for all channels; its value is three numbers."""
 
     name = "COLOR"
 
@@ -219,7 +219,7 @@ class Size(Value):
 
 
 class Truth(Value):
-    """True or false, of a file or of Python; a flag on the command line."""
+    """True or false: a `bool` in a file and in Python, a flag on the command line."""
 
     name = "boolean"
     remedy = "give true or false"
@@ -237,7 +237,7 @@ class Choice(Value):
     Parameters
     ----------
     kind : str
-        What they are names of, for the message.
+        What the names stand for, used in messages: ``"method"``.
     names : iterable of str
         The names.
     """
@@ -259,7 +259,7 @@ class Choice(Value):
 
 
 class OutputFile(click.Path):
-    """Name of a file to write; an empty one, as of a shell's variable that is not set, is none."""
+    """Name of a file to write; an empty name, as from a shell variable that is not set, is refused."""
 
     def convert(self, value, param, ctx):
         """The name."""

@@ -1,4 +1,4 @@
-"""Animations: a camera that goes once round, and its frames, rendered by processes or machines."""
+"""Animations: a camera that goes once round its target, and frames rendered by processes or machines."""
 
 import functools
 import os
@@ -45,7 +45,7 @@ __all__ = [
 
 
 def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
-    """A vector turned once round an axis, in equal steps, counter-clockwise seen against the axis.
+    """A vector turned once round an axis, in equal steps, counter-clockwise as seen from the axis' tip.
 
     Step k is ``v cos a + (u x v) sin a + u (u·v) (1 - cos a)`` with the axis' unit vector u and
     ``a = 2 pi k / count`` (Rodrigues). The first is the vector itself, to the bit.
@@ -53,7 +53,7 @@ def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
     Parameters
     ----------
     vector, axis : three floats
-        The axis not 0.
+        The axis is not 0.
     count : int
         Steps, at least 1.
 
@@ -64,7 +64,7 @@ def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
     Raises
     ------
     ValueError
-        If there are several and the vector lies along the axis: they would be the same but for rounding.
+        If ``count`` is over 1 and the vector lies along the axis: all steps would be equal but for rounding.
     """
     vector, unit = np.asarray(vector, dtype=np.float64), normalise(axis)
     if count > 1 and np.linalg.norm(np.cross(normalise(vector), unit)) < 1e-6:
@@ -75,14 +75,14 @@ def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
 
 
 def turntable(camera: Camera, count: int) -> list[Camera]:
-    """Cameras that go once round their target, about the axis ``up``, from a camera on.
+    """Cameras that go once round the target of a camera, about the axis ``up``, in equal steps.
 
-    The lights stay where they are. The first camera is the given one.
+    The first is the given camera. The lights do not move.
 
     Raises
     ------
     ValueError
-        If there are several and the camera looks along the axis.
+        If ``count`` is over 1 and the camera looks along the axis.
     """
     offset = np.subtract(camera.position, camera.target)
     positions = np.add(camera.target, turned(offset, camera.up, count)[1:])
@@ -90,10 +90,10 @@ def turntable(camera: Camera, count: int) -> list[Camera]:
 
 
 def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
-    """Cameras with one target, as `Camera.framing` gives them, all as far away as the furthest.
+    """Cameras of `Camera.framing` with one target, moved to the distance of the furthest.
 
-    A turntable of framing cameras would come nearer wherever the mesh is narrow. The height of the picture
-    becomes the largest, the near plane the nearest.
+    Without this a turntable would come nearer wherever the mesh is narrow. All get the largest height of
+    picture and the nearest near plane among them.
     """
     if len(cameras) == 1:
         return list(cameras)
@@ -123,8 +123,8 @@ class Animation:
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     full : Design, optional
-        The full pipeline of a specialised one: the frames' errors are against its method and model. ``None``:
-        the pipeline itself.
+        The pipeline that ``design`` is a specialisation of: the frames' errors are against its method and
+        model. ``None``: ``design`` itself.
     pipes : int
         Number of pipelines.
     setups : int
@@ -176,9 +176,10 @@ def _triangle_simulator(
 
 
 def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
-    """Render one frame, and compare it with the golden renderer's.
+    """Render one frame, and compare it with the frame of the golden renderer.
 
-    A process builds or loads its model at the first frame. A model has one state: threads take turns.
+    A process builds or loads its model at the first frame. Threads of a process share one model: they render
+    one after the other.
     """
     with _ONE_AT_A_TIME:
         scene = replace(animation.scene, camera=camera)
@@ -216,9 +217,9 @@ class FrameExecutor:
     submit : callable
         Takes a camera, returns the `concurrent.futures.Future` of its `AnimationFrame`.
     workers : int
-        Frames at a time.
+        Number of frames rendered at a time.
     name : str
-        For the report.
+        Text for the report: ``"4 processes"``.
     """
 
     submit: Callable[[Camera], Future[AnimationFrame]]
@@ -253,7 +254,7 @@ def dask_executor(animation: Animation, address: str) -> Iterator[FrameExecutor]
     animation : Animation
         What all frames have in common; it is sent to each worker once.
     address : str
-        Of the scheduler, ``tcp://host:8786``.
+        Address of the scheduler, ``tcp://host:8786``.
     """
     with cluster_client(address) as client:
         workers = len(client.nthreads())
@@ -267,9 +268,9 @@ def dask_executor(animation: Animation, address: str) -> Iterator[FrameExecutor]
 
 
 def render_frames(executor: FrameExecutor, cameras: Sequence[Camera]) -> Iterator[tuple[int, AnimationFrame]]:
-    """Frames in the order in which they are done, each with its index.
+    """Render a frame for each camera: pairs of index and frame, in the order in which they are finished.
 
-    At most two frames a worker are under way, so that finished ones do not fill the memory.
+    At most two frames a worker are submitted at a time, so that finished ones do not fill the memory.
 
     Parameters
     ----------
@@ -301,11 +302,11 @@ def render_frames(executor: FrameExecutor, cameras: Sequence[Camera]) -> Iterato
 
 
 def write_gif(path: str | os.PathLike, frames: Iterable[str | os.PathLike], milliseconds: int = 50) -> None:
-    """Write pictures of one size as an animated GIF without end; whole or not at all.
+    """Write pictures of one size as an animated GIF that repeats for ever; whole or not at all.
 
-    GIF has 256 colours. The same serve all frames, so that none flickers: those of Pillow's maximum coverage
-    over the frames' colours, each counted once, or else a wide background would take most. They are found in
-    a regular sample of about a million pixels.
+    A GIF has 256 colours. All frames share one palette, so that no colour flickers. Pillow's maximum coverage
+    finds it among the colours of a regular sample of about a million pixels. Each colour counts once, so
+    that a wide background does not take most of the palette.
 
     Parameters
     ----------
@@ -314,7 +315,7 @@ def write_gif(path: str | os.PathLike, frames: Iterable[str | os.PathLike], mill
     frames : paths
         The pictures.
     milliseconds : int
-        Time of each, in steps of 10.
+        Time that each picture is shown, in steps of 10.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Frames of a display: a top simulated down to its four lanes, on one clock, and the lanes decoded."""
+"""Frames of a display: a top module simulated to its four lanes, on one clock, and the lanes decoded."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,37 +19,37 @@ from blysk.sim.engines.simulate import simulate
 __all__ = ["OneClock", "Shown", "show"]
 
 CYCLES = 4
-"""Cycles of the serial clock whose bits leave in a beat: 32 bits."""
+"""Cycles of the serial clock in one output beat, which has 32 bits."""
 
 
 class OneClock(wiring.Component):
-    """A top with the clocks ``sync``, ``pixel`` and ``serial`` on one clock, for the engines.
+    """A top module with the clocks ``sync``, ``pixel`` and ``serial``, driven by one clock, for the engines.
 
-    The one clock is the serial clock. The pixel clock's registers move on every fifth of its cycles, those of
-    ``sync`` on as many as its rate asks for, spread evenly: on each clock edge every register does what it
-    does with clocks of its own whose edges fall on the serial clock's. Its output cells are our models.
+    The one clock is the serial clock. The registers of ``pixel`` are enabled in every fifth of its cycles,
+    those of ``sync`` in a share ``rate`` of them, spread evenly: each register behaves as with a clock of its
+    own whose edges coincide with edges of the serial clock. The output cells are `OutputCells`, our models.
 
     Parameters
     ----------
     top : Component
-        With ``pairs`` and ``status``, and ``buttons`` where it has some.
+        With the members ``pairs`` and ``status``, and perhaps ``buttons``.
     rate : Fraction
         Rate of ``sync`` over that of ``serial``, at most 1.
 
     Members
     -------
     i : :py:`In(stream.Signature(buttons))`
-        The buttons from now on.
+        State of the buttons from this cycle on.
     o : :py:`Out(stream.Signature(32))`
-        Bits of the lanes, those of four cycles at a time: of each cycle two bits of lane 0, of lane 1, ...;
-        the sink must be ready.
+        Bits of the lanes in four cycles; for each cycle two bits of lane 0, two of lane 1, and so on. The
+        sink must be ready in every cycle.
     status : :py:`Out(...)`
-        That of the top.
+        The top's counters.
 
     Raises
     ------
     ValueError
-        If ``sync`` is faster than the serial clock.
+        If the rate is 0 or less, or ``sync`` is faster than the serial clock.
     """
 
     def __init__(self, top: wiring.Component, rate: Fraction):
@@ -67,7 +67,7 @@ class OneClock(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The enables, the top under them, and a register that collects bits."""
+        """The enables of two clocks, the top under them, and a register that collects bits."""
         m = Module()
         inner, top = Module(), self.top
         cells = OutputCells(LANES)
@@ -137,11 +137,11 @@ def show(
     top : OneClock
         The top.
     mode : DisplayMode
-        Its display's.
+        Mode of its display.
     count : int
         Frames, from the first after power-up.
     buttons : int array, optional
-        Buttons from power-up on; each value for a cycle, the last one stays.
+        State of the buttons from power-up on: a value for each cycle, the last one then stays.
     engine : str
         As `simulate` has it.
     progress : callable, optional

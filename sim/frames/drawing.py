@@ -1,4 +1,4 @@
-"""Frames in bands by simulated hardware: a drawing's pixels band by band, its cycles and counters."""
+"""Frames drawn in bands by simulated hardware: pixels band by band, cycles and counters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ __all__ = ["DrawingSimulator", "DrawnBands", "MergedDrawUnit"]
 
 
 class MergedDrawUnit(wiring.Component):
-    """A `DrawUnit` with one stream out: pixels, and after a band's last one a beat with ``done``.
+    """A `DrawUnit` with one output stream: pixels, and after the last pixel of a band a beat with ``done``.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class MergedDrawUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """A pixel goes first; buttons stay as the last request had them."""
+        """A pixel goes before ``done``; the buttons keep the value of the last request."""
         m = Module()
         m.submodules.unit = unit = self.unit
         buttons = Signal(4, name="buttons")
@@ -73,13 +73,13 @@ class DrawnBands:
     Parameters
     ----------
     band : int64 array, shape (B,)
-        Index of each.
+        Index of each band.
     pixels : list of arrays
-        Of each its pixels' beats: x, y, r, g, b.
+        Output beats of each band's pixels: x, y, r, g, b.
     cycles : int64 array, shape (B,)
-        Of each from its request to its ``done``, and the clearing after the band before.
+        Cycles of each band from its request to its ``done``, with the clearing after the previous band.
     counts : dict of str to int
-        `STATUS` at the end.
+        The counters of `STATUS` at the end.
     """
 
     band: np.ndarray
@@ -88,7 +88,7 @@ class DrawnBands:
     counts: dict[str, int]
 
     def pictures(self, drawing: Drawing, background: Sequence[int] = (0, 0, 0)) -> list[np.ndarray]:
-        """Frame buffers of whole frames, of bands that were asked for in turn."""
+        """Frame buffers, uint8 (height, width, 3); band 0 starts one, the bands after it must be in order."""
         images: list[np.ndarray] = []
         for band, pixels in zip(self.band, self.pixels, strict=True):
             if band == 0:
@@ -123,7 +123,7 @@ class DrawingSimulator:
         bands : sequence of int
             Indices.
         buttons : sequence of int, optional
-            What is down from each request on.
+            Buttons that are pressed from each request on; 0 by default.
         **stalls
             ``input_stalls`` and ``output_stalls`` of `simulate`.
 

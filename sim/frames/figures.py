@@ -30,7 +30,7 @@ ERRORS = {
     "method": "exact normals of every pixel, same model",
     "total": "exact normals of every pixel, Blinn's power",
 }
-"""Name of each error, and the frame that it is against."""
+"""Name of each error, and the frame that it compares with."""
 
 
 def frame_figures(
@@ -74,8 +74,8 @@ def triangle_figures(
 ) -> dict[str, Any]:
     """Figures of a frame by simulated geometry, ready for `write_json`.
 
-    There is no ``arithmetic_error``, as the spans are the hardware's own. ``cycles`` are from the first
-    triangle to the last pixel, ``triangle_cycles`` those until the last triangle was taken in.
+    There is no ``arithmetic_error``, as the hardware makes its own spans. ``cycles`` counts from the first
+    triangle to the last pixel, ``triangle_cycles`` to the cycle in which the last triangle is taken.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def triangle_figures(
 def _figures(
     scene: Scene, design: Design, frame: SimulatedFrame | SimulatedTriangleFrame, triangles: int, visible: int
 ) -> dict[str, Any]:
-    """What every frame has."""
+    """Figures that every frame has."""
     return {
         "method": design.method,
         "model": design.model,
@@ -149,8 +149,8 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     Parameters
     ----------
     frames : sequence of dict
-        Of `frame_figures` or `triangle_figures`, of one scene and pipeline. ``triangles`` are the most that
-        a frame has.
+        Figures of `frame_figures` or `triangle_figures`, all of one scene and pipeline. ``triangles`` of the
+        result is the largest of the frames.
     """
     same = ("method", "model", "exponent", "lights", "materials", "engine", "width", "height")
     same += tuple(key for key in ("pipes", "geometry", "setups") if key in frames[0])
@@ -170,14 +170,14 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def worst_errors(figures: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
-    """The worst of each error over several frames: the largest, and of PSNR the least.
+    """The worst value of each error over several frames: the largest, but the least PSNR.
 
-    Frames that show no surface have no errors and do not count; if none does, every figure is NaN.
+    Frames that show no surface have no errors and do not count; if no frame shows one, every figure is NaN.
 
     Parameters
     ----------
     figures : sequence of dict
-        Of `frame_figures`.
+        Figures of `frame_figures`.
     """
     worst = {}
     for name in (name for name in ERRORS if f"{name}_error" in figures[0]):
@@ -200,8 +200,8 @@ def saving_figures(specialisation: Specialisation) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``full`` and ``specialised``: number of each resource; ``reductions``: ``reason`` and ``saves`` of
-        each, on top of those before it.
+        ``full`` and ``specialised``: number of each resource; ``reductions``: of each reduction its
+        ``reason``, and what it ``saves`` in addition to the reductions before it.
     """
     full, steps = specialisation.costs()
     before = [full, *steps]

@@ -44,7 +44,7 @@ class SimulatedFrame(Frame):
 
 
 _IDLE = 1000
-"""Cycles without a transfer after which several pipelines are done: a pixel takes less."""
+"""Idle timeout of several pipelines: cycles without a beat after which they are done; a pixel takes less."""
 
 
 def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dict[str, np.ndarray]:
@@ -53,9 +53,9 @@ def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dic
     Parameters
     ----------
     unit : ShadingPipelineUnit
-        The pipeline, or what has its ports.
+        The pipeline, or a unit with its input ports.
     spans : Spans
-        What it is to shade.
+        The spans to shade.
     """
     members = unit.i.payload.shape().members
     beats = {name: getattr(spans, name) for name in members if name not in ("values", "normal_middle")}
@@ -69,9 +69,9 @@ def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dic
 
 
 def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Pixels of wide beats in the order of one pipeline, whose pixels have these scanlines.
+    """Pixels of wide beats, sorted to the order of one pipeline, whose pixels have the scanlines ``y``.
 
-    Of a scanline both have them in the order of its spans.
+    Within a scanline both orders are that of its spans.
     """
     lanes = beats["pixels"].shape[1]
     pixels = beats["pixels"][(beats["present"][:, np.newaxis] >> np.arange(lanes) & 1).astype(bool)]
@@ -88,7 +88,7 @@ class FrameSimulator:
     Parameters
     ----------
     design : Design
-        Method, reflection model, number of lights.
+        The pipeline: method, reflection model, number of lights and so on.
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     pipes : int
@@ -128,7 +128,7 @@ class FrameSimulator:
     def _run(
         self, spans: Spans, constants: Sequence[FrameConstants], y: np.ndarray, **options
     ) -> tuple[Run, np.ndarray]:
-        """A run, and the pixels in the order of the spans; ``y`` are their scanlines."""
+        """A simulation, and its pixels in the order of the spans; ``y`` are the pixels' scanlines."""
         # How many wide beats come depends on how many pixels leave on a cycle.
         ends = {"count": len(y)} if self.pipes == 1 else {"count": None, "idle_timeout": _IDLE}
         run = simulate(
@@ -155,14 +155,14 @@ class FrameSimulator:
         scene : Scene
             What to draw; at most as many lights as the design has.
         progress : callable, optional
-            Called now and then with the number of pixels so far and in all.
+            Called at times with the number of pixels so far, and of all pixels.
         vcd : str, optional
             File for the waveforms; engine ``"pysim"`` only.
 
         Raises
         ------
         SimulationError
-            If the pipeline breaks the stream's rules, stops, or answers with other pixels than asked for.
+            If the pipeline breaks the stream's rules, stops, or gives pixels at wrong coordinates.
         ValueError
             If the scene has more lights or other materials than the design, or a term is brighter than 8.
         """
@@ -196,7 +196,7 @@ def _colors(beats: np.ndarray) -> np.ndarray:
 
 
 def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
-    """A few spans of every kind, lights from all sides and materials, to check a model with."""
+    """Some spans of every kind, and constants with lights from all sides, to check a new model with."""
     rng = np.random.default_rng(2025)
     length = np.r_[1, 2, 3, rng.integers(0, min(24, 1 << design.length_bits), 37)]
     normals = rng.normal(size=(len(length), 3))
@@ -220,7 +220,7 @@ def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
 
 
 def sample_constants(design: Design, rng: np.random.Generator | None = None) -> list[FrameConstants]:
-    """Frame constants of each material of a design, lights from all sides, to check a model with."""
+    """Frame constants of each material of a design, with lights from all sides, to check a new model with."""
     rng = np.random.default_rng(2025) if rng is None else rng
     half = COMPONENT.max_code // 2
     vectors = rng.integers(-half, half, (2, design.lights, 3))
@@ -237,7 +237,7 @@ def sample_constants(design: Design, rng: np.random.Generator | None = None) -> 
 
 
 def sample_material(design: Design, index: int) -> Material:
-    """A material whose highlight the pipeline has a bank for, or the exponent that is fixed, by a number."""
+    """Sample material number ``index``, with an exponent or lobe that the pipeline serves."""
     material = Material((0.08, 0.05, 0.03), (0.5,) * 3, (0.6,) * 3, design.build.exponent or 7 + index % 64)
     if not design.loads_tables:
         return material

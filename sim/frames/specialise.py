@@ -28,7 +28,7 @@ class Reduction(NamedTuple):
     reason : str
         What is left out, and why: one line.
     changes : dict
-        Fields of `Design` without it; of a field that is itself a record, those of its fields.
+        New values of fields of `Design`; for a field that is itself a record, a dict of its changed fields.
     """
 
     reason: str
@@ -45,7 +45,7 @@ def _without(design: Design, reduction: Reduction) -> Design:
 
 @dataclass(frozen=True)
 class Specialisation:
-    """A pipeline for a scene, or for the frames of a turntable, beside the full one.
+    """The smallest pipeline for a scene or the frames of a turntable, and the full pipeline.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Specialisation:
     reductions : tuple of Reduction
         The parts that the scenes do not need.
     scenes : tuple of Scene
-        The scenes for `design`: without lights that give none, and with equal materials merged.
+        The scenes that `design` draws: lights without effect left out, and equal materials merged.
     """
 
     full: Design
@@ -67,7 +67,7 @@ class Specialisation:
         return reduce(_without, self.reductions, self.full)
 
     def costs(self) -> tuple[Cost, tuple[Cost, ...]]:
-        """Cost of the full pipeline, and of that without the first part, the first two, and so on."""
+        """Cost of the full pipeline, and of that with the first reduction, with the first two, and so on."""
         designs = accumulate(self.reductions, _without, initial=self.full)
         costs = [cost_of(ShadingPipelineUnit(design)) for design in designs]
         return costs[0], tuple(costs[1:])
@@ -76,19 +76,19 @@ class Specialisation:
 def specialise(
     scenes: Scene | Sequence[Scene], full: Design | None = None, *, exact: bool = True
 ) -> Specialisation:
-    """The smallest pipeline for a scene: every part of it is used.
+    """The smallest pipeline for a scene, without the parts that the scene does not use.
 
-    Left out are: lights that light nothing; the specular path, where no span has specular light; the
-    highlight gate, where there is nothing to gate; the memory of materials, for equal ones; the PROM, for one
-    exponent; two of three channels, where all colours are grey; and the upper bits of coordinates and
-    lengths. No word of the arithmetic changes its width, so that no pixel does. If not ``exact``, the chord
-    method also has fewer bits in its differences where all spans are short: its error bound stays, its pixels
-    may change.
+    These are left out: lights that light nothing; the specular path, if no span has specular light; the
+    highlight gate, if there is nothing to gate; the memory of materials, if all are equal; the PROM, if there
+    is one exponent; two of three channels, if all colours are grey; and the upper bits of coordinates and
+    lengths. The words of the arithmetic keep their widths, so that every pixel stays the same. If not
+    ``exact`` and all spans are short, the differences of the chord method also get fewer bits: the error
+    bound stays, pixels may change.
 
     Parameters
     ----------
     scenes : Scene or sequence of Scene
-        One scene, or several that differ in the camera.
+        One scene, or several that differ in the camera only.
     full : Design, optional
         Method and model, with as many lights and materials as the scene. By default, the chord method with a
         highlight gate.
@@ -193,7 +193,7 @@ def _without_highlights(
 def _with_fixed_values(
     design: Design, constants: Sequence[FrameConstants], reductions: Sequence[Reduction]
 ) -> list[Reduction]:
-    """One exponent, or all tables, where specular light is left, and one channel."""
+    """Reductions by fixed values: exponent or tables, if there is specular light, and grey colours."""
     found = []
     exponents = {of.exponent for of in constants}
     has_specular = all(reduction.changes.get("specular", 0) is not None for reduction in reductions)
@@ -214,7 +214,7 @@ def _with_fixed_values(
 
 
 def _with_fewer_bits(full: Design, scene: Scene, longest: int) -> list[Reduction]:
-    """Coordinates of the picture's size, and lengths up to the longest span's."""
+    """Reductions: coordinates with the bits of the picture's size, lengths with those of the longest span."""
     found = []
     for name, side, what in (("x_bits", scene.width, "columns"), ("y_bits", scene.height, "rows")):
         bits = max(int(side - 1).bit_length(), 1)
@@ -228,7 +228,7 @@ def _with_fewer_bits(full: Design, scene: Scene, longest: int) -> list[Reduction
 
 
 def _with_shorter_words(prepared: Sequence[PreparedFrame], longest: int) -> list[Reduction]:
-    """What short spans allow the chord method."""
+    """Reduction of the chord method's differences to the fraction bits that the longest span needs."""
     found = []
     bits = min(bits for bits in range(36, 47, 2) if longest <= ChordSetup(fraction_bits=bits).longest)
     if bits < 46:

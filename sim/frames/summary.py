@@ -28,7 +28,7 @@ _COUNTS = {
 
 
 _WARNINGS = ("repaired_normals", "dropped_faces", "missed_spans", "wide_spans", "out_of_range_spans")
-"""Counts that may be faults."""
+"""Counts that may come from a fault of the mesh or the design."""
 
 
 def _line(name: str, text: str) -> str:
@@ -63,7 +63,7 @@ def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 
 def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """What a person needs of a frame's figures, in at most seven lines; `frame_lines` has the rest."""
+    """A frame's main figures in at most seven lines; `frame_lines` has all of them."""
     yield _line(
         "mesh",
         f"{figures['mesh']}, {figures['triangles']:,} triangles, {figures['width']}x{figures['height']}",

@@ -1,4 +1,4 @@
-"""A folder that a user takes away with the Verilog: a cocotb bench, and the vectors of a frame."""
+"""A folder for users of the Verilog: a cocotb test bench, and the vectors of a frame."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,7 +34,7 @@ _TRIANGLES = 400
 def teapot_frame(
     design: Design, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
 ) -> tuple[Spans, list[FrameConstants], Pixels]:
-    """A teapot for a pipeline, with as many lights and materials as it has, and nothing too bright.
+    """A teapot for a pipeline, with as many lights and materials as it has, and no term too bright.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ def teapot_frame(
     size : two ints
         Width and height of the picture.
     triangles : int
-        Of the teapot, about.
+        Number of triangles of the teapot, about.
 
     Returns
     -------
     spans : Spans
-        What goes in. The first is of length 0, and gives no pixel.
+        The input. The first span is of length 0, and gives no pixel.
     constants : list of FrameConstants
-        Those of each material.
+        The constants of each material.
     pixels : Pixels
-        What must come out, by the bit-accurate model.
+        The expected output, by the bit-accurate model.
     """
     mesh = load_mesh("teapot", triangles=triangles).mesh
     width, height = size
@@ -83,7 +83,7 @@ def teapot_frame(
 
 
 def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[str, np.ndarray]]:
-    """What goes into a pipeline for a small frame, and what must come out, by the ports of its Verilog.
+    """Inputs and expected outputs of a pipeline for a small frame, by the ports of its Verilog.
 
     Parameters
     ----------
@@ -93,8 +93,8 @@ def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[s
     Returns
     -------
     dict of dict of int arrays
-        Of ``writes``, ``spans``, ``pixels`` and ``status``: a column of codes for each port, all equally
-        long. See `teapot_frame`.
+        For each of ``writes``, ``spans``, ``pixels`` and ``status`` a column of codes for each port, all of
+        one length. See `teapot_frame`.
     """
     several = isinstance(unit.parameters, PixelPipelines)
     spans, constants, pixels = teapot_frame(unit.parameters.design if several else unit.parameters)
@@ -142,7 +142,7 @@ def check_folder(folder: str | os.PathLike) -> None:
     Raises
     ------
     InputError
-        If there is such a folder and it is not empty, or it cannot be made or written.
+        If the folder exists and is not empty, or cannot be made or written.
     """
     if names := files_within(folder, _TEMPLATES[0]):
         raise InputError(str(folder), f"holds {names[0]} already", "give a new or empty folder")
@@ -166,7 +166,7 @@ def write_testbench(
     name, text : str
         Its top module, and its Verilog.
     about : sequence of str
-        Lines that say what it is.
+        Lines of README.md that describe the pipeline.
 
     Raises
     ------

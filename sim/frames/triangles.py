@@ -34,7 +34,7 @@ class SimulatedTriangleFrame:
     counts : dict of str to int
         `RenderUnit`'s counters.
     written : int
-        Pixels written, those that something nearer replaced later included.
+        Pixels written, with those that a nearer surface replaced later.
     visible : int
         Pixels of the picture that show the surface.
     cycles : int
@@ -44,7 +44,7 @@ class SimulatedTriangleFrame:
     engine : {"cxxrtl", "pysim"}
         The simulator.
     seconds : dict
-        Of ``triangles`` (transformed and clipped) and of ``simulate``.
+        Seconds of ``triangles`` (to transform and clip them) and of ``simulate``.
     setups : int
         Lanes of triangle setup.
     """
@@ -72,7 +72,7 @@ class SimulatedTriangleFrame:
 
 
 class TriangleSimulator:
-    """Triangles to pixels, built once for a size of pictures.
+    """Simulator of the hardware from triangles to pixels, built once for a size of pictures.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class TriangleSimulator:
         self._check()
 
     def _check(self) -> None:
-        """A few triangles by the new model, against the bit-accurate one."""
+        """Compare the pixels of some triangles by the new simulation model with the bit-accurate model."""
         rng = np.random.default_rng(2025)
         steps, count = self.renderer.geometry.grid.steps, 12
         frame = Frame.centred(*self.size)
@@ -142,7 +142,7 @@ class TriangleSimulator:
             raise SimulationError("the simulated hardware's pixels are not those of its bit-accurate model")
 
     def _constants(self, frame: Frame) -> dict[str, int]:
-        """Codes of the frame, the first picture."""
+        """Codes of the frame's constants, as for the first picture."""
         return frame.codes | ({} if self.renderer.coarse is None else {"picture": 0})
 
     def render(
@@ -159,9 +159,9 @@ class TriangleSimulator:
         scene : Scene
             What to draw, of the simulator's size.
         progress : callable, optional
-            Called now and then with the number of pixels written so far and, as all are not known, again.
+            Called at times; both numbers are the pixels written so far, as the total is unknown.
         count : int, optional
-            How many pixels will be written, where that is known: less than waiting for more.
+            Number of pixels that will be written, if known: it saves the idle timeout at the end.
         vcd : str, optional
             File for the waveforms; engine ``"pysim"`` only.
 
@@ -215,9 +215,9 @@ class TriangleSimulator:
         )
 
     def _longest_silence(self, sent: SceneTriangles, inside: int = 24) -> int:
-        """Cycles without a triangle taken in or a pixel given, at most: those inside may all be hidden.
+        """Upper bound of the cycles without a beat, as all triangles inside the hardware may be hidden.
 
-        Of so many of the largest every pixel and scanline of their boxes.
+        It counts every pixel and scanline in the boxes of the ``inside`` largest triangles.
         """
         triangles, frame, steps = sent.triangles, sent.frame, self.renderer.geometry.grid.steps
         sides = []

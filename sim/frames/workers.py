@@ -1,4 +1,4 @@
-"""Who does work that falls into independent parts: processes of this machine, or the workers of a cluster."""
+"""Executors of independent tasks: processes of this machine, or the workers of a cluster."""
 
 import contextlib
 import importlib.util
@@ -29,7 +29,7 @@ _START = "start one with `dask scheduler`, and give its address, as tcp://host:8
 
 
 def processors() -> int:
-    """Processors that this process may use."""
+    """Number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:
@@ -40,18 +40,18 @@ def processors() -> int:
 def local_executor(
     jobs: int, begin: Callable[..., object] | None = None, arguments: tuple[Any, ...] = ()
 ) -> Iterator[Executor]:
-    """Processes on this machine, with the cache of this one.
+    """Processes on this machine, which share the cache of this process.
 
-    An exception in the block, an interrupt too, ends the processes at once.
+    An exception in the block, such as an interrupt, ends the processes at once.
 
     Parameters
     ----------
     jobs : int
         How many processes.
     begin : callable, optional
-        What each calls first, with the arguments: these cross once, not with every call.
+        Called first in each process, with ``arguments``, which are sent once and not with every task.
     arguments : tuple
-        Of ``begin``.
+        Arguments of ``begin``.
 
     Raises
     ------
@@ -108,12 +108,12 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def check_address(address: str) -> None:
-    """Check, before long work, that this may be the address of a scheduler, and that Dask is there.
+    """Check, before long work, that an address has the form of a scheduler's, and that Dask is installed.
 
     Raises
     ------
     InputError
-        If it is not.
+        If the form is another, or Dask is missing.
     """
     option = f"--cluster {address}"
     # Dask's client, given what is no address, stays behind half built.
@@ -127,19 +127,19 @@ def check_address(address: str) -> None:
 def cluster_client(address: str) -> Iterator["Client"]:
     """Dask's client of a scheduler whose workers have this version of blysk.
 
-    Each worker builds its models in its own cache. An exception in the block takes back what waits; Dask
-    cannot stop what is being done. Dask's messages are pickled Python: whoever answers at the address is
-    trusted.
+    Each worker builds its models in its own cache. An exception in the block cancels the waiting tasks; Dask
+    cannot stop the running ones. Dask's messages are pickled Python: use only an address that you trust.
 
     Parameters
     ----------
     address : str
-        Of the scheduler, ``tcp://host:8786``.
+        Address of the scheduler, ``tcp://host:8786``.
 
     Raises
     ------
     InputError
-        If Dask is not installed, no scheduler answers, it has no worker with this version, or loses them.
+        If Dask is not installed, no scheduler answers, or it has no workers, workers of another version, or
+        loses them.
     """
     option = f"--cluster {address}"
     check_address(address)

@@ -1,4 +1,4 @@
-"""The shading pipeline beside this file against the expected pixels; README.md says what the vectors are."""
+"""Test of the shading pipeline beside this file against expected pixels; README.md describes the vectors."""
 
 import csv
 import random
@@ -10,10 +10,10 @@ from cocotb.triggers import FallingEdge, ReadOnly
 
 VECTORS = Path(__file__).resolve().parent / "vectors"
 PATIENCE = 10_000
-"""Clocks without a transfer after which the pipeline counts as stuck."""
+"""Cycles without a transfer after which the pipeline counts as stuck."""
 
 SETTLE = 64
-"""Clocks in which no further pixel may come."""
+"""Cycles after the last pixel in which no further pixel may come."""
 
 
 def read(name):
@@ -33,9 +33,9 @@ def sample(dut, ports):
 
 
 class Source:
-    """Offers rows on a stream, one after the other, with pauses; what it offers stays until it is taken.
+    """Source of a stream: offers rows in turn, with pauses; an offered row stays until it is taken.
 
-    The first comes when all rows of the source ``after`` have been taken.
+    The first row is offered after all rows of the source ``after`` have been taken.
     """
 
     def __init__(self, dut, stream, rows, pauses, after=None):
@@ -44,7 +44,7 @@ class Source:
         self.offered = False
 
     def drive(self):
-        """Half a clock before the rising edge: offer the next row, perhaps."""
+        """Half a cycle before the rising edge: offer the next row, or pause."""
         if not self.offered:
             free = self.rows and (self.after is None or self.after.done)
             self.offered = bool(free) and random.random() >= self.pauses
@@ -54,7 +54,7 @@ class Source:
                     getattr(self.dut, port).value = code
 
     def observe(self):
-        """When the outputs have settled: whether the row is taken at the edge."""
+        """After the outputs have settled: whether the row is taken at the edge."""
         taken = self.offered and self.ready.value == 1
         if taken:
             self.rows.pop()
@@ -68,19 +68,19 @@ class Source:
 
 
 class Sink:
-    """Takes pixels, with pauses, and holds each against the expected one."""
+    """Sink of a stream: takes pixels, with pauses, and compares each with the expected one."""
 
     def __init__(self, dut, expected, pauses):
         self.dut, self.expected, self.pauses = dut, expected, pauses
         self.taken, self.held, self.ready = 0, None, False
 
     def drive(self):
-        """Half a clock before the rising edge: be ready, perhaps."""
+        """Half a cycle before the rising edge: be ready, or pause."""
         self.ready = random.random() >= self.pauses
         self.dut.o_ready.value = int(self.ready)
 
     def observe(self):
-        """When the outputs have settled: check what is offered; whether it is taken at the edge."""
+        """After the outputs have settled: check the offered pixel; whether it is taken at the edge."""
         valid = sample(self.dut, ["o_valid"])["o_valid"]
         pixel = sample(self.dut, self.expected[0]) if valid else None
         where = f"pixel {self.taken}"
@@ -108,7 +108,7 @@ class Sink:
 
 
 async def cycles(dut, parts, count=None):
-    """Clock so many times, or until every part is done."""
+    """Run the clock for ``count`` cycles, or until every part is done; the number of cycles."""
     idle = clock = 0
     while clock != count and not (count is None and all(part.done for part in parts)):
         await FallingEdge(dut.clk)
@@ -124,7 +124,7 @@ async def cycles(dut, parts, count=None):
 @cocotb.test()
 @cocotb.parametrize(pauses=[(0.0, 0.0), (0.4, 0.4), (0.8, 0.1), (0.1, 0.8)])
 async def every_pixel(dut, pauses):
-    """Constants, then spans in and pixels out; sources and the sink pause for these parts of the cycles."""
+    """Send constants, then spans, and check pixels; sources and sink pause in these shares of the cycles."""
     for port in ("i_valid", "write_valid", "o_ready"):
         getattr(dut, port).value = 0
     dut.rst.value = 1
