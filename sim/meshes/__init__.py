@@ -1,1 +1,1 @@
-"""Meshes: the files of the world, and the teapot's patches."""
+"""Meshes: readers of mesh files, and the teapot."""

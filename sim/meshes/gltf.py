@@ -1,4 +1,4 @@
-"""GLB and glTF files: checks of what trimesh does not check, materials, and the files that they refer to."""
+"""GLB and glTF files: checks that trimesh does not make, materials, and a text that trimesh reads right."""
 
 import importlib.util
 import json
@@ -74,7 +74,7 @@ def check_gltf(document: dict) -> None:
 
 
 def _check_nodes(document: dict) -> None:
-    """Refuse nodes that are no trees: trimesh would draw one of several places, or none, or never end."""
+    """Refuse nodes that form no trees: trimesh would draw one of several places, or none, or never end."""
     nodes = document.get("nodes", [])
     children = [node.get("children", []) for node in nodes]
     roots = [scene.get("nodes", []) for scene in document.get("scenes", [])]
@@ -94,9 +94,9 @@ def _check_nodes(document: dict) -> None:
 
 
 def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
-    """Put numbers of materials in place of the materials, and leave out what hangs on textures.
+    """Replace a document's materials by their numbers, and remove textures and vertex colours.
 
-    trimesh then tells the number of each part of a mesh, and there is no image that it could look for.
+    trimesh then gives the material's number of each part of a mesh, and looks for no image file.
     """
     texts = document.pop("materials", None) or []
     for unread in ("images", "textures", "samplers"):
@@ -133,7 +133,8 @@ def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
 def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial, int]:
     """A material of a glTF document, and how many textures it has.
 
-    Factors that are missing are 1, as glTF has it. Those of a texture, which is not read, say nothing.
+    Missing factors are 1, as glTF defines. Metallic and roughness factors of a texture do not count, as
+    textures are not read.
     """
     look = text.get("pbrMetallicRoughness", {})
     factor = look.get("baseColorFactor", [1, 1, 1, 1]) if isinstance(look, dict) else look
@@ -159,10 +160,10 @@ def _factor(look: dict, key: str, name: str) -> float:
 
 
 def plain_gltf(document: dict, found: Found) -> bytes:
-    """The text of a document without what trimesh trips over, and what the picture will not show of it.
+    """The text of a document without cameras; what the picture will not show goes into ``found.ignored``.
 
-    trimesh would lose what hangs on a camera. Morph targets with a weight other than 0 and skins are
-    counted: the mesh is drawn as it is without them.
+    trimesh would lose the nodes below a camera. Skins, and morph targets with a weight other than 0, are
+    counted: the mesh is drawn without them.
     """
     meshes = document.get("meshes", [])
     morphed = {

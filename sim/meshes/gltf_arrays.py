@@ -36,7 +36,7 @@ def _listed(document: dict, name: str) -> list[dict]:
 
 
 def _whole(value: Any, what: str, below: float = math.inf) -> int:
-    """A whole number from 0; Python would count negative ones from the end."""
+    """Check a whole number: 0 or more, as Python would count a negative index from the end."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
         raise Refused(f"it has {what} {shown(str(value))}, no whole number from 0")
     if value >= below:
@@ -76,7 +76,7 @@ def check_arrays(document: dict) -> None:
 
 
 def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list[bytes]:
-    """The bytes of a document's buffers: in it, in the GLB file, or in files of its folder."""
+    """Bytes of a document's buffers, from the document, the GLB file, or files of its folder."""
     buffers = []
     for number, buffer in enumerate(_listed(document, "buffers")):
         uri = buffer.get("uri")
@@ -118,7 +118,7 @@ def _glb_chunk(data: bytes) -> bytes:
 
 
 class _Arrays:
-    """The accessors of a document, and a buffer of arrays put to them."""
+    """The accessors of a document, and a new buffer with arrays that are added to them."""
 
     def __init__(self, document: dict, buffers: list[bytes]):
         self.document, self.buffers = document, buffers
@@ -147,7 +147,7 @@ class _Arrays:
     def check_draco(self, compressed: dict) -> None:
         """Refuse compressed data that its decoder refuses: trimesh would leave the part out.
 
-        Without the decoder only what stands there uncompressed, too, comes here, and is read.
+        Without the decoder, only data that is also there uncompressed gets here, and is read in that form.
         """
         if importlib.util.find_spec("DracoPy") is None:
             return
@@ -163,7 +163,7 @@ class _Arrays:
             raise Refused("its Draco-compressed data is damaged", REEXPORT) from error
 
     def add(self, values: np.ndarray) -> int:
-        """Number of a new accessor with these values: float32 vectors, or indices of 32 bits."""
+        """Add an array, float32 vectors or 32-bit indices; the number of its new accessor."""
         kind, component = ("<f4", _FLOAT) if values.dtype.kind == "f" else ("<u4", 5125)
         stored = np.ascontiguousarray(values, dtype=kind)
         views, accessors = self.document["bufferViews"], self.document["accessors"]
@@ -175,7 +175,7 @@ class _Arrays:
         return len(accessors) - 1
 
     def as_floats(self, index: int, name: str) -> int:
-        """Number of the accessor with a quantised attribute as floats; of normals, of unit length."""
+        """Number of an accessor that has an attribute as floats; quantised normals get unit length."""
         accessor = self.document["accessors"][index]
         if accessor["type"] != "VEC3":
             raise Refused(f"its {name} is of the type {shown(str(accessor['type']))}, not VEC3")
@@ -195,10 +195,10 @@ class _Arrays:
 
 
 def plain_arrays(document: dict, buffers: list[bytes]) -> list[bytes]:
-    """Put a document into the form that trimesh reads right; its buffers, one of them perhaps new.
+    """Put a document into a form that trimesh reads right; the buffers, perhaps with a new one.
 
-    trimesh takes whole numbers as they stand, normalised or not; it leaves out triangle fans and draws one
-    of a node's instances.
+    trimesh does not scale normalised whole numbers, leaves out triangle fans, and draws only one of a node's
+    instances.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Materials of mesh files: what a file says, and the reflection coefficients that follow."""
+"""Materials of mesh files: values that a file gives, and the reflection coefficients made of them."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,20 +19,20 @@ _INSTEAD = (("diffuse", "ambient"), ("exponent", "roughness"), ("specular", "fre
 
 @dataclass(frozen=True)
 class FileMaterial:
-    """What a file says of a material; ``None`` where it says nothing.
+    """Values that a file gives for a material; ``None`` where it gives none.
 
     Parameters
     ----------
     name : str
         Its name; empty for faces that have no material in the file.
     diffuse, specular : three floats or None
-        Colours, each channel 0 to 1: factors of k_d and k_s, as they stand.
+        Colours, each channel 0 to 1: k_d and k_s without conversion.
     exponent : int or None
         Exponent of the highlight, 1 to 1000.
     roughness : float or None
-        Of models that have one in place of an exponent.
+        Roughness, for the reflection models that have one in place of an exponent.
     fresnel, ambient : three floats or None
-        F_0 of `Material`; and k_a, where it is not a share of the diffuse colour.
+        F_0 of `Material`; and k_a, if it is not to be a share of the diffuse colour.
     two_sided : bool
         Whether its faces are seen from behind, too.
     """
@@ -50,7 +50,7 @@ class FileMaterial:
     def of_metallic_roughness(
         cls, name: str, base: Triple, metallic: float, roughness: float, two_sided: bool = False
     ) -> "FileMaterial":
-        """Of glTF's factors, 0 to 1 each: see `Material.of_metallic_roughness`."""
+        """A material of glTF's factors, 0 to 1 each: see `Material.of_metallic_roughness`."""
         made = Material.of_metallic_roughness(base, metallic, roughness, _AMBIENT_SHARE)
         names = ("diffuse", "specular", "exponent", "roughness", "fresnel", "ambient")
         return cls(name, **{field: getattr(made, field) for field in names}, two_sided=two_sided)
@@ -58,16 +58,17 @@ class FileMaterial:
 
 @dataclass
 class Found:
-    """A file's materials: number 0 for faces without one, then its own; and what of the file is not read.
+    """A file's materials, number 0 for faces without one, and a list of the contents that are not read.
 
     Parameters
     ----------
     names : list of str
         Names of the materials.
     readers : list of callable or None
-        Of each, what reads it, when a face uses it, and gives the material and how many textures it has.
+        A function for each material, called if a face uses it, that returns the material and its number of
+        textures; ``None`` if the file does not define it.
     ignored : list of str
-        What is not read, in words.
+        Contents that are not read, in words.
     """
 
     names: list[str] = field(default_factory=lambda: [""])
@@ -81,7 +82,7 @@ class Found:
 
 
 def color_of(channels: list[float], what: str, name: str, text: str) -> Triple:
-    """A colour of a material; `Refused`, with the text of the file, if it is none."""
+    """A colour of a material; `Refused`, with the file's text, if it is not three numbers from 0 to 1."""
     if len(channels) != 3 or not all(0 <= channel <= 1 for channel in channels):
         raise Refused(
             f"material {name!r} has {what} {shown(text)!r}, not three numbers from 0 to 1", ONE_MATERIAL
@@ -92,18 +93,18 @@ def color_of(channels: list[float], what: str, name: str, text: str) -> Triple:
 def surfaces(
     materials: Sequence[FileMaterial], default: Material, fixed: Collection[str] = ()
 ) -> tuple[Material, ...]:
-    """Reflection coefficients of a mesh's materials: what the file says, before a default.
+    """Reflection coefficients of a mesh's materials: the file's values, and a default where it has none.
 
-    The file's diffuse colour is k_d, and a tenth of it, or of the base colour, k_a; its specular colour is
-    k_s. An exponent that is given counts before the file's roughness, and a specular colour that is given
-    before the file's F_0.
+    k_d is the file's diffuse colour, k_s its specular colour, and k_a a tenth of the diffuse or base colour.
+    If ``fixed`` has the exponent, the file's roughness does not count; in the same way the specular colour
+    excludes the file's F_0, and the diffuse colour its k_a.
 
     Parameters
     ----------
     materials : sequence of FileMaterial
-        Of `load_mesh`.
+        Materials of `load_mesh`.
     default : Material
-        Coefficients where the file says nothing.
+        Coefficients where the file gives none.
     fixed : collection of str
         Fields of ``default`` that hold for all materials, whatever the file says: ``"diffuse"`` and so on.
     """

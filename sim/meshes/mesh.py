@@ -32,10 +32,10 @@ __all__ = ["DEFAULT_CREASE", "DEFAULT_TRIANGLES", "SUFFIXES", "LoadedMesh", "loa
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
 
 DEFAULT_TRIANGLES = 10_000
-"""Triangles of the teapot, about."""
+"""Triangles of the teapot that are asked for by default."""
 
 DEFAULT_CREASE = 40.0
-"""Degrees over which an edge is sharp, where a mesh has no normals."""
+"""Angle between faces, in degrees, over which an edge is sharp; for meshes without normals."""
 
 # A triangle whose height is below this part of the largest coordinate is rounding only: 32 units of 2**-53.
 _FLAT = 2.0**-48
@@ -43,7 +43,7 @@ _FLAT = 2.0**-48
 
 @dataclass(frozen=True)
 class LoadedMesh:
-    """A mesh and what had to be mended in it.
+    """A mesh, its materials, and the counts of repairs.
 
     Parameters
     ----------
@@ -55,10 +55,10 @@ class LoadedMesh:
         Stored vertex normals that were zero, not finite, or more than 1/256 off unit length, or that the
         file refers to but does not hold.
     dropped_faces : int
-        Triangles without area, left out.
+        Triangles without area, which are left out.
     materials : tuple of FileMaterial
-        Those that the mesh's ``material`` refers to, at least one; each is used by a face, and no two are
-        equal but for the name.
+        Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
+        differ in more than the name.
     ignored : tuple of str
         What the file holds, or refers to, that the mesh and the materials do not show: textures, vertex
         colours, a material file that is not there.
@@ -82,36 +82,37 @@ def load_mesh(
     """Load a mesh from a file, or build the teapot.
 
     Normals stored at the vertices of an OBJ, PLY, GLB or glTF file are kept. Zero, NaN and infinite ones
-    are replaced by the computed normal, ones of another length are normalised; both are counted. Without
-    stored normals (and for STL, which has them a face) vertices of equal position are welded, the mesh is
-    cut along the edges where two faces meet at more than ``crease_angle``, and a vertex gets the sum of its
-    face normals, weighted by the face's angle there.
+    are replaced by the computed normal, normals of another length are normalised; both are counted. Without
+    stored normals (and for STL, whose normals belong to faces) vertices of equal position are welded, the
+    mesh is cut along the edges where two faces meet at more than ``crease_angle``, and a vertex gets the sum
+    of its face normals, each weighted by the face's angle at the vertex, as a unit vector.
 
     All meshes of a scene are put together in world coordinates: vertices by the node's matrix ``M``,
     normals by its inverse transpose, and a mirroring node (``det M < 0``) turns the triangles round.
     Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
-    cover them, concave ones by ears. Of glTF, quantised arrays are scaled and instances of a node drawn;
-    morph weights and skins are not applied, and told in ``ignored``.
+    cover them, concave ones by ear clipping. Quantised arrays of glTF are scaled, and all instances of a node
+    drawn; morph weights and skins are not applied, and listed in ``ignored``.
 
-    Materials: of a GLB or glTF file ``pbrMetallicRoughness.baseColorFactor`` without its alpha, white where
-    there is none; of an OBJ file the ``Kd``, ``Ks`` and ``Ns`` (rounded, at least 1) of its ``usemtl``, from
-    the ``mtllib`` files in its folder. The factor of glTF is linear, as k_d is, and the picture is written
-    without a transfer curve: it is used as it stands, as is Kd. Metal, roughness, transparency, emission and
-    ``illum`` are not read. A material file that does not exist, or lacks a name, leaves the colours open
-    (``None``) and is told in ``ignored``, with textures and vertex colours, which are never read either.
-    Materials of no face are left out, and equal ones are one. PLY and STL files have one.
+    Materials of a GLB or glTF file: the base colour without its alpha, metallic and roughness factors of
+    ``pbrMetallicRoughness``, each 1 if missing (see `Material.of_metallic_roughness`), and ``doubleSided``.
+    Materials of an OBJ file, from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded, at
+    least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of glTF are linear, as k_d
+    is, and the picture is written without a transfer curve: they are used without conversion, as is Kd.
+    Transparency, emission and ``illum`` are not read. If a material file does not exist, or lacks a name, the
+    colours are ``None``, and ``ignored`` lists it, as it lists textures and vertex colours, which are never
+    read. Materials of no face are left out, and equal ones merged. PLY and STL files have one material.
 
     Parameters
     ----------
     source : str
-        ``teapot`` for the built-in one (a file of that name is ``./teapot``), else a path that ends in
-        .obj, .ply, .stl, .glb or .gltf, in any case.
+        ``teapot`` for the built-in mesh (a file of that name is ``./teapot``), else a path that ends in
+        .obj, .ply, .stl, .glb or .gltf, in upper or lower case.
     triangles : int
-        Triangles of the teapot, 64 to 4,000,000; of no effect for a file.
+        Triangles of the teapot, about, 64 to 4,000,000; without effect for a file.
     crease_angle : float
         Degrees, 0 to 180. At 0 only coplanar faces share a normal, at 180 all faces do.
     materials : bool
-        Whether to look at the file's materials; without, all faces have one that says nothing.
+        Whether to read the file's materials; if not, all faces have one material without values.
 
     Returns
     -------
@@ -121,12 +122,12 @@ def load_mesh(
     Raises
     ------
     InputError
-        If a number is out of range, or the file is missing, empty, of unknown type, damaged, refers to
+        If a number is out of range; if the file is missing, empty, of unknown type or damaged, refers to
         files outside its folder, needs a decoder that is not installed or a glTF extension that is not
-        supported, has numbers of another form than the format's, or holds no triangle, a vertex
-        that is not finite, an index out of range, nodes that are no trees, or more than 20 million
-        triangles; or a material in use has a colour that is not three numbers from 0 to 1 or an exponent
-        over 1000, or there are more than 1024 of them.
+        supported, or has numbers in another form than the format's; if it holds no triangle, a vertex that
+        is not finite, an index out of range, nodes that form no trees, or more than 20 million triangles; if
+        a material in use has a colour that is not three numbers from 0 to 1 or an exponent over 1000; or if
+        more than 1024 materials are in use.
     """
     if not 0 <= crease_angle <= 180:
         raise InputError(
@@ -153,7 +154,7 @@ def load_mesh(
 
 
 def _fault(error: Exception) -> str:
-    """What a loader stumbled over, in words of the file and not of the program."""
+    """A loader's exception as a reason in terms of the file, not of the program."""
     damaged = "is damaged, a part is missing or of a wrong kind"
     if isinstance(error, AssertionError | AttributeError | KeyError | TypeError):
         return damaged
@@ -181,7 +182,7 @@ def _quiet_trimesh():
 
 
 def _read(path: Path) -> bytes:
-    """The file's bytes, once path, suffix and size are known to be good."""
+    """The file's bytes, after a check of its path, suffix and size."""
     try:
         if not path.exists():
             raise Refused("there is no such file", "check the path, or use the name teapot")
@@ -203,7 +204,7 @@ def _read(path: Path) -> bytes:
 
 
 def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scene, Found]":
-    """Check what trimesh does not, and load without touching any file that was not checked."""
+    """Load a file by trimesh, after the checks that trimesh lacks; no file is opened that was not checked."""
     # Its import takes longer than to draw a small picture; only a file needs it.
     import trimesh
 
@@ -296,7 +297,7 @@ def _assemble(
 def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
     """Matrix into the world, and name, of the geometry of every node that has one.
 
-    trimesh's own way takes time by the cube of a node's level.
+    The time of trimesh's own function grows with the cube of a node's depth in the tree.
     """
     graph = scene.graph.transforms
     below = {}
@@ -310,7 +311,7 @@ def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
 
 
 def _number(name: str, geometry: object, path: Path) -> int:
-    """Number of a part's material."""
+    """Number of the material of a part of a mesh."""
     suffix = path.suffix.lower()
     if suffix == ".obj":
         return int(name) if name.isdecimal() else 0
@@ -319,7 +320,7 @@ def _number(name: str, geometry: object, path: Path) -> int:
 
 
 def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
-    """The mesh with the materials that its faces use, numbered from 0, equal ones as one."""
+    """The mesh with the materials that its faces use, numbered from 0, equal ones merged."""
     used, of_face = np.unique(loaded.mesh.material, return_inverse=True)
     places, materials, of_used, textures = {}, [], [], 0
     for number in used.tolist():
@@ -353,7 +354,7 @@ def _finish(
     lost: int,
     crease_angle: float,
 ) -> LoadedMesh:
-    """Drop faces without area, mend stored normals, compute the others; materials still by their numbers."""
+    """Drop faces without area, mend stored normals, compute the others; materials keep the file's numbers."""
     used = np.unique(faces)
     broken = len(used) - np.isfinite(vertices[used]).all(axis=1).sum()
     if broken:

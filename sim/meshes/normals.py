@@ -22,7 +22,7 @@ def face_cross(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
 def weighted_normals(
     vertices: np.ndarray, faces: np.ndarray, owner: np.ndarray, owners: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Unit face normals, and their sums, weighted by angle, over the corners of each ``owner`` (F, 3)."""
+    """Unit face normals, and their angle-weighted unit sums over the corners of each ``owner`` (F, 3)."""
     corners = vertices[faces]
     face_normals = normalise(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     sides = np.roll(corners, -1, axis=1) - corners
@@ -62,10 +62,10 @@ def repaired_normals(
 def crease_normals(
     vertices: np.ndarray, faces: np.ndarray, crease_angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cut a mesh at its creases: for each new vertex the old one and its normal, and the new faces.
+    """Cut a mesh at its creases: the old vertex of each new one, the new faces, and the new normals.
 
-    Two corners at one place belong to one new vertex if a chain of faces around it leads from one to the
-    other over edges that are no creases.
+    Two corners at one position share a new vertex if a chain of faces around the position leads from one to
+    the other over edges that are no creases.
     """
     if not len(faces):
         return np.zeros(0, dtype=np.int64), faces, np.zeros((0, 3))
@@ -103,7 +103,7 @@ def crease_normals(
 
 
 def transformed(normals: np.ndarray, cofactors: np.ndarray) -> np.ndarray:
-    """Normals turned by the cofactors, each with the length that it was stored with."""
+    """Normals multiplied by the cofactors, and scaled back to their stored lengths."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     finite = np.isfinite(normals).all(axis=1)
     turned = np.full(normals.shape, np.nan)

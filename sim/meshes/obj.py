@@ -1,4 +1,4 @@
-"""OBJ files and their material files, in the form that trimesh reads."""
+"""OBJ files and their material files, rewritten in the form that trimesh reads."""
 
 import math
 import os
@@ -20,9 +20,9 @@ _MAX_LIBRARY = 16_000_000
 
 
 def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
-    """An OBJ file with an object for each material, by its number, and its material files' names.
+    """An OBJ file with an object for each material, named by its number, and the names of its material files.
 
-    Two materials must not become one by what looks like a comment: ``usemtl Material #25`` is a name.
+    The text after ``#`` is part of a material's name, as in ``usemtl Material #25``, and no comment.
     """
     numbers = {"": 0}
     libraries = []
@@ -45,7 +45,7 @@ def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
 
 
 def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None:
-    """Look up the names of materials in the material files; the texts are read where a face uses them."""
+    """Find the materials' definitions in the material files; a definition is read if a face uses it."""
     texts = {}
     for name in dict.fromkeys(libraries):
         # A name with spaces, or several names.
@@ -75,8 +75,8 @@ def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None
 def _mtl_material(text: str, name: str) -> tuple[FileMaterial, int]:
     """A material of a material file, and how many textures it has.
 
-    Where it has Pr or Pm, roughness and metallic factor, these take the place of Ks and Ns; of the two a
-    missing one is 1 and 0, and a missing Kd white.
+    If it has a roughness Pr or a metallic factor Pm, these replace Ks and Ns; a missing Pr is then 1, a
+    missing Pm 0, and a missing Kd white.
     """
     values, textures = {}, 0
     for line in text.splitlines():
@@ -133,8 +133,8 @@ _END = rb"[ \t]*+\r?$"
 def tidy_obj(data: bytes, found: Found) -> bytes:
     """An OBJ file in the form that trimesh reads: positions of 3 numbers, and faces of 3 corners.
 
-    Lines that it would take wrongly are refused: numbers of another form than C's, positions with a weight
-    other than 1, indices that are 0.
+    Lines that trimesh would read wrongly are refused: numbers in another form than C's, positions with a
+    weight other than 1, indices that are 0.
     """
     data = re.sub(rb"#.*", b"", data)
     if re.search(rb"^(?:[ \t]++(?:vn?|vt|f)[ \t]|(?:vn?|vt|f)(?:\t| [ \t]))", data, re.MULTILINE):
@@ -180,7 +180,7 @@ def _absolute(data: bytes) -> bytes:
 
 
 def _positions(data: bytes, found: Found) -> bytes:
-    """The text with three numbers of each position, where some have a weight or a colour, too."""
+    """The text with three numbers for each position, without weights and colours."""
     wrong = rb"^(?:v (?!%b(?:[ \t]++%b){0,5}+%b)|vn (?!%b%b))([^\n]*)" % (_THREE, _NUMBER, _END, _THREE, _END)
     if bad := re.search(wrong, data, re.MULTILINE):
         raise Refused(f"a position or normal is {shown(bad[1].decode().strip())!r}, not 3 numbers")
@@ -195,7 +195,7 @@ def _positions(data: bytes, found: Found) -> bytes:
 
 
 def _triangular(data: bytes) -> bytes:
-    """The text with a line for each triangle of a polygon."""
+    """The text with polygons cut into triangles, a line for each."""
     lines = list(re.finditer(rb"^f (\S++(?:[ \t]++\S++){3,}+)%b" % _END, data, re.MULTILINE))
     if not lines:
         return data

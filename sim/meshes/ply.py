@@ -1,4 +1,4 @@
-"""PLY files: text and binary, with polygons of any count of corners."""
+"""PLY files: text and binary, with polygons of any number of corners."""
 
 import re
 import struct
@@ -26,7 +26,7 @@ class _Property(NamedTuple):
     kind: str
     """Type of the value, or of the values of a list."""
     count: str = ""
-    """Type of a list's count; empty if it is none."""
+    """Type of a list's count; empty if the property is no list."""
 
 
 class _Element(NamedTuple):
@@ -36,7 +36,7 @@ class _Element(NamedTuple):
 
 
 class _List(NamedTuple):
-    """Lists of all rows: their values one after the other, and how many each has."""
+    """A list of each row: the values of all lists, joined, and the length of each list."""
 
     values: np.ndarray
     counts: np.ndarray
@@ -51,8 +51,8 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
     Raises
     ------
     Refused
-        If the header is damaged, rows or bytes are missing, a list has another count than it says, or a face
-        has fewer than 3 corners or one that does not exist.
+        If the header is damaged, rows or bytes are missing, a list has another length than its count, or a
+        face has fewer than 3 corners or one that does not exist.
     """
     order, elements, body = _header(data, found)
     columns: dict[str, _Columns] = {}
@@ -106,7 +106,7 @@ def _triangles(vertices: np.ndarray, face: _Columns) -> np.ndarray:
 
 
 def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
-    """Order of the bytes (empty for text), the elements, and what comes after the header."""
+    """Byte order (empty for text), the elements, and the rest after the header."""
     head, mark, body = data.partition(b"end_header")
     if not mark:
         raise Refused("the PLY header has no end")
@@ -155,7 +155,7 @@ def _property(words: list[str]) -> _Property | None:
 
 
 def _text(element: _Element, rows: list[bytes]) -> _Columns:
-    """Columns of an element of a text; each row has to have what the header says, and nothing else."""
+    """Columns of an element of a text; each row must have the header's values, and nothing else."""
     words = [row.split() for row in rows]
     lengths = np.array([len(row) for row in words], dtype=np.int64)
     try:
@@ -185,7 +185,7 @@ def _text(element: _Element, rows: list[bytes]) -> _Columns:
 
 
 def _binary(element: _Element, body: bytes, start: int, order: str) -> tuple[_Columns, int]:
-    """Columns of an element of a binary file, and where it ends."""
+    """Columns of an element of a binary file, and the byte after its end."""
     short = f"it is cut short: its {shown(element.name)} rows take more bytes than there are"
     counts: list[int] = []
     cursor = start
@@ -228,7 +228,7 @@ def _binary(element: _Element, body: bytes, start: int, order: str) -> tuple[_Co
 
 
 def _ragged(element: _Element, body: bytes, start: int, order: str) -> tuple[_Columns, int]:
-    """Columns of an element whose lists differ in length: where a row starts, only the one before tells."""
+    """Columns of an element whose lists differ in length, read row by row, and the byte after its end."""
     letters = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
     values: dict[str, list] = {each.name: [] for each in element.properties}
     counts: dict[str, list[int]] = {each.name: [] for each in element.properties}

@@ -9,7 +9,7 @@ __all__ = ["check_corners", "triangulated"]
 
 
 def check_corners(corners: np.ndarray, vertices: int) -> None:
-    """Refuse indices of vertices that there are not; they count from 0."""
+    """Refuse indices, from 0, of vertices that do not exist."""
     if corners.size and not 0 <= corners.min() <= corners.max() < vertices:
         wrong = corners.min() if corners.min() < 0 else corners.max()
         raise Refused(f"a face refers to vertex {wrong} (from 0), there are {vertices}")
@@ -18,21 +18,21 @@ def check_corners(corners: np.ndarray, vertices: int) -> None:
 def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Cut polygons of equally many corners into triangles.
 
-    A fan from the first corner is kept where each of its triangles is turned like the polygon, which for a
-    polygon that does not cross itself means that they cover it; the others are cut by ears, in the plane at
-    right angles to their area vector ``sum(p_i x p_(i+1)) / 2``.
+    A fan from the first corner is used if each of its triangles has the polygon's orientation: the fan then
+    covers a polygon that does not cross itself. Other polygons are cut by ear clipping, in the plane at right
+    angles to their area vector ``sum(p_i x p_(i+1)) / 2``.
 
     Parameters
     ----------
     vertices : ndarray, shape (V, 3)
         Coordinates.
     polygons : int ndarray, shape (P, n)
-        Vertices of their corners, n at least 3, in range.
+        Vertices of their n corners, n at least 3, in range.
 
     Returns
     -------
     corners : int ndarray, shape (T, 3)
-        Of each triangle, which corners of its polygon, 0 to n - 1; polygon after polygon.
+        The corners of its polygon, 0 to n - 1, that each triangle has; polygon after polygon.
     owners : int ndarray, shape (T,)
         The polygon of each triangle.
     """
@@ -64,7 +64,7 @@ def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray
 
 
 def _ears(places: np.ndarray, area: np.ndarray) -> np.ndarray:
-    """Corners of the triangles of one polygon, turned as it is."""
+    """Corners of the triangles of one polygon by ear clipping, in the polygon's orientation."""
     normal = area / np.linalg.norm(area)
     side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     side /= np.linalg.norm(side)

@@ -1,4 +1,4 @@
-"""What the readers of mesh files share: refusals, names in messages, and files beside a file."""
+"""Shared parts of the readers of mesh files: refusals, names in messages, and files that a file refers to."""
 
 import codecs
 import os
@@ -10,14 +10,14 @@ from blysk.sim.errors import one_line
 __all__ = ["MAX_FACES", "ONE_MATERIAL", "REEXPORT", "Refused", "inside", "shown", "utf8"]
 
 MAX_FACES = 20_000_000
-"""Most triangles of a mesh."""
+"""Largest number of triangles of a mesh."""
 
 REEXPORT = "check the file or export it again"
 ONE_MATERIAL = "mend it, or shade the mesh with one material"
 
 
 class Refused(Exception):
-    """A reason and a remedy, before the file's name is put to them."""
+    """A file is refused: reason and remedy, to which the caller adds the file's name."""
 
     def __init__(self, reason: str, remedy: str = REEXPORT):
         super().__init__(reason)
@@ -26,19 +26,19 @@ class Refused(Exception):
 
 
 def shown(text: str) -> str:
-    """Text of a file in a message."""
+    """Text of a file for a message: in one line, and at most 60 characters."""
     return one_line(text, 60)
 
 
 def utf8(text: bytes) -> bytes:
-    """Text with the names and comments of another encoding made harmless; UTF-16 by its mark."""
+    """A text as valid UTF-8: UTF-16 with a byte order mark is converted, invalid bytes are replaced."""
     if text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return text.decode("utf-16", "replace").encode()
     return text.decode("utf-8", "replace").encode()
 
 
 def inside(folder: Path, reference: str, name: str | None = None) -> Path:
-    """The file that a reference means, in the folder or one below; it need not exist."""
+    """The file that a reference means, in the folder or below; `Refused` if outside. It need not exist."""
     name = reference if name is None else name
     # Of a name that is too long, or links in a circle, `Path` has exceptions to tell.
     target = Path(os.path.realpath(folder / name))

@@ -1,4 +1,4 @@
-"""STL files that are cut short, which trimesh would load in part."""
+"""STL files: refusal of those that are cut short, which trimesh would load in part."""
 
 import struct
 
@@ -8,7 +8,7 @@ __all__ = ["tidy_stl"]
 
 
 def tidy_stl(data: bytes) -> bytes:
-    """Refuse an STL that is cut short: of a binary one trimesh would only say that it is empty."""
+    """The bytes of an STL file; `Refused` if it is cut short, where trimesh says at most that it is empty."""
     if data[:5].lower() == b"solid" and b"\0" not in data:
         if b"endsolid" not in data.lower():
             raise Refused("it is cut short: the end of the solid is missing")
