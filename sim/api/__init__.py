@@ -1,1 +1,1 @@
-"""What `import blysk` gives: scenes, designs, frames and Verilog, with a default for every option."""
+"""Interface of `import blysk`: scenes, designs, frames and Verilog, with a default for every option."""

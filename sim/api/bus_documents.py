@@ -1,4 +1,4 @@
-"""What is written beside the Verilog of a core on a bus: its registers as Markdown, C header and SVD."""
+"""Documents of a core on a bus, written beside its Verilog: registers as Markdown, C header and SVD."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from blysk.hdl.bus.bus import BusUnit
 __all__ = ["DOCUMENTS", "documents_of", "layout_lines"]
 
 DOCUMENTS = (".md", ".h", ".svd")
-"""Suffixes of what is written beside the Verilog."""
+"""Suffixes of the documents."""
 
 _SPACE = 1 << ADDRESS_BITS
 _IN_SVD = {
@@ -23,7 +23,7 @@ _ACCESS = {"clear": "1 clears"}
 
 
 def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
-    """Texts by suffix: ``.md``, ``.h`` and ``.svd``, all of the same table.
+    """Texts of the documents by suffix, ``.md``, ``.h`` and ``.svd``, all made of one table of registers.
 
     Parameters
     ----------

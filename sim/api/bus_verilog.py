@@ -24,16 +24,16 @@ _PATHS = {
 
 
 def unit_of_top(top: str, bus: str, parameters, **options):
-    """A core, on a bus or with its own ports.
+    """The unit of a core, on a bus or with its own ports.
 
     Parameters
     ----------
     top, bus : str
-        Their names; the bus may be ``"native"``.
+        Names of the core and the bus; ``"native"`` for its own ports.
     parameters : Design or Renderer
-        As the core takes them.
+        Parameters of the core's constructor.
     **options
-        To its constructor.
+        Options of the constructor.
     """
     return (
         TOPS[top].unit(parameters, **options) if bus == "native" else BusUnit(bus, top, parameters, **options)
@@ -41,7 +41,7 @@ def unit_of_top(top: str, bus: str, parameters, **options):
 
 
 def geometry_descriptions(unit: GeometryUnit) -> dict[str, str]:
-    """Descriptions of the ports of geometry alone."""
+    """Descriptions of the ports of a core from triangles to spans."""
     made = set(unit.o.payload.shape().members)
     counted = {f"status_{name}" for name in unit.status.shape().members}
     shared = {
@@ -60,7 +60,7 @@ def bus_descriptions(unit: BusUnit) -> dict[str, str]:
 
 
 def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Sequence[str]) -> list[str]:
-    """How a core on a bus is driven, in lines.
+    """Header of a core on a bus, in lines: how to drive it.
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
     bus : str
         Name of the bus.
     of_core : sequence of str
-        What the core is.
+        Lines that describe the core.
     constants : sequence of str
-        Frame constants by the addresses of its write port, and their example.
+        Lines of the frame constants, with the addresses of its write port, and of their example.
     """
     framing, map = unit.framing, unit.map
     packets, layouts = framing.packets, framing.parameters

@@ -1,4 +1,4 @@
-"""Designs by the words of the command line, and their Verilog."""
+"""Designs by the options of the command line, and their Verilog."""
 
 import re
 from collections.abc import Mapping
@@ -47,30 +47,30 @@ __all__ = [
 _FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
 
 ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
-"""Hardware from spans to pixels."""
+"""A unit from spans to pixels: one pipeline or several."""
 
 
 def design(
     *, lights: int = 1, materials: int = 1, factors: int = 0, **options: Unpack[DesignOptions]
 ) -> Design:
-    """A pipeline with the defaults of the command line.
+    """A pipeline of the given options, with the defaults of the command line.
 
     Parameters
     ----------
     lights, materials : int
-        How many it serves: 1 to 16, and 1 to 1024.
+        How many it serves: 1 to 16 lights, and 1 to 1024 materials.
     factors : int
-        How many of the lights, the first ones, fade by distance or as spots, of ``chord-local``.
+        Number of lights, counted from the first, that fade by distance or as spots; ``chord-local`` only.
     method : str
         Interpolation along a span: one of `METHODS`, by default ``"chord"``.
     model : str
         Reflection model: one of `MODELS` or `LOBES`, by default ``"blinn"``; or the curve of a file.
     operand : {"cosine", "one_minus_cosine"}
-        Operand of the specular unit, of methods that find normals.
+        Operand of the specular unit, for methods that interpolate normals.
     gate : bool
         Whether there is a highlight gate.
     setup_interval : int
-        Least cycles from a span to the next, where the method has that choice.
+        Least cycles from one span to the next, for methods that have that choice.
     style : {"throughput", "compact"}
         One pixel a cycle, or few multipliers.
 
@@ -95,9 +95,9 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     Parameters
     ----------
     settings : Settings
-        With values of `DESIGN`.
+        Values of all options of `DESIGN`.
     lights, materials : int
-        Its counts.
+        Numbers of lights and materials.
 
     Raises
     ------
@@ -126,19 +126,19 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
 
 
 def renderer_of(design: Design, option: str = "geometry", value: str = "hardware") -> Renderer:
-    """Triangles to pixels with a shading pipeline.
+    """A renderer from triangles to pixels with a shading pipeline.
 
     Parameters
     ----------
     design : Design
         The pipeline.
     option, value : str
-        What asks for it.
+        Option and value that ask for it, for the error.
 
     Raises
     ------
     OptionError
-        If its method takes values.
+        If the method takes values of a span in place of normals.
     """
     try:
         return Renderer(design)
@@ -153,16 +153,16 @@ def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> Shading
     Parameters
     ----------
     design : Design
-        Of each.
+        Design of each pipeline.
     pipes : int
-        How many: 1, 2, 4 or 8.
+        Number of pipelines: 1, 2, 4 or 8.
     merged : bool
         Whether several give one stream of pixels, in the order of one pipeline.
 
     Raises
     ------
     OptionError
-        If there cannot be so many.
+        If the design cannot have that number of pipelines.
     """
     (chosen,) = checked({"pipes": pipes}, PIPES).values()
     if chosen == 1:
@@ -175,7 +175,7 @@ def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> Shading
 
 
 def header_of(unit: ShadingUnit) -> list[str]:
-    """What a pipeline is, in lines: version, design and cycles; of several, what each of them is."""
+    """Description of a pipeline, in lines: version, design and cycles; of several, also their streams."""
     parameters = unit.parameters
     several = parameters if isinstance(parameters, PixelPipelines) else None
     made = parameters.design if isinstance(parameters, PixelPipelines) else parameters
@@ -225,7 +225,7 @@ def header_of(unit: ShadingUnit) -> list[str]:
 
 
 def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[str]:
-    """What several pipelines are."""
+    """Description of several pipelines, in lines."""
     if several is None:
         return []
     streams = (
@@ -235,7 +235,7 @@ def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[st
 
 
 def _render_header(unit: RenderUnit) -> list[str]:
-    """What triangles to pixels are, in lines: those of the pipeline inside without its input's, and more."""
+    """Description of a core from triangles to pixels: its pipeline without its input, and its geometry."""
     first, *lines = (line for line in header_of(unit.pipeline) if not line.startswith("i_"))
     return [
         first.replace("shading pipeline", "triangles to pixels"),
@@ -258,7 +258,7 @@ def _coarse_lines(unit: RenderUnit) -> list[str]:
 
 
 def _geometry_lines(geometry: GeometryUnit) -> list[str]:
-    """What goes into triangles to spans."""
+    """Description of the input of a core from triangles to spans."""
     grid = geometry.grid
     spans = "their true lines, uncut" if geometry.lines else "three unit normals, wide ones cut"
     return [
@@ -277,12 +277,12 @@ def _numbered(name: str) -> str:
 
 
 def _geometry_header(unit: GeometryUnit) -> list[str]:
-    """What triangles to spans are, in lines."""
+    """Description of a core from triangles to spans, in lines."""
     return [f"blysk {version('blysk')} triangles to spans, MIT licence", _FORMATS, *_geometry_lines(unit)]
 
 
 def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, str]:
-    """Descriptions of the ports of a core that gives pixels."""
+    """Descriptions of the ports of a core with pixels as output."""
     if isinstance(unit, RenderUnit):
         picture = [] if unit.coarse else ["constants_picture"]
         return {port: text for port, text in RENDER_PORT_DESCRIPTIONS.items() if port not in picture}
@@ -297,7 +297,7 @@ def _top_and_bus(geometry: str, top: str | None, bus: str) -> tuple[str, str]:
     Raises
     ------
     OptionError
-        If there is no such core or bus, or the core is another than hardware geometry makes.
+        If there is no such core or bus, or the core takes spans and geometry is hardware.
     """
     checked({"bus": bus} | ({} if top is None else {"top": top}), PORTS)
     hardware = geometry == "hardware"
@@ -332,21 +332,23 @@ def verilog(
     pipes : int
         Number of pipelines, 1, 2, 4 or 8, that take spans of different scanlines.
     merged : bool
-        Whether several give one stream of pixels in place of one each.
+        Whether several pipelines give one stream of pixels in place of one each.
     top : str, optional
-        ``"shader"``, ``"geometry"`` or ``"render"``: what the core does; by default as geometry says.
+        The core: ``"shader"`` (spans to pixels), ``"geometry"`` (triangles to spans) or ``"render"``
+        (triangles to pixels). By default ``"render"`` if geometry is hardware, else ``"shader"``.
     bus : {"native", "axi", "wishbone"}
         Its own ports, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
     setups : int
-        Lanes of triangle setup, 1 or 2, of what takes triangles.
+        Lanes of triangle setup, 1 or 2, of a core that takes triangles.
     coarse : (int, int), optional
-        Size of the largest picture of a coarse depth test, of triangles to pixels; see `CoarseDepth`.
+        Largest width and height of a picture for the coarse depth test of a core from triangles to pixels;
+        by default it has none. See `CoarseDepth`.
 
     Raises
     ------
     InputError
-        If the name is none in Verilog, or the method takes values and geometry is hardware, or there
-        cannot be so many pipelines, or not this core on this bus.
+        If the name is no Verilog identifier, the method takes values of a span and the core triangles, the
+        design cannot have that number of pipelines, or the bus does not serve the core.
     """
     design = Design() if design is None else design
     return verilog_and_unit(design, name, geometry, pipes, merged, top, bus, setups, coarse)[0]
@@ -363,7 +365,7 @@ def verilog_and_unit(
     setups: int = 1,
     coarse: tuple[int, int] | None = None,
 ) -> tuple[str, ShadingUnit | RenderUnit | GeometryUnit | BusUnit]:
-    """The same, and the hardware that it is of."""
+    """The text of `verilog`, and the unit that it was made from."""
     (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
     top, bus = _top_and_bus(chosen, top, bus)
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):

@@ -50,20 +50,20 @@ __all__ = [
 ]
 
 SLOW_SIZE = (160, 120)
-"""Largest picture of the slow engine where it stands in for the compiled one, and its default size."""
+"""Largest picture of the engine pysim if it replaces cxxrtl, and its default size: width and height."""
 
 COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
 """Options of a material."""
 
 ColorLike = str | float | Triple
-"""``"#rrggbb"``, one number, or three."""
+"""A colour: ``"#rrggbb"``, one number, or three."""
 
 Source = str | os.PathLike[str] | Mesh
-"""``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
+"""Source of a scene: ``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
 
 
 GEOMETRIES = ("software", "hardware")
-"""Who turns triangles into spans."""
+"""Choices of the part that turns triangles into spans."""
 
 
 class Option(NamedTuple):
@@ -76,7 +76,7 @@ class Option(NamedTuple):
     default : object
         Its value where neither the caller nor a scene file gives one.
     help : str
-        What it says, for the command line's help.
+        Text of the command line's help.
     key : str
         Its key in a scene file; empty if it has none.
     """
@@ -88,7 +88,7 @@ class Option(NamedTuple):
 
 
 class PartError(ValueError):
-    """A reason and a remedy for a part of a value, which ``key`` names: ``[2].color``."""
+    """Bad part of a value, with a reason and a remedy; ``key`` names the part: ``[2].color``."""
 
     def __init__(self, key: str, reason: str, remedy: str):
         super().__init__(reason)
@@ -104,11 +104,11 @@ class Model(Choice):
         self.remedy = f"{self.points}, or {self.remedy}"
 
     def get_metavar(self, param, ctx=None):
-        """The names, or a file."""
+        """Placeholder in the help text: the names, or a file."""
         return f"[{'|'.join(self.names)}|FILE.csv]"
 
     def check(self, value):
-        """The name; or the curve of a file."""
+        """The name, or the `TabulatedModel` of a file."""
         if isinstance(value, TabulatedModel):
             return value
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
@@ -137,7 +137,7 @@ class Roughness(Number):
 
 
 class Lights(Value):
-    """Lights: objects, or tables of a direction or a position, a colour, attenuation, spot and cone."""
+    """Lights: `Light` objects, or tables of direction or position, colour, attenuation, spot and cone."""
 
     name = "lights"
     remedy = "write [[lights]] and its direction and color below, for each light"
@@ -193,7 +193,7 @@ class Direction(Vector):
     Parameters
     ----------
     words : mapping of str
-        What each word stands for: a vector, or itself where other values tell its vector.
+        Meaning of each word: a vector, or the word itself if its vector depends on other options.
     """
 
     def __init__(self, words: Mapping[str, str | Triple]):
@@ -202,11 +202,11 @@ class Direction(Vector):
         self.remedy = f"give X,Y,Z, a vector other than 0, or one of {', '.join(words)}"
 
     def parse(self, text):
-        """A word as it is, or numbers with commas between them."""
+        """A word unchanged, or numbers with commas between them."""
         return text if text in self.words else super().parse(text)
 
     def check(self, value):
-        """A tuple of `float`, or a word that stands for itself."""
+        """A tuple of `float`, or a word whose vector depends on other options."""
         if isinstance(value, str) and value in self.words:
             return self.words[value]
         return super().check(value)
@@ -217,7 +217,7 @@ _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)
 
 
 def shown_key(name: str) -> str:
-    """A key of a file in a message."""
+    """Text of a file's key for a message."""
     return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
 
 
@@ -344,7 +344,7 @@ DESIGN: dict[str, Option] = {
         Choice("style", STYLES), "throughput", "One pixel a cycle, or few multipliers.", "pipeline.style"
     ),
 }
-"""Options of a design, but for its counts."""
+"""Options of a design without its counts."""
 
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
@@ -355,7 +355,7 @@ COUNTS: dict[str, Option] = {
         "How many of the lights, the first ones, fade by distance or as spots; needs --method chord-local.",
     ),
 }
-"""Counts of a design, which a scene gives where there is one."""
+"""Counts of a design, for commands without a scene; a scene gives its own."""
 
 GEOMETRY: dict[str, Option] = {
     "geometry": Option(
@@ -401,7 +401,7 @@ SETUPS: dict[str, Option] = {
         "pipeline.setups",
     ),
 }
-"""Option of a rendering and of Verilog, of what takes triangles."""
+"""Option of a rendering and of Verilog, for hardware that takes triangles."""
 
 COARSE: dict[str, Option] = {
     "coarse": Option(
@@ -411,7 +411,7 @@ COARSE: dict[str, Option] = {
         "of triangles to pixels.",
     ),
 }
-"""Option of Verilog, of triangles to pixels."""
+"""Option of Verilog, for a core from triangles to pixels."""
 
 RENDERING: dict[str, Option] = {
     **GEOMETRY,

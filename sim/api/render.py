@@ -52,10 +52,10 @@ __all__ = [
 SPECIALISING = "finding out what the scene needs"
 """Stage of `prepare_rendering` in which a specialisation is found."""
 BUILDING = "building the model"
-"""Stage of `prepare_rendering` in which the hardware is compiled; what makes that long is said after it."""
+"""Stage of `prepare_rendering` in which the hardware is compiled; the cause of a long time is appended."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
-"""``"auto"``: compiled, or Amaranth's simulator where no C++ compiler works."""
+"""Names of engines; ``"auto"``: ``"cxxrtl"``, or ``"pysim"`` where no C++ compiler works."""
 
 Progress = Callable[[int, int], object]
 
@@ -69,11 +69,11 @@ class RenderedFrame:
     scene : Scene
         What was drawn.
     design : Design
-        The pipeline; of a specialised one the full pipeline.
+        The pipeline; if it was specialised, the full pipeline.
     simulated : SimulatedFrame or SimulatedTriangleFrame
-        The frame with its spans, or by triangles, as the hardware gave it.
+        The hardware's frame, by spans or by triangles.
     name : str
-        Of the mesh.
+        Name of the mesh.
     details : dict
         Further figures: ``counts`` of the mesh, ``seconds`` of loading and building, and perhaps
         ``specialisation``.
@@ -92,7 +92,7 @@ class RenderedFrame:
 
     @property
     def error(self) -> ErrorFigures:
-        """Errors against exact normals of every pixel with the same model, in LSB and dB."""
+        """Errors against exact normals at every pixel with the same reflection model, in LSB and dB."""
         return self.comparison.method_error
 
     @property
@@ -117,7 +117,7 @@ class RenderedFrame:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """The golden frame, and the errors against three references; by triangles against two."""
+        """The golden frame, and the errors against three references; of a frame by triangles, against two."""
         if isinstance(self.simulated, SimulatedTriangleFrame):
             return compare_image(self.scene, self.design, self.simulated.image)
         return compare(self.scene, self.design, self.simulated)
@@ -213,15 +213,15 @@ class Rendering:
     scenes : tuple of Scene
         What is drawn.
     specialisation : Specialisation
-        The full pipeline, and what is left out of it: nothing, unless asked for.
+        The full pipeline and its reductions; none if no specialisation was asked for.
     is_specialised : bool
-        Whether it was.
+        Whether a specialisation was asked for.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     simulator : FrameSimulator or TriangleSimulator or None
         The hardware's simulator; ``None`` where there is no compiler and none is needed.
     seconds : dict
-        Of loading and building.
+        Seconds of loading and building.
     pipes : int
         Number of pipelines.
     setups : int
@@ -248,7 +248,7 @@ class Rendering:
 
     @property
     def counts(self) -> dict[str, int]:
-        """What had to be mended in the mesh."""
+        """Counts of repairs of the mesh: normals and dropped faces."""
         mesh = self.loaded
         return {"repaired_normals": mesh.repaired_normals, "dropped_faces": mesh.dropped_faces}
 
@@ -295,23 +295,23 @@ def prepare_rendering(
     remote: bool = False,
     stage: Callable[[str], object] = lambda text: None,
 ) -> Rendering:
-    """Load the mesh, choose the engine, and build the pipeline.
+    """Load the mesh, choose the engine, and build the pipeline: a rendering that is ready to draw.
 
     Parameters
     ----------
     settings : Settings
-        Of `rendering_settings`.
+        Settings of `rendering_settings`.
     design : Design, optional
         The pipeline, in place of the settings' own.
     engine : {"auto", "cxxrtl", "pysim"}
-        Where ``"auto"`` finds no compiler, pictures are at most `SLOW_SIZE`, with a warning; those of a scene
-        that is given keep their size.
+        If ``"auto"`` finds no compiler, pictures are at most `SLOW_SIZE`, with a warning; a given scene keeps
+        its size.
     frames : int
-        Of a turntable; 0: a single picture.
+        Number of frames of a turntable; 0: a single picture.
     remote : bool
-        Whether others draw the frames, so that a missing compiler does not matter here.
+        Whether other machines draw the frames, so that a compiler is not needed on this one.
     stage : callable
-        Is told what is done next.
+        Called with a text before each stage of the work.
     """
     start = perf_counter()
     with settings.located():
@@ -348,7 +348,7 @@ def prepare_rendering(
 
 
 def _large(design: Design) -> str:
-    """What a design has many of, which takes time where it is simulated for the first time."""
+    """Text of large counts of a design, for which the first build of its model takes long."""
     counts = ("lights", design.lights), ("materials", design.materials)
     many = ", ".join(f"{count:,} {what}" for what, count in counts if count > 4)
     return f" of {many}: up to a minute the first time" if many else ""
@@ -370,7 +370,7 @@ def _simulator(
 
 
 def _check_geometry(settings: Settings, design: Design) -> None:
-    """Refuse what triangles cannot be drawn with, and what only they can."""
+    """Refuse options that hardware geometry does not serve, and options that need it."""
     if settings["geometry"] == "software":
         remedy = "give geometry hardware, too"
         if settings["setups"] > 1:
@@ -390,7 +390,7 @@ def _check_geometry(settings: Settings, design: Design) -> None:
 
 
 def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:
-    """Refuse materials that have more lobes than there are banks, or others than the fixed ones."""
+    """Refuse materials with more lobes than the pipeline has tables, or with others than its fixed ones."""
     if not design.loads_tables:
         return
     try:
@@ -419,7 +419,7 @@ def _specialised(scenes: Sequence[Scene], design: Design, settings: Settings) ->
 
 
 def _shrink(settings: Settings, error: CompilerMissing) -> None:
-    """The slow engine's own size, with a warning."""
+    """Reduce the picture to the size of the engine pysim, with a warning; a given scene keeps its size."""
     if isinstance(settings.source, Scene):
         warnings.warn(f"pysim instead of cxxrtl, {error}", RuntimeWarning, stacklevel=4)
         return
@@ -442,8 +442,8 @@ def render(
 ) -> RenderedFrame:
     """Draw a mesh or a scene by a simulated pipeline.
 
-    The frame is checked on the way: the pipeline's first pixels are those of its bit-accurate model, and no
-    pixel is lost or doubled.
+    The simulation is checked: a new model gives the pixels of the bit-accurate model for a sample, and the
+    frame has no lost or doubled pixel.
 
     Parameters
     ----------
@@ -455,15 +455,15 @@ def render(
         Simulator: the compiled one, or Amaranth's own; ``"auto"`` takes the first where a C++ compiler works,
         else the second, with a warning and at most 160 x 120 pixels.
     vcd : path, optional
-        File for the waveforms; the engine is ``"pysim"``, and 160 x 120 the default size.
+        File for the waveforms; it sets the engine to ``"pysim"`` and the default size to 160 x 120.
     progress : callable, optional
         Called now and then with the number of pixels so far and in all.
     **options
         Those of `scene` and of `design`, by the names of the command line; ``geometry``: ``"hardware"``
-        simulates triangles to pixels, ``"software"`` spans to pixels; ``setups``: 1 or 2 lanes of triangle
-        setup of the first; ``coarse``: whether that drops hidden spans before shading; ``specialise``:
-        whether to build only what the scene needs; ``short_words``: with words as short as the error bound
-        allows; ``pipes``: 1, 2, 4 or 8 pipelines for different scanlines.
+        simulates triangles to pixels, ``"software"`` spans to pixels; for ``"hardware"``, ``setups``: 1 or 2
+        lanes of triangle setup, and ``coarse``: whether hidden spans are dropped before shading;
+        ``specialise``: whether to build only the parts that the scene needs; ``short_words``: with words as
+        short as the error bound allows; ``pipes``: 1, 2, 4 or 8 pipelines for different scanlines.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Scenes with a default for everything."""
+"""Scenes from options, with a default for each."""
 
 import math
 import os
@@ -38,17 +38,17 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     background, ambient_light, back_faces
         See `Scene`; by default ``"#1a1c20"``, 1 and ``"flip"``.
     triangles : int
-        Of the teapot, about; by default 10,000.
+        Number of triangles of the teapot, about; by default 10,000.
     crease : float
-        Degrees over which an edge is sharp, in a mesh file without normals; by default 40.
+        Angle in degrees over which an edge is sharp, in a mesh file without normals; by default 40.
     materials : {"file", "one"}
-        Whether the mesh file's materials count.
+        Whether to use the mesh file's materials, or one for all faces; by default ``"file"``.
     projection : {"perspective", "orthographic"}
-        Of the camera.
+        Projection of the camera; by default perspective.
     view : three floats or str
-        Direction from the mesh to the viewer: the camera shows all of the mesh. By default (0.4, 0.5, 1) to
-        the right, up and front; ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``, ``"bottom"``.
-        The front is (0, 0, 1), with z as the upright (0, -1, 0); right is upright times front.
+        Direction from the mesh to the viewer, or ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``,
+        ``"bottom"``; the camera shows all of the mesh. By default (0.4, 0.5, 1) along right, up and front.
+        Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z; right is the cross product of up and front.
     position, target : three floats
         The camera, in place of ``view``, and the point in the middle of its picture, by default the middle of
         the mesh; in the mesh's units.
@@ -57,14 +57,13 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     field_of_view : float
         See `Camera`; by default 30.
     viewer : {"distant", "near"}
-        See `Scene`; ``"near"`` needs the method ``chord-local``.
+        See `Scene`; by default distant; ``"near"`` needs the method ``chord-local``.
     lights : sequence of Light
-        At most 16; by default one from (-0.5, 0.8, 0.7). Those with a position need the method
-        ``chord-local``; they may fade by the distance, and be spots. Those whose colour is 0 are off, and
-        left out.
+        At most 16; by default one from (-0.5, 0.8, 0.7). Lights with a position need the method
+        ``chord-local``; they may fade by distance or be spots. Lights of colour 0 are off, and left out.
     ambient, diffuse, specular, exponent, roughness, fresnel
-        See `Material`; by default those of the mesh file's materials, else copper and 50. An exponent that is
-        given counts before a file's roughness, too.
+        See `Material`; by default the values of the mesh file's materials, else copper and exponent 50. An
+        exponent given here also replaces a file's roughness.
 
     Raises
     ------
@@ -82,7 +81,7 @@ def load(settings: Settings) -> LoadedMesh:
     Raises
     ------
     InputError
-        As `load_mesh`; of a mesh that a scene file names, with file and key.
+        As `load_mesh`; if a scene file names the mesh, the error names that file and key.
     """
     source = settings.source
     if isinstance(source, Mesh | Scene):
@@ -110,9 +109,9 @@ def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Sc
     loaded : LoadedMesh
         The mesh.
     settings : Settings
-        All options of `scene`; or a scene, which is the first.
+        All options of `scene`; or with a scene as source, which is then the first.
     count : int
-        Frames of a turntable; the first is the scene itself, where there is one.
+        Number of frames of a turntable.
 
     Raises
     ------
@@ -153,7 +152,7 @@ def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, li
 
 
 def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
-    """Those of the file, but for the coefficients that are given."""
+    """The file's materials, with the coefficients that options give in place of the file's."""
     default = Material(*(settings[name] for name in COEFFICIENTS))
     return surfaces(loaded.materials, default, settings.given.intersection(COEFFICIENTS))
 

@@ -1,4 +1,4 @@
-"""Scene files: everything that a picture depends on, in TOML."""
+"""Scene files: all options of a picture in TOML."""
 
 import os
 import tomllib
@@ -14,7 +14,7 @@ from blysk.sim.value_types import Value, shown
 __all__ = ["MAX_BYTES", "SceneFile", "key_lines", "read_scene_file"]
 
 MAX_BYTES = 100_000
-"""Largest scene file; a mesh is a file of its own."""
+"""Largest scene file, in bytes; it holds no mesh."""
 
 _MAX_DOTS = 256
 """Most dots in a line: `tomllib` takes memory with the square of the parts of a key."""
@@ -22,15 +22,15 @@ _MAX_DOTS = 256
 
 @dataclass(frozen=True)
 class SceneFile:
-    """What a scene file says.
+    """Values of a scene file.
 
     Parameters
     ----------
     path : str
         The file.
     values : dict
-        What the file sets and nothing else, by the names of the options, in their types; and ``mesh``, which
-        is ``teapot`` or a path: one that is not absolute starts at the scene file's folder.
+        The values that the file sets, by the names of the options, in their types; and ``mesh``: ``teapot``
+        or a path, where a relative path of the file is joined to the scene file's folder.
     keys : dict
         The key of each value, for messages: ``material.exponent``.
     """
@@ -43,7 +43,7 @@ class SceneFile:
 def read_scene_file(path: str | os.PathLike) -> SceneFile:
     """Read a scene file.
 
-    The keys, all of them optional but ``mesh.file``::
+    These are the keys; only ``mesh.file`` is required::
 
         size = [640, 480]
         background = "#1a1c20"              # or [r, g, b], or one number, each 0 to 1
@@ -78,7 +78,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         diffuse = [0.75, 0.42, 0.2]
         specular = 0.6
         exponent = 50
-        # roughness, 0 to 1                 # of ggx and beckmann; by default by the exponent
+        # roughness = 0.2                   # of ggx and beckmann, over 0, up to 1; default: by the exponent
         # fresnel                           # F_0 of Schlick's reflection, a colour; by default none
 
         [pipeline]
@@ -90,20 +90,24 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         gate = false                        # the highlight gate
         specialise = false                  # only what the scene needs
         short_words = false                 # with specialise: words as short as the error bound allows
+        geometry = "software"               # "hardware": simulate triangles to spans and the depth test, too
+        setups = 1                          # with hardware: lanes of triangle setup, 1 or 2
+        coarse = false                      # with hardware: drop hidden spans before shading
+        pipes = 1                           # pipelines for different scanlines, 1, 2, 4 or 8
 
-    The values' ranges are those of the command line. The mesh, and values that exclude each other, are not
-    looked at.
+    The values' ranges are those of the command line. Neither the mesh file nor conflicts between values are
+    checked.
 
     Parameters
     ----------
     path : path
-        The file, in UTF-8, at most 100,000 bytes, and 256 dots in a line.
+        The file, in UTF-8, with at most 100,000 bytes, and at most 256 dots in a line.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is no TOML, or holds an unknown key, a value of another type or out of
-        range, or no mesh. The message names the file and the key.
+        If the file cannot be read, is no TOML, has an unknown key, a value of another type or out of range,
+        or names no mesh. The message names the file and the key.
     """
     values: dict[str, Any] = {}
     keys: dict[str, str] = {}
@@ -193,7 +197,7 @@ class _MeshFile(Value):
 
 
 def _schema() -> dict[str, Any]:
-    """Tables of keys, nested as in a file; of each key its option's name and type."""
+    """Tables of keys, nested as in a file: the option's name and type of each key."""
     schema: dict[str, Any] = {}
     options = {**SCENE, **DESIGN, **RENDERING}
     keys = {"mesh": (_MeshFile(), "mesh.file")} | {name: (of.kind, of.key) for name, of in options.items()}

@@ -1,4 +1,4 @@
-"""Values of options: those that a caller gives, over those of a scene file, over the defaults."""
+"""Values of options: a caller's replace a scene file's, which replace the defaults."""
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
@@ -21,7 +21,7 @@ __all__ = ["Settings", "checked", "read_settings"]
 
 @dataclass(frozen=True)
 class Settings:
-    """Values of options, and where each comes from.
+    """Values of options, and the origin of each.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ class Settings:
     values : dict
         Value of every option.
     given : frozenset of str
-        Names of the options that are no defaults.
+        Names of the options with a value from the caller or a scene file.
     origins : dict
-        File and key of each value that a scene file gives, ``mesh`` among them.
+        File and key of each value from a scene file, also of ``mesh``.
     """
 
     source: Source | Scene
@@ -44,19 +44,19 @@ class Settings:
         return self.values[name]
 
     def refuse(self, name: str, reason: str, remedy: str, value: object = None) -> OptionError:
-        """The error of a value; without a ``value``, the option's own is shown."""
+        """The error of an option; without ``value``, it shows the option's own value."""
         return OptionError(name, self.values[name] if value is None else value, reason, remedy)
 
     @property
     def lights(self) -> tuple[Light, ...]:
-        """Those of the scene; of the options those that are on: one that is off takes no hardware."""
+        """Lights of the scene, or those of the options that are on: a light that is off needs no hardware."""
         if isinstance(self.source, Scene):
             return self.source.lights
         return tuple(light for light in self["lights"] if light.is_on)
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """Within the block, the error of a value that a scene file gives names file and key."""
+        """Within the block, the error of a value from a scene file names the file and the key."""
         try:
             yield
         except OptionError as error:
@@ -66,7 +66,7 @@ class Settings:
 
 
 def checked(options: Mapping[str, Any], table: Mapping[str, Option]) -> dict[str, Any]:
-    """Values of options as their types have them; those that are ``None`` left out.
+    """Values of options, checked and converted by their types; options that are ``None`` are left out.
 
     Raises
     ------
@@ -95,18 +95,18 @@ def checked(options: Mapping[str, Any], table: Mapping[str, Option]) -> dict[str
 def read_settings(
     source: Source | Scene, options: Mapping[str, Any], table: Mapping[str, Option], **defaults: Any
 ) -> Settings:
-    """Options over those of the scene file, if the source is one, over the defaults.
+    """Settings of a caller's options; missing ones are those of the scene file, if any, or the defaults.
 
     Parameters
     ----------
     source : str or path or Mesh or Scene
-        What is drawn.
+        The mesh, scene file or scene to draw.
     options : dict
-        Some options of the table; ``None`` is none.
+        Options of the table; ``None`` counts as not given.
     table : dict
-        The options that there are.
+        All options.
     **defaults
-        In place of those of the table.
+        Defaults that replace those of the table.
 
     Raises
     ------
@@ -136,10 +136,10 @@ def read_settings(
 
 
 def _turn_view(values: dict[str, Any], given: Collection[str]) -> None:
-    """Put vectors in place of a word for the view, and of the default one if the upright is another.
+    """Replace a word for the view by vectors, and turn the default view with another upright.
 
-    The front of a mesh is where z points to; of one whose upright is z, where -y does. Right is the upright
-    times the front. From the top and the bottom the front is below and above in the picture.
+    The front of a mesh is along z, or along -y if its upright is z. Right is the cross product of upright and
+    front. Seen from the top, the front is at the bottom of the picture; seen from the bottom, at its top.
     """
     view, up = values["view"], np.array(values["up"], dtype=np.float64)
     if not isinstance(view, str) and ("view" in given or "up" not in given):
@@ -164,7 +164,7 @@ def _triple(vector: np.ndarray) -> Triple:
 
 
 _INSTEAD = {"view": ("position", "target"), "position": ("view", "target")}
-"""Options of a scene file that a given one takes the place of."""
+"""Options of a scene file that a caller's option replaces, besides the one of its name."""
 
 
 def _check_pairs(settings: Settings) -> None:

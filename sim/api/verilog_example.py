@@ -1,4 +1,4 @@
-"""Worked example in the header of a Verilog file: every write of a frame, and the values of a table."""
+"""Worked example for the header of a Verilog file: every write of a frame, and the values of a table."""
 
 import numpy as np
 
@@ -21,12 +21,13 @@ _PER_LINE = 8
 
 
 def example_of(design: Design) -> list[str]:
-    """Lines: all writes for a grey surface and white light along the viewer, in decimal.
+    """Lines of the example: all writes for a grey surface and white light along the viewer, in decimal.
 
     Parameters
     ----------
     design : Design
-        The pipeline. A lobe that is fixed at build time, or whose model has a roughness, has that of its own.
+        The pipeline. The example has its exponent if that is fixed at build time; there are no lines if its
+        tables are fixed for other lobes.
     """
     colours = ((value,) * 3 for value in (AMBIENT, DIFFUSE, SPECULAR))
     material = Material(*colours, design.build.exponent or EXPONENT)

@@ -23,13 +23,13 @@ from blysk.sim.errors import InputError, OptionError, one_line
 __all__ = ["cli", "main"]
 
 _COMMANDS = ("render", "verilog")
-"""Commands of this folder, each in a file of its name, which is imported when it is asked for."""
+"""Commands of this folder, each in a file of its name, which is imported when the command is called."""
 
 
 class _Group(click.Group):
-    """The commands here, and those that an installed package registers under ``blysk.commands``.
+    """Group of this folder's commands and those that installed packages register under ``blysk.commands``.
 
-    Layers above this one add theirs so; nothing of them is imported before it is asked for.
+    Layers above this one add their commands in this way; a command is imported when it is called.
     """
 
     def list_commands(self, ctx):
@@ -62,7 +62,7 @@ def cli():
 
 
 def _run(arguments: list[str]) -> int:
-    """`cli.main` without its own ways with an interrupt and a closed pipe."""
+    """`cli.main` without click's handling of an interrupt and a closed pipe."""
     try:
         with cli.make_context("blysk", arguments) as context:
             cli.invoke(context)
@@ -72,7 +72,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _without_traceback(text: str) -> str:
-    """What another program says, of a traceback its last line and without the exception's name."""
+    """Another program's output, with a traceback cut to its last line without the exception's name."""
     start, mark, rest = text.partition("Traceback (most recent call last)")
     if not mark:
         return text
@@ -83,8 +83,8 @@ def _without_traceback(text: str) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status.
 
-    0: done. 1: a simulation went wrong. 2: bad input, in one line on standard error. 130: interrupted, by a
-    terminal or by SIGTERM.
+    0: done. 1: a simulation went wrong. 2: bad input, or no compiler, memory or disk space, in one line on
+    standard error. 130: interrupted, by a terminal or by SIGTERM. 141: standard output is a closed pipe.
     """
 
     def show(message, *_):
@@ -134,7 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _termination_as_interrupt() -> Iterator[None]:
-    """Else workers would outlive this process, and half-written files stay."""
+    """Treat SIGTERM as an interrupt: else workers would outlive this process, and half-written files stay."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -146,5 +146,5 @@ def _termination_as_interrupt() -> Iterator[None]:
 
 
 def _give_up_output() -> None:
-    """Keep what is left in the buffer of standard output from raising again at exit."""
+    """Send standard output to the null device, so that its buffer raises no second error at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

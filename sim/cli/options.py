@@ -1,4 +1,4 @@
-"""Options of commands, from the tables of the Python interface."""
+"""Options of commands, made of the tables of the Python interface."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -26,10 +26,10 @@ _LIGHTS = {
         ("position", "spot", "cone", "color", "attenuation"),
     ),
 }
-"""Options of lights: their parameters, their numbers, and the fields of `Light` that these are, in order."""
+"""Options of lights: parameter, type, and the fields of `Light` that the numbers fill in turn."""
 
 _COUNTS = {"cone": 2}
-"""Numbers of a field that are not three."""
+"""Count of a field's numbers, if it is not 3."""
 
 _HELP = {
     "--point-light": "Position of a light in the mesh's units, its colour, and its attenuation: at the "
@@ -48,7 +48,7 @@ Command = Callable[..., Any]
 
 
 def _text(value: object) -> str:
-    """A default as the command line takes it."""
+    """A default in the form of the command line."""
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, tuple):
@@ -69,8 +69,8 @@ def _click_option(name: str, option: Option) -> Callable[[Command], Command]:
 def options_of(table: Mapping[str, Option]) -> Callable[[Command], Command]:
     """Decorator of a command that adds the options of a table.
 
-    None has a default here: what is not given is left to the Python interface. ``lights`` become ``--light``,
-    ``--point-light`` and ``--spot-light``, see `lights_of`.
+    The options have no defaults here: the Python interface sets the values that are not given. ``lights``
+    becomes ``--light``, ``--point-light`` and ``--spot-light``, see `lights_of`.
     """
 
     def decorate(command: Command) -> Command:
@@ -97,7 +97,7 @@ def given_options(context: click.Context, names: Sequence[str]) -> dict[str, Any
 
 
 def lights_of(options: Mapping[str, Any]) -> list[Light]:
-    """Lights of ``--light``, ``--point-light`` and ``--spot-light``, in this order; empty without any.
+    """Lights of ``--light``, ``--point-light`` and ``--spot-light``, in this order; perhaps an empty list.
 
     Raises
     ------
@@ -121,6 +121,6 @@ def lights_of(options: Mapping[str, Any]) -> list[Light]:
 
 
 def option_error(error: OptionError) -> InputError:
-    """The error of an option in the words of the command line."""
+    """The error of an option, named as on the command line."""
     flag = "light" if error.option == "lights" else error.option.replace("_", "-")
     return error.at(f"--{flag} {error.value}".strip())

@@ -25,7 +25,7 @@ def check_outputs(
     Raises
     ------
     InputError
-        If one cannot be.
+        If an output is refused.
     """
     seen = {os.path.realpath(path) for path in inputs}
     for path in [*pictures, *others]:
@@ -37,21 +37,21 @@ def check_outputs(
 
 
 def animation_paths(output: str, count: int, others: Mapping[str, str | None]) -> tuple[list[str], str]:
-    """Files of a turntable's frames, and of the animation.
+    """Names of the files of a turntable's frames, PNG, and of the animation, GIF.
 
     Parameters
     ----------
     output : str
-        Name that theirs are made of.
+        Name from which they are made.
     count : int
-        Frames.
+        Number of frames.
     others : dict
-        By option, output files that are for one frame only.
+        Output files of options that are for a single frame only, by option.
 
     Raises
     ------
     InputError
-        If there is one of the latter, or the name has another suffix than ``.gif`` or ``.png``.
+        If ``others`` has a file, or the name has another suffix than ``.gif`` or ``.png``.
     """
     for option, path in others.items():
         if path:

@@ -192,7 +192,7 @@ def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
 
 
 def _told(bar: tqdm, text: str) -> None:
-    """Show a stage of the work; of those that may take long say how long, on a terminal or not."""
+    """Show a stage of the work; for a stage that may take long, print its time, also without a terminal."""
     bar.set_description_str(text)
     if text == SPECIALISING:
         print(_SPECIALISE, flush=True)
@@ -201,7 +201,7 @@ def _told(bar: tqdm, text: str) -> None:
 
 
 def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
-    """The frame, with its progress."""
+    """Render the frame, with a progress bar."""
     with (
         atomic_writer(vcd) if vcd else nullcontext() as waves,
         tqdm(unit=" pixels", unit_scale=True, delay=1, leave=False, disable=None) as bar,
@@ -217,7 +217,7 @@ def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
 def _animation(
     ready: Rendering, pictures: Sequence[str], jobs: int | None, address: str | None, drawn: list[str]
 ) -> dict[str, Any]:
-    """Render and write the frames of a turntable, their names to ``drawn``; the figures of all."""
+    """Render and write the frames of a turntable, append their names to ``drawn``; figures of all."""
     start = perf_counter()
     smallest = ready.specialisation
     animation = Animation(

