@@ -1,1 +1,1 @@
-"""Benchmark layer: error against run time, measured, each speed as a ratio of two runs."""
+"""Benchmark layer: measured errors, costs and run times; each speed is a ratio of two runs."""

@@ -1,4 +1,4 @@
-"""The frames that errors are measured on: scene, designs, exponents."""
+"""Frames on which errors are measured: scene, designs, exponents."""
 
 from collections.abc import Iterator, Sequence
 
@@ -23,7 +23,7 @@ DESIGNS += [("chord", model) for model in _MODELS]
 
 
 def scene_for(mesh: Mesh, exponent: int, width: int = 640, height: int = 480) -> Scene:
-    """White light on a grey, glossy surface: every channel shows the whole error."""
+    """Scene of a mesh with white light on a grey, glossy surface: every channel shows the whole error."""
     return Scene(
         mesh=mesh,
         camera=Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", width / height),

@@ -1,7 +1,7 @@
-"""How methods are drawn: one colour, marker and dash each, the same in every drawing and on every page.
+"""Styles of methods: a colour, a marker and a dash of each, the same in every drawing and on every page.
 
-The colours are those of Okabe and Ito, which readers with any colour vision tell apart, without yellow,
-which is too light on white; a variant of a method has its colour with other dashes and another marker.
+The colours are those of Okabe and Ito, which readers with any colour vision can tell apart, without yellow,
+which is too light on white. A variant of a method has its colour with other dashes and another marker.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ __all__ = ["STYLES", "Style", "style_of"]
 
 
 class Style(NamedTuple):
-    """How a method is drawn.
+    """Style of a method's lines and points.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class Style(NamedTuple):
     dash : str
         Dashes of a line, as matplotlib takes them.
     marker : str
-        Of a point, as matplotlib takes it.
+        Marker of a point, as matplotlib takes it.
     """
 
     color: str
@@ -42,11 +42,11 @@ STYLES = {
     "chord": Style("#d55e00", "#ff8b3d", marker="D"),
     "chord-local": Style("#b0508a", "#e08fc0", "--", "d"),
 }
-"""By method."""
+"""Style of each method."""
 
 
 def style_of(method: str) -> Style:
-    """Style of a method, of one as published that of the method that it is a form of."""
+    """Style of a method; a variant as published has the style of its method."""
     if method in STYLES:
         return STYLES[method]
     base = method.rpartition("-")[0] if method in PUBLISHED else ""

@@ -1,4 +1,4 @@
-"""What commands of this folder share: progress that can be interrupted; the end of one run as a module."""
+"""Shared parts of this folder's commands: progress that can be interrupted, and the exit status."""
 
 import contextlib
 import sys
@@ -15,7 +15,7 @@ __all__ = ["resumable", "run"]
 
 @contextlib.contextmanager
 def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
-    """Show the progress of work whose parts are kept; the value is to be called after each.
+    """Show the progress of work whose parts are kept; call the context's value after each part.
 
     An interrupt ends the command with status 130 and a line that says how many parts are kept.
 
@@ -24,7 +24,7 @@ def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
     total : int
         Number of the parts.
     unit : str
-        What they are called.
+        Name of the parts.
     """
     kept = 0
     with tqdm(total=total, unit=f" {unit}", leave=False, disable=None) as bar:
@@ -43,21 +43,21 @@ def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
 
 
 def run(command: click.Command, name: str, arguments: Sequence[str] | None) -> int:
-    """Run a command; what goes wrong is told in one line.
+    """Run a command; print an error in one line.
 
     Parameters
     ----------
     command : click.Command
         Its result is an exit status.
     name : str
-        Of the module, for messages.
+        Name of the module, for messages.
     arguments : sequence of str or None
-        ``None``: those of the process.
+        Arguments; ``None``: those of the process.
 
     Returns
     -------
     int
-        The command's; 1 when a simulation or a tool goes wrong, 2 for bad input.
+        Exit status of the command; 1 if a simulation or a tool fails, 2 for bad input.
     """
     try:
         return command.main(arguments, prog_name=name, standalone_mode=False)

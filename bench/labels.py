@@ -1,4 +1,4 @@
-"""Labels beside the points and lines of a drawing that do not lie on each other."""
+"""Labels of a drawing's points and lines that do not cover each other."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ _SPOTS = (
     *((1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1)),
     *((1, 2), (1, -2), (-1, 2), (-1, -2), (1, 3), (1, -3), (-1, 3), (-1, -3), (1, 4), (1, -4)),
 )
-"""Where a label may stand: steps to the side and up, nearest first."""
+"""Places of a label: steps to the side and up from its point, nearest first."""
 
 
 class Label(NamedTuple):
@@ -26,9 +26,9 @@ class Label(NamedTuple):
     x, y : float
         The point, in data coordinates.
     text : str
-        What stands beside it.
+        The text beside the point.
     color : str
-        Of the text.
+        Colour of the text.
     weight : str
         ``"normal"`` or ``"bold"``.
     """
@@ -43,25 +43,25 @@ class Label(NamedTuple):
 def place_labels(
     axes: Axes, labels: Sequence[Label], points: Sequence[tuple[float, float]] = (), **options: Any
 ) -> int:
-    """Write labels where they cover neither another label nor a point; the first ones first.
+    """Write labels so that they cover neither another label nor a point, in their order.
 
-    A label that stands away from its point gets a thin line to it. One that finds no place is left out.
+    A label at a distance from its point gets a thin line to it. A label without a free place is left out.
 
     Parameters
     ----------
     axes : Axes
-        Whose limits and scales do not change any more.
+        The axes; their limits and scales must not change afterwards.
     labels : sequence of Label
-        The more important first.
+        The labels, the more important first.
     points : sequence of (x, y)
-        Of the data, which labels keep clear of.
+        Points of the data that labels must not cover.
     **options
-        Of the text.
+        Options of the text.
 
     Returns
     -------
     int
-        Labels left out.
+        Number of labels left out.
     """
     canvas = FigureCanvasAgg(axes.figure)
     canvas.draw()

@@ -8,12 +8,12 @@ __all__ = ["ring"]
 
 
 def ring(around: int = 36, across: int = 18) -> Mesh:
-    """A ring with exact normals: radii 1 and 0.42, axis y; that of the project's examples.
+    """The ring of the project's examples with exact normals: radii 1 and 0.42, axis y.
 
     Parameters
     ----------
     around, across : int
-        Points along each of its circles.
+        Points along its large and its small circles.
     """
     a, b = np.meshgrid(
         np.linspace(0, 2 * np.pi, around, endpoint=False),

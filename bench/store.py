@@ -1,4 +1,4 @@
-"""Measurements that are made once: results in the user's cache, by what was measured and with which code."""
+"""Measurements that are made once: results in the user's cache, by a hash of measurement and code."""
 
 import ast
 import contextlib
@@ -35,7 +35,7 @@ class Task:
     settings : dict
         Values that JSON can hold.
     timed : bool
-        Whether it measures a time, and so must have the machine to itself.
+        Whether it measures a time; such a measurement runs alone, in this process.
     """
 
     function: Callable[..., Any]
@@ -49,8 +49,8 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Hash of the settings, of the code in `golden`, `hdl` and `sim` and of what the function uses of
-        `bench`, and of the libraries' versions: another of these is another measurement.
+        """Hash of name, settings, libraries' versions, the code of `golden`, `hdl` and `sim`, and the modules
+        of `bench` that the function's module imports: with another hash it is another measurement.
         """
         file = Path(inspect.getsourcefile(self.function))
         parts = (
@@ -62,13 +62,13 @@ class Task:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def run(self) -> Any:
-        """Measure now, whatever the cache has."""
+        """Measure now, without the cache."""
         return self.function(**self.settings)
 
 
 @functools.cache
 def _bench(file: Path) -> str:
-    """Hash of a module and of those of `bench` that it imports, directly or not."""
+    """Hash of a module and of all modules of `bench` that it imports, directly or not."""
     digest, seen, open_ = hashlib.sha256(), set(), [file]
     folder = Path(blysk.bench.__path__[0])
     while open_:
@@ -87,7 +87,7 @@ def _bench(file: Path) -> str:
 
 
 def _load(path: Path) -> Any:
-    """The result in an entry, or ``None``: a spoilt one is as good as none."""
+    """The result in an entry, or ``None`` if the entry is missing or damaged."""
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         entry = json.loads(path.read_text(encoding="utf-8"))
         if entry["digest"] == _digest(entry["result"]):
@@ -104,22 +104,23 @@ def results_of(
 ) -> list[Any]:
     """Results of measurements, in their order: from the cache, or measured now and kept there.
 
-    Each result is kept as soon as it is there, so that a run that was stopped goes on where it was. An entry
-    that is not as it was written is measured again.
+    Each result is kept as soon as it is measured, so that a run that was stopped can continue. A damaged
+    entry is measured again.
 
     Parameters
     ----------
     tasks : sequence of Task
         What to measure.
     executor : Executor, optional
-        Who measures what is not timed. ``None``: this process, as it does what is, one after the other.
+        Workers of the measurements that are not timed. Timed ones run in this process, one after the other;
+        ``None``: all do.
     progress : callable
-        Called after each.
+        Called after each measurement.
 
     Raises
     ------
     Exception
-        What a measurement raises; those that are done are kept, those behind it not begun.
+        The exception of a measurement. Finished measurements are kept, waiting ones not begun.
     """
     folder = cache_folder() / "results"
     with contextlib.suppress(OSError):

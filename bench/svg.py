@@ -1,4 +1,4 @@
-"""Figures of matplotlib as small texts of SVG that are the same every time."""
+"""Figures of matplotlib as small SVG texts that are equal in every run."""
 
 import re
 from collections import Counter
@@ -23,7 +23,7 @@ STYLE = {"svg.fonttype": "none", "svg.hashsalt": "blysk", "font.family": ["DejaV
 
 
 def _with_classes(text: str) -> str:
-    """Styles that are used more than once as classes."""
+    """The SVG with classes in place of styles that occur more than once."""
     found = Counter(re.findall(r' style="([^"]*)"', text))
     names = {style: f"s{k}" for k, (style, uses) in enumerate(found.items()) if uses > 1}
     rules = "".join(f".{name}{{{style}}}\n" for style, name in names.items())
@@ -39,7 +39,7 @@ def _rounded(number: re.Match) -> str:
 
 
 def svg(figure: Figure) -> str:
-    """A figure as SVG, the same text every time: without date, indentation, clipping and needless digits."""
+    """A figure as SVG, equal in every run: without date, indentation, clipping and needless digits."""
     buffer = StringIO()
     with rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, facecolor="white")
@@ -68,9 +68,9 @@ def panels(
     width, height : float
         Inches.
     columns : int
-        Panels.
+        Number of panels.
     **options
-        Of `matplotlib.figure.Figure.subplots`.
+        Options of `matplotlib.figure.Figure.subplots`.
     """
     style = {"font.size": 8, "axes.axisbelow": True, "axes.grid": True}
     with rc_context(style | {"grid.color": "#dddddd", "grid.linewidth": 0.5}):

@@ -1,11 +1,11 @@
-"""Baselines: what each unit and pipeline takes, and the cycles of a fixed set of frames, as they were.
+"""Baselines: recorded resources of each unit and pipeline, and cycles of a fixed set of frames.
 
-The figures stand in ``bench/quality/baselines.json``, and a test fails when one moves by more than 2 % either
-way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints what moved; the exit status
-is 1 if a figure did by more than that, or an entry is missing or not measured any more. ``--update`` writes
-the file.
+The figures are in ``bench/quality/baselines.json``, and a test fails if one changes by more than 2 % either
+way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints the changes; the exit status
+is 1 if a figure changed by more than that, or an entry is missing or not measured any more. ``--update``
+writes the file.
 
-Cycles do not depend on the engine; here they are Amaranth's own simulator's, which compiles nothing.
+Cycles do not depend on the engine; they are counted in Amaranth's own simulator, which compiles nothing.
 """
 
 import json
@@ -53,23 +53,23 @@ __all__ = [
 ]
 
 Figures = Mapping[str, Mapping[str, int]]
-"""Of entries: by name, figures by name."""
+"""Figures of entries: by the entry's name, values by the figure's name."""
 
 TOLERANCE = 0.02
-"""Share of its baseline by which a figure may move."""
+"""Share of its baseline by which a figure may change."""
 
 FILE = Path(str(files(__package__))) / "baselines.json"
-"""The baselines."""
+"""File of the baselines."""
 
 UPDATE = "python -m blysk.bench.quality.baselines --update"
-"""The command that makes them."""
+"""Command that writes the baselines."""
 
 _EXPONENT = 50
 
 
 @cache
 def _scenes() -> dict[str, Scene]:
-    """A teapot, whose spans are short, and a bent square, whose spans go from side to side."""
+    """A teapot, whose spans are short, and a square with bent normals, whose spans are as wide as it."""
     corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
     normals = normalise(corners * 0.1 + (0, 0, 1))
     square = Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normals)
@@ -92,7 +92,8 @@ def cycles_of(design: Design, style: str = "throughput") -> dict[str, int]:
     Returns
     -------
     dict
-        By frame: ``teapot_cycles``, 256 triangles at 48x36; ``square_cycles``, a bent one at 32x24.
+        ``teapot_cycles`` of a teapot of 256 triangles at 48x36, and ``square_cycles`` of a square with bent
+        normals at 32x24.
     """
     simulator = FrameSimulator(design.built(style=style), "pysim")
     return {f"{name}_cycles": simulator.render(scene).cycles for name, scene in _scenes().items()}
@@ -143,7 +144,7 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
 
 
 ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
-"""What is measured: for each entry a function that gives its figures.
+"""Entries to measure: for each a function that returns its figures.
 
 ``frames``: `cycles_of` the pipelines of each method in both styles, and of some with a gate. ``parts``:
 `Cost.totals` of these, of a pipeline of each model, and of every measured variant of every other unit.
@@ -151,7 +152,7 @@ ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
 
 
 def measure(name: str) -> dict[str, int]:
-    """Figures of an entry, as they are now."""
+    """Measure the figures of an entry."""
     return ENTRIES[name]()
 
 
@@ -161,7 +162,7 @@ def read(path: Path = FILE) -> dict[str, dict[str, int]]:
     Raises
     ------
     InputError
-        If the file is missing or no such file.
+        If the file is missing or damaged.
     """
     try:
         return json.loads(path.read_text(encoding="utf-8"))
@@ -170,14 +171,14 @@ def read(path: Path = FILE) -> dict[str, dict[str, int]]:
 
 
 def differences(old: Figures, new: Figures, tolerance: float = 0.0) -> list[str]:
-    """What moved by more than a tolerance, a line each: entry, figure, old, new, and by how much.
+    """Changes by more than a tolerance, a line each: entry, figure, old, new, and change in percent.
 
-    An entry or figure that only one of both has is a difference at any tolerance; so is one that was 0.
+    An entry or figure that only one side has is a difference at any tolerance, and so is a change from 0.
 
     Parameters
     ----------
     old, new : figures of entries
-        Baselines, and what was measured.
+        Baselines and measured figures.
     tolerance : float
         Share of the old figure.
     """
@@ -200,7 +201,7 @@ def differences(old: Figures, new: Figures, tolerance: float = 0.0) -> list[str]
 @click.option("--update", is_flag=True, help="Write the baselines.")
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
 def _command(update: bool, jobs: int) -> int:
-    """Measure every figure, and print what moved since the baselines were written."""
+    """Measure every figure, and print the changes since the baselines were written."""
     if update:
         check_writable(FILE)
     old = {} if update and not FILE.exists() else read(FILE)
@@ -227,12 +228,12 @@ def _command(update: bool, jobs: int) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print what moved, or write the baselines.
+    """Print the changes, or write the baselines.
 
     Returns
     -------
     int
-        0; 1 when a figure moved by more than `TOLERANCE`, 2 for bad input, told in one line, 130 when
+        0; 1 if a figure changed by more than `TOLERANCE`; 2 for bad input, printed in one line; 130 if
         interrupted.
     """
     return run(_command, "blysk.bench.quality.baselines", arguments)

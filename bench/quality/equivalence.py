@@ -1,4 +1,4 @@
-"""Equivalent mutants: those that no stimulus could tell from the unit, as ABC proves."""
+"""Equivalent mutants: ABC proves that no stimulus distinguishes them from the unit."""
 
 import itertools
 import math
@@ -16,7 +16,7 @@ from blysk.bench.tools.place_and_route import YOSYS, ToolError
 __all__ = ["Miter", "yosys"]
 
 _SECONDS = 20
-"""After which a proof that a mutant is equivalent is given up; most that succeed take 3 at most."""
+"""Time limit in seconds of a proof of equivalence; most proofs that succeed take at most 3."""
 
 
 def yosys(script: str, folder: Path) -> None:
@@ -53,7 +53,7 @@ _NARROW = 12
 
 
 def _numbers(data: bytes) -> Iterator[int]:
-    """Those of AIGER's binary format: seven bits a byte, lowest first, and whether there are more."""
+    """Numbers of AIGER's binary format: seven bits a byte, lowest first, and a bit for more bytes to come."""
     value = shift = 0
     for byte in data:
         value |= (byte & 127) << shift
@@ -72,17 +72,18 @@ def _coded(number: int) -> bytes:
 
 
 class Miter:
-    """A unit and a mutant of it, and whether any output ever differs: AND gates and one-bit registers.
+    """Equivalence check of a unit and a mutant of it, as AND gates and one-bit registers.
 
-    Products are too much for a proof. So first, the two share their registers, and what either would put into
-    them must be the same: if so, they stay the same by induction. Those that are narrow, or tell where beats
-    are, go on as in the unit, for these control; the others are inputs: whatever they hold, unless the unit
-    never puts anything but 0 into them. Not shared are the mutant's own, and those bits that do differ.
+    A proof through products would take too long. Therefore unit and mutant share their registers, and the
+    proof shows that both compute the same next values: then the registers stay equal by induction. Narrow
+    registers, and those that mark the stages with a beat, control the unit and follow its logic; the other
+    shared registers are free inputs, but 0 if they are always 0 in the unit. Registers that the fault
+    reaches, and bits that differ in a proof, are not shared.
 
     Parameters
     ----------
     folder : path
-        With the netlist of all mutants that `mutation.mutate` wrote; without any, it is the unit.
+        Folder with the netlist that `mutation.mutate` wrote: with input ``mutant`` 0 it is the unit.
     """
 
     def __init__(self, folder: Path):
@@ -111,7 +112,7 @@ class Miter:
         self._zero = self._constant()
 
     def _constant(self) -> set[int]:
-        """Registers of the unit that are always 0: as long as they all are, none becomes anything else."""
+        """Registers of the unit that are always 0: while all of them are 0, each next value is 0."""
         zero = set(range(len(self._next)))
         while True:
             # Of each node what it is for certain: 0, 1, or not known.
@@ -132,7 +133,7 @@ class Miter:
             zero -= changed
 
     def is_equivalent(self, mutant: int, register: str = "") -> bool:
-        """Whether a mutant, of whatever comes to a register, is proved to do what the unit does."""
+        """Whether a mutant, whose fault reaches ``register`` first, is proved equivalent to the unit."""
         shared = set(range(len(self._next)))
         # What changes nothing is seen before a register is taken apart, and then hardly.
         if not self._write(mutant, shared):
@@ -149,7 +150,7 @@ class Miter:
         return False
 
     def _prove(self, mutant: int, shared: Set[int], seconds: float) -> tuple[bool, set[int]]:
-        """Whether nothing differs while registers are ``shared``, and which of them do."""
+        """Whether all outputs and ``shared`` registers are proved equal, and the registers that differ."""
         compared = self._write(mutant, shared)
         if not compared:
             return True, set()
@@ -172,7 +173,7 @@ class Miter:
         return found[1] == found[2], {compared[k] for k in asserted} - {-1}
 
     def _write(self, mutant: int, shared: Set[int]) -> list[int]:
-        """Write ``mutant.aig``; of each of its outputs, the register that it compares, or -1."""
+        """Write ``mutant.aig``; the register that each output compares, -1 for an output of the unit."""
         known, gates = {}, []
         places = itertools.count(1 + self._inputs)
         units = [[0, *range(2, 2 * self._inputs + 2, 2)] for _ in range(2)]

@@ -1,15 +1,15 @@
-"""Mutants: how many small faults in the hardware of every unit the vectors of its record find.
+"""Mutation score of every unit: the share of small faults in its hardware that the record's vectors find.
 
-``python -m blysk.bench.quality.mutants [UNIT ...]`` takes faults of a unit at random (a bit of a cell that is
+``python -m blysk.bench.quality.mutants [UNIT ...]`` takes random faults of a unit (a bit of a cell that is
 stuck, inverted, or inverted by a neighbour: Yosys' pass ``mutate``), and gives each the runs of the unit's
-record, which `tests/test_units.py` holds against the bit-accurate model. A mutant is killed if an output
-beat, or its cycle, is not that of the unit; in a run without stalls the cycles of the inputs count, too. Of
-the others, those are equivalent that no stimulus could tell from the unit, as Yosys and ABC (package pyosys)
-prove; they count for nothing. The *score* is the share of the rest that is killed. Cycles are not mutated,
-and reset stays low: tests and proofs of their own hold each unit to it.
+record, which `tests/test_units.py` compares with the bit-accurate model. A mutant is killed if an output
+beat, or its cycle, differs from the unit's; in a run without stalls the cycles of the inputs count, too. A
+mutant that is not killed is equivalent if Yosys and ABC (package pyosys) prove that no stimulus distinguishes
+it from the unit; equivalent ones do not count. The *score* is the share of the others that is killed. Clocks
+are not mutated, and reset stays low: other tests and proofs check them.
 
-All mutants are one compiled model, an input of which chooses. The exit status is 1 when a unit's score is
-less than `LEAST`, or a mutant survives at a signal that the record does not waive; 2 for bad input.
+All mutants of a unit are one compiled model, with an input that chooses one. The exit status is 1 if a unit's
+score is less than `LEAST`, or a mutant survives at a signal that the record does not waive; 2 for bad input.
 """
 
 import re
@@ -48,10 +48,10 @@ LEAST = 0.95
 
 
 def waived(unit: str, mutant: str) -> bool:
-    """Whether the record waives a fault at the signal to which a mutant's results come.
+    """Whether the record waives faults at the first register or output that a mutant's fault reaches.
 
-    A waiver is a pattern for the signal's path or its last parts; a copy of a signal for a later stage has
-    the name of the signal and a number.
+    A waiver is a pattern for the signal's path or its last parts; it also matches copies of the signal for
+    later stages, which have its name and a number.
 
     Parameters
     ----------
@@ -71,18 +71,18 @@ def waived(unit: str, mutant: str) -> bool:
 
 @dataclass(frozen=True)
 class Score:
-    """What became of the mutants of a unit.
+    """Result of the mutants of a unit.
 
     Parameters
     ----------
     unit : str
         Its name.
     mutants : int
-        How many there were.
+        Number of mutants.
     equivalent : tuple of str
-        Those that are proved to do what the unit does.
+        Mutants that are proved equivalent to the unit.
     survived : tuple of str
-        Those that are neither killed nor proved equivalent.
+        Mutants that are neither killed nor proved equivalent.
     """
 
     unit: str
@@ -92,12 +92,12 @@ class Score:
 
     @property
     def killed(self) -> int:
-        """How many the vectors kill."""
+        """Number of mutants that the vectors kill."""
         return self.mutants - len(self.equivalent) - len(self.survived)
 
     @property
     def score(self) -> float:
-        """Share of those that are not equivalent that is killed; 1 without any."""
+        """Share of the mutants that are not equivalent that is killed; 1 if there are none."""
         return self.killed / max(1, self.mutants - len(self.equivalent)) if self.survived else 1.0
 
     @property
@@ -107,14 +107,14 @@ class Score:
 
 
 def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
-    """Make mutants of a unit, run its record's vectors on them, and prove what is left.
+    """Make mutants of a unit, run its record's vectors on them, and try to prove the survivors equivalent.
 
     Parameters
     ----------
     unit : str
         A key of `RECORDS`.
     count, seed : int
-        How many mutants, and the seed of their choice.
+        Number of mutants, and seed of their choice.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
     Raises
     ------
     ToolError
-        If a tool fails, or the unit among its mutants is not the unit; with the unit's name.
+        If a tool fails, or mutant 0 does not behave as the unit; with the unit's name.
     """
     try:
         return _measured(unit, count, seed)
@@ -158,7 +158,7 @@ def scores(
     executor: Executor | None = None,
     progress: Callable[[], object] = lambda: None,
 ) -> list[Score]:
-    """Scores of units, in their order; those that are known are not measured again.
+    """Scores of units, in their order; scores in the cache are not measured again.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def table(rows: Sequence[Score]) -> str:
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
 def _command(units, count, seed, jobs, figures) -> int:
-    """Break every unit, or those named, in small ways, and tell how many faults its vectors find."""
+    """Make small faults in every unit, or in the named ones, and print how many its vectors find."""
     unknown = [unit for unit in units if unit not in RECORDS]
     if unknown:
         raise InputError(unknown[0], "is no unit", f"choose from {', '.join(RECORDS)}")
@@ -223,13 +223,13 @@ def _command(units, count, seed, jobs, figures) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, and judge.
+    """Print the table, and compare with the target.
 
     Returns
     -------
     int
-        0; 1 when a score is less than `LEAST`, a mutant survives without a reason or a tool fails, 2 for bad
-        input, told in one line.
+        0; 1 if a score is less than `LEAST`, a mutant survives without a waiver or a tool fails; 2 for bad
+        input, printed in one line.
     """
     return run(_command, "blysk.bench.quality.mutants", arguments)
 

@@ -1,4 +1,4 @@
-"""Mutants of a unit: small faults in its netlist, all in one model, and the vectors that look for them."""
+"""Mutants of a unit: small faults in its netlist, all in one model, and the vectors that test them."""
 
 import ctypes
 import json
@@ -27,7 +27,7 @@ __all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "vectors_of"]
 
 
 def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
-    """Input and answer of every run of a record's default variant, shortest first.
+    """Stimulus and expected trace of every run of a record's default variant, shortest first.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Wrapped(Component):
         super().__init__({**unit.signature.members, **members})
 
     def elaborate(self, platform) -> Module:
-        """Connect the unit's members; the unit itself is for those to add who wrap it."""
+        """Connect the unit's members; a subclass or user adds the unit itself."""
         m = Module()
         for name, member in self.unit.signature.members.items():
             inner, outer = getattr(self.unit, name), getattr(self, name)
@@ -89,17 +89,17 @@ class Wrapped(Component):
 
 
 class _Observed(Wrapped):
-    """A unit, an input that chooses a mutant, and outputs that are 0 where no partner of a stream looks.
+    """A unit with an input that chooses a mutant, and outputs that are 0 while their value does not matter.
 
-    A ``ready`` is seen while ``valid`` is high, a payload likewise. The cycles on which each flag of a unit
-    is high are its status, as in a pipeline.
+    ``ready`` and payload matter only while ``valid`` is high. ``status`` counts the cycles in which each flag
+    of the unit is high, as in a pipeline.
 
     Parameters
     ----------
     unit : Component
         The unit.
     width : int
-        Bits of that input, ``mutant``.
+        Bits of the input ``mutant``.
     """
 
     def __init__(self, unit: Component, width: int):
@@ -127,7 +127,7 @@ class _Observed(Wrapped):
 
 
 def flags_of(unit: Component) -> list[str]:
-    """Names of a unit's flags that no run of its own shows."""
+    """Names of a unit's flags; none if its own ``status`` counts them."""
     if "status" in unit.signature.members:
         return []
     return [name for name in ("out_of_range", "wide") if name in unit.signature.members]
@@ -166,9 +166,9 @@ write_rtlil mutated.il"""
 
 
 def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, str]:
-    """Write ``flat.il``, the unit, and ``whole.il`` and ``mutated.il``, with all its mutants.
+    """Write ``flat.il``, the unit, and ``whole.il`` and ``mutated.il``, the unit with all its mutants.
 
-    Returns what each is, by number.
+    Returns the name of each mutant, by its number.
     """
     width = count.bit_length()
     netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
@@ -198,7 +198,7 @@ def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], s
 
 
 def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
-    """Name, by a cell's name, of the first register or output that its results come to."""
+    """Function from a cell's name to the first register or output that the cell's results reach."""
     cells, readers, names = module["cells"], defaultdict(list), {}
     for name, net in sorted(module["netnames"].items(), key=lambda item: item[1]["hide_name"]):
         names.update({bit: name for bit in net["bits"] if bit not in names})
@@ -250,16 +250,16 @@ class Mutants(cxxrtl.Model):
         library.blysk_open = library.blysk_open_mutant
 
     def choose(self, mutant: int) -> None:
-        """Which mutant runs from now on; 0 for the unit."""
+        """Choose the mutant of the following runs; 0 for the unit."""
         ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
 
     def trace(self, stimulus: Stimulus) -> Trace:
-        """A run of so many cycles as the stimulus says."""
+        """Run a stimulus up to its limit of cycles; the trace."""
         return self._run(stimulus, None)
 
 
 def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: Iterable[int]) -> set[int]:
-    """Those of the mutants that the vectors kill."""
+    """The mutants that the vectors kill."""
     alive = set(mutants)
     for stimulus, trace in vectors:
         model.choose(0)
@@ -276,7 +276,7 @@ def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: I
 
 
 def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
-    """What a test sees of a run. Cycles of the inputs follow from those of the outputs, but under stalls."""
+    """Parts of a trace that tests compare; without stalls also the cycles of the inputs."""
     free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
     cycles = (trace.input_cycles,) if free else ()
     return trace.end, trace.clock, trace.output, trace.cycles, trace.status, *cycles

@@ -1,12 +1,12 @@
-"""The chord method's error at every exponent: the frames of meshes through the model, beside float64.
+"""The chord method's error at every exponent: frames of meshes by the bit-accurate model and in float64.
 
 ``python -m blysk.bench.quality.sweep [MESH ...]`` takes each mesh (the teapot by default) at 320x240, in
 white light and with a grey, glossy material, at every exponent from 1 to 1000 with the model cosquad and at
-30 of them with every other model. Each frame goes through `Design.compute`, which the simulated
-pipeline equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and is held
-against exact normals of every pixel with the same model. ``--json`` keeps the figures of every frame. The
-exit status is 1 when a pixel is more than 1 LSB off, other than where a light is on in one and off in the
-other (see `Point`), 2 for a mesh that cannot be read.
+30 of them with every other model. Each frame is computed by `Design.compute`, which the simulated pipeline
+equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and compared with
+exact normals at every pixel and the same model. ``--json`` keeps the figures of every frame. The exit status
+is 1 if the error of a pixel is over 1 LSB, switched pixels left out (see `Point`); 2 for a mesh that
+cannot be read.
 """
 
 import argparse
@@ -40,45 +40,45 @@ EXPONENTS = tuple(range(1, MAX_EXPONENT + 1))
 
 FEW_EXPONENTS = (1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50, 65, 85, 100, 130, 170, 220, 270, 330, 400)
 FEW_EXPONENTS += (470, 500, 600, 700, 800, 900, 1000)
-"""Those of the models that are not swept whole."""
+"""Exponents of the models that are not swept at every exponent."""
 
 LARGEST = 1.0
 """Target: the largest error of a channel, in LSB."""
 
 LARGEST_COSINE = ChordInterpolator.DIFFUSE_BUDGET / 255 + 2.0**-15
-"""How near to 0 an exact N·L must be for its sign to be open, 5e-4: the error of the chord method's fit, and
-those of vectors and words."""
+"""Largest ``|N·L|``, 5e-4, whose sign the chord method may change: the error of its fit, and errors of
+vectors and words."""
 
 
 @dataclass(frozen=True)
 class Point:
     """Errors of a frame.
 
-    A light with ``N . L <= 0`` gives nothing, and at small exponents a highlight may reach that far. Where
+    A light with ``N . L <= 0`` gives nothing, and at small exponents a highlight may reach such pixels. If
     the exact N·L is so close to 0 that the method's error decides its sign, the whole highlight is on in one
-    frame and off in the other. Pixels over `LARGEST` where the signs differ, and the exact N·L is within
-    `LARGEST_COSINE`, are counted by themselves, as switched.
+    frame and off in the other. A pixel is *switched* if its error is over `LARGEST`, the signs differ, and
+    the exact N·L is within `LARGEST_COSINE`; switched pixels are counted apart.
 
     Parameters
     ----------
     model : str
         Reflection model.
     exponent : int
-        Of the highlight.
+        Exponent of the highlight.
     spans : int
-        Spans after the cutting.
+        Number of spans after cutting.
     pixels : int
         Pixels that show the surface.
     max_lsb : float
-        Largest error of a channel of any of them.
+        Largest error of a channel of those pixels, in LSB.
     over : int
         Pixels with an error over `LARGEST`.
     switched : int
-        How many of those are switched.
+        Number of switched pixels among them.
     switched_cosine : float
-        Largest exact ``|N . L|`` of those, 0 without any.
+        Largest exact ``|N . L|`` of switched pixels, 0 without any.
     steady_lsb : float
-        Largest error of the pixels that are not switched.
+        Largest error of the pixels that are not switched, in LSB.
     """
 
     model: str
@@ -102,9 +102,9 @@ class Frame:
     width, height : int
         Size of the picture.
     coefficients : three floats, optional
-        k_a, k_d and k_s of every channel; by default, as the next two, those of `scene_for`.
+        k_a, k_d and k_s of every channel; by default those of `scene_for`.
     view, light : three floats each, optional
-        Directions from the mesh to the viewer and to the light.
+        Directions from the mesh to the viewer and to the light; by default those of `scene_for`.
     """
 
     def __init__(
@@ -141,9 +141,9 @@ class Frame:
         return replace(self.scene, material=replace(self.scene.material, exponent=exponent))
 
     def golden(self, model: str, exponent: int) -> np.ndarray:
-        """Exact normals of every pixel, in LSB: float64 array, shape (pixels, 3).
+        """Frame with exact normals at every pixel, in LSB: float64 array, shape (pixels, 3).
 
-        What `render` draws, pixel by pixel in the order of the fragments.
+        These are the colours of the golden renderer's `render`, in the order of the fragments.
         """
         scene = self.scene_of(exponent)
         shaded = intensity_of_cosines(
@@ -157,7 +157,7 @@ class Frame:
         return 255 * saturate(shaded)
 
     def spans_of(self, design: Design, exponent: int) -> tuple[Raster, Spans]:
-        """Spans as `prepare` cuts and quantises them for a pipeline."""
+        """Spans that `prepare` cuts and quantises for a pipeline."""
         scene = self.scene_of(exponent)
         cut, _ = cut_spans(scene, self.raster, design)
         return cut, spans_for(scene, cut, design)
@@ -204,7 +204,7 @@ class Frame:
         constants: FrameConstants,
         chosen: np.ndarray,
     ) -> np.ndarray:
-        """Which of some shown pixels are switched."""
+        """Whether each of the ``chosen`` shown pixels is switched."""
         fragment = self._shown[chosen]
         which, place = np.unique(cut.span[fragment], return_inverse=True)
         length = spans.length[which]
@@ -224,9 +224,9 @@ class Summary:
     mesh, model : str
         Names.
     exponents, pixels : int
-        How many frames, and the pixels of each.
+        Number of frames, and of pixels of each.
     steady_lsb, steady_exponent
-        Largest error without switched pixels, and where; see `Point`.
+        Largest error without switched pixels, in LSB, and its exponent; see `Point`.
     over : int
         Pixels over `LARGEST` of all frames, switched ones left out.
     max_lsb, exponent
@@ -234,9 +234,9 @@ class Summary:
     switched : int
         Switched pixels over `LARGEST` of all frames.
     switched_cosine : float
-        Largest exact ``|N . L|`` of those.
+        Largest exact ``|N . L|`` of switched pixels.
     missed : tuple of int
-        Exponents with an error over `LARGEST` that is not of a switched pixel.
+        Exponents at which a pixel that is not switched has an error over `LARGEST`.
     """
 
     mesh: str
@@ -254,7 +254,7 @@ class Summary:
 
 
 def summarise(mesh: str, points: Sequence[Point]) -> list[Summary]:
-    """One summary for each model, in the order in which they come."""
+    """A summary for each model, in the order of their first points."""
     result = []
     for model in dict.fromkeys(point.model for point in points):
         own = [point for point in points if point.model == model]
@@ -280,7 +280,7 @@ def summarise(mesh: str, points: Sequence[Point]) -> list[Summary]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a line for each mesh and model, and judge.
+    """Print a line for each mesh and model, and compare with the target.
 
     Returns
     -------

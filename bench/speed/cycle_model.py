@@ -1,4 +1,4 @@
-"""Cycles of a frame from the lengths of its spans: for pictures that take long to simulate.
+"""Cycles of a frame, computed from the lengths of its spans, for pictures that take long to simulate.
 
 ``python -m blysk.bench.speed.cycle_model`` prints, for every method, the cycles of simulated frames beside
 those of the model.
@@ -28,33 +28,33 @@ from blysk.sim.meshes.teapot import teapot
 __all__ = ["WAITING", "compare", "frame_cycles", "intervals_of", "span_cycles", "unit_of"]
 
 _NEVER = -(1 << 40)
-"""Minus infinity of sums of cycles."""
+"""Minus infinity in sums of cycles."""
 
 WAITING = 2
-"""Cycles after the first pixel of the span before the last, until a place for a prepared span is free."""
+"""Cycles from the first pixel of span k - 2 until the buffer has a free place for the prepared span k."""
 
 _CHUNK = 1 << 16
 
 EMPTY_SEGMENT_CYCLES = 3
-"""Of the adaptive normaliser, for a segment without a pixel."""
+"""Cycles of the adaptive normaliser for a segment without a pixel."""
 
 
 def span_cycles(length: np.ndarray, interval: np.ndarray, waiting: int = WAITING) -> int:
-    """Cycles from the first pixel of some spans to their last.
+    """Cycles from the first pixel of a sequence of spans to the last pixel.
 
-    Two prepared spans wait at most before the accumulators. With r_k, the cycle on which span k is prepared,
-    s_k, that of its first pixel, I_k, its interval, and l_k, its length:
+    At most two prepared spans wait before the accumulators. Let r_k be the cycle in which span k is prepared,
+    s_k the cycle of its first pixel, I_k its interval, l_k the cycles of its pixels, and w ``waiting``:
 
     ``r_k = max(r_{k-1} + I_k, s_{k-2} + w)``, ``s_k = max(s_{k-1} + l_{k-1}, r_k)``.
 
-    This is a product of matrices in the algebra of maximum and sum, which is taken in pairs.
+    This is a product of matrices in the max-plus algebra, computed in pairs.
 
     Parameters
     ----------
     length, interval : int arrays, shape (spans,)
-        Cycles that the pixels of a span take, and least cycles from the span before it to it.
+        Cycles of the pixels of each span, and least cycles from the previous span to it.
     waiting : int
-        w.
+        See `WAITING`.
     """
     begin = -int(interval[0]) if len(length) else 0
     state = np.array([0, begin, -waiting, -waiting], dtype=np.int64)
@@ -65,7 +65,7 @@ def span_cycles(length: np.ndarray, interval: np.ndarray, waiting: int = WAITING
 
 
 def _matrices(length: np.ndarray, interval: np.ndarray, waiting: int) -> np.ndarray:
-    """A matrix a span: its end, r_k, s_k, s_{k-1} from those of the span before; shape (spans, 4, 4)."""
+    """Max-plus matrices from span k - 1 to k of its end, r_k, s_k and s_{k-1}; shape (spans, 4, 4)."""
     found = np.full((len(length), 4, 4), _NEVER, dtype=np.int64)
     found[:, :3, 1] = np.asarray(interval)[:, np.newaxis]
     found[:, :3, 3] = waiting
@@ -76,7 +76,7 @@ def _matrices(length: np.ndarray, interval: np.ndarray, waiting: int) -> np.ndar
 
 
 def _product(matrices: np.ndarray) -> np.ndarray:
-    """Product of all, the last one first."""
+    """Max-plus product of all matrices, the last one leftmost."""
     while len(matrices) > 1:
         odd = matrices[-1:] if len(matrices) % 2 else matrices[:0]
         early, late = matrices[: len(matrices) - len(odd)].reshape(-1, 2, 4, 4).swapaxes(0, 1)
@@ -86,10 +86,10 @@ def _product(matrices: np.ndarray) -> np.ndarray:
 
 
 def intervals_of(unit: ShadingPipelineUnit, spans: Spans) -> np.ndarray:
-    """Least cycles from the span before to each span; int, shape (spans,).
+    """Least cycles from the previous span to each span; int, shape (spans,).
 
-    Where a span shorter than three pixels may follow sooner (`InterpolatorUnit.shortest_interval`), its
-    length counts; of ``bisection`` the number of its segments does.
+    They depend on the length of spans under three pixels if these may follow sooner
+    (`InterpolatorUnit.shortest_interval`), and for ``bisection`` on the number of segments.
     """
     interpolator, method = unit.parameters.interpolator, unit._interpolator
     length = np.asarray(spans.length)
@@ -101,7 +101,7 @@ def intervals_of(unit: ShadingPipelineUnit, spans: Spans) -> np.ndarray:
 
 
 def _bisected(normaliser: AdaptiveNormaliser, spans: Spans) -> np.ndarray:
-    """Intervals of ``bisection``: a span's levels are counted while the one before it is divided."""
+    """Intervals of ``bisection``: a span's levels are counted while the previous span is divided."""
     unit = AdaptiveNormaliserUnit(normaliser)
     steps = np.asarray(spans.length) - 1
     cosine = np.einsum("ij,ij->i", spans.normal_left / ONE, spans.normal_right / ONE)
@@ -117,9 +117,9 @@ def _bisected(normaliser: AdaptiveNormaliser, spans: Spans) -> np.ndarray:
 def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     """Cycles of a frame of one material without stalls, from the first write of a constant to the last pixel.
 
-    Where the interval of a span is a constant this is what a simulation counts. Of ``chord``,
-    ``chord-local``, ``bisection`` and ``quadratic-eval`` it is within 3 %, of ``quadratic-horner`` within 12
-    %, by `compare`.
+    It equals the cycles of a simulation if the interval of spans is constant. By `compare` it is within 3 %
+    for ``chord``, ``chord-local``, ``bisection`` and ``quadratic-eval``, within 12 % for
+    ``quadratic-horner``.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     spans : Spans
         Spans of the frame, none of them empty.
     writes : int
-        Writes of constants before it.
+        Number of writes of constants before the frame.
     """
     length = np.asarray(spans.length, dtype=np.int64) * unit.cycles_per_pixel
     waiting = WAITING if unit._interpolator.shortest_interval is None else 0
@@ -136,13 +136,13 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
 
 
 def unit_of(design: Design) -> ShadingPipelineUnit:
-    """The pipeline, of which only the figures are asked: no warning tells that nothing elaborates it."""
+    """The pipeline of a design for its figures only: no warning says that it is never elaborated."""
     warnings.simplefilter("ignore", UnusedElaboratable)
     return ShadingPipelineUnit(design)
 
 
 def compare(design: Design, triangles: int, size: tuple[int, int]) -> tuple[int, int]:
-    """Cycles of a simulated teapot, and of the model."""
+    """Cycles of a teapot's frame by simulation and by the cycle model."""
     scene = scene_for(teapot(triangles), 50, *size)
     frame = FrameSimulator(design).render(scene)
     writes = sum(len(of.writes()["data"]) for of in constants_of(scene, design))

@@ -2,14 +2,14 @@
 
 ``python -m blysk.bench.speed.engines`` sends the longer spans of a teapot at 4000x3000 through the chord
 pipeline of one light in both engines and in Verilator's model of the emitted Verilog, and through the same
-pipeline with a highlight gate in the compiled engine. It prints what each does in a second, and how long a
-picture of a teapot of 50,000 triangles takes by ``blysk render`` with its model in the cache. It ends with
-status 1 when the compiled engine makes less than 5 million pixels a second on one core, is less than 200
-times as fast as pysim, or is slower than Verilator, or the picture takes 2 s.
+pipeline with a highlight gate in the compiled engine. It prints cycles and pixels a second of each, and the
+seconds of ``blysk render`` for a teapot of 50,000 triangles with its model in the cache. The exit status is 1
+if the compiled engine makes less than 5 million pixels a second on one core, is less than 200 times as fast
+as pysim, or is slower than Verilator, or if the picture takes 2 s or more.
 
-Seconds are those of the processor in this process, which has one thread: other work on the machine does not
-count. A run of an engine is the whole call, beats packed and unpacked; one of Verilator is the loop over the
-cycles alone, from packed beats to packed beats.
+Seconds are processor time of this process, which has one thread: other work on the machine does not count. A
+run of an engine is the whole call, with packing and unpacking of beats; a run of Verilator is only the loop
+over the cycles, from packed beats to packed beats.
 """
 
 import hashlib
@@ -46,19 +46,19 @@ __all__ = ["LEAST_LENGTH", "LEAST_PIXELS", "LEAST_RATIO", "LEAST_RIVAL", "LONGES
 __all__ += ["main", "measure", "picture_seconds", "teapot_spans"]
 
 LEAST_PIXELS = 5e6
-"""Target: pixels a second of the compiled engine."""
+"""Target: least pixels a second of the compiled engine."""
 
 LEAST_RATIO = 200
-"""Target: speed of the compiled engine in terms of pysim."""
+"""Target: least ratio of the speeds of the compiled engine and pysim."""
 
 LEAST_RIVAL = 1
-"""Target: speed of the compiled engine in terms of Verilator."""
+"""Target: least ratio of the speeds of the compiled engine and Verilator."""
 
 LONGEST_SECONDS = 2.0
 """Target: seconds from a teapot of 50,000 triangles to its picture of 640x480."""
 
 LEAST_LENGTH = 16
-"""Pixels of the spans that the speed is measured with."""
+"""Least length in pixels of the spans with which the speed is measured."""
 
 # The command, and the processor's seconds at its end.
 _TIMED_COMMAND = """
@@ -75,7 +75,7 @@ _WAIT = 1000
 
 @dataclass(frozen=True)
 class Speed:
-    """Speed of both engines, with all overhead but the building of the model, and of the baseline.
+    """Speed of both engines, with all overhead except building the model, and of Verilator as baseline.
 
     Parameters
     ----------
@@ -84,11 +84,11 @@ class Speed:
     cxxrtl_beats, pysim_beats : float
         Output beats a second.
     build : float
-        Seconds on the clock to the compiled model and its first, short run; less with a warm cache.
+        Wall-clock seconds to build the compiled model and for its first, short run; less with a warm cache.
     cycles : int
         Cycles of the compiled run, up to the last transfer.
     verilator_beats : float or None
-        Output beats a second of Verilator's model, ``None`` where it was not asked for.
+        Output beats a second of Verilator's model; ``None`` if it did not run.
     """
 
     cxxrtl: float
@@ -101,7 +101,7 @@ class Speed:
 
     @property
     def ratio(self) -> float:
-        """Speed of the compiled engine in terms of the interpreted one."""
+        """Ratio of the speeds of the compiled and the interpreted engine."""
         return self.cxxrtl / self.pysim
 
 
@@ -126,11 +126,11 @@ def measure(
     repeats: int = 3,
     baseline: bool = False,
 ) -> Speed:
-    """Run both engines, and compare what they give.
+    """Run both engines, compare their outputs, and measure their speeds.
 
-    The interpreted engine gets the first ``pysim_beats`` beats only, since it is the slower one by far. The
-    compiled one runs those as well, for the comparison, and then all of them ``repeats`` times, in turn with
-    Verilator's model; the fastest of each counts. The cycles of waiting for the end are part of both engines'
+    The interpreted engine gets the first ``pysim_beats`` beats only, since it is much slower. The compiled
+    one runs those too, for the comparison, and then all beats ``repeats`` times, in turn with Verilator's
+    model; the fastest run of each counts. The cycles of the idle timeout at the end are part of both engines'
     times and counts.
 
     Parameters
@@ -142,7 +142,7 @@ def measure(
     constants, write
         As `simulate` takes them.
     expected : mapping of field names to arrays, optional
-        What all the beats must give.
+        Expected output of all the beats.
     pysim_beats : int
         Input beats for the interpreted engine.
     repeats : int
@@ -157,8 +157,8 @@ def measure(
     Raises
     ------
     ValueError
-        If the engines differ in a beat or a cycle, the compiled one gives other than expected, or Verilator's
-        model other beats or cycles than the compiled one.
+        If the engines differ in a beat or a cycle, the compiled engine's output is not as expected, or
+        Verilator's model gives other beats or cycles than the compiled engine.
     SimulationError
         If there is no Verilator, or it fails.
     """
@@ -217,17 +217,17 @@ def measure(
 
 
 def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    """Seconds of the processor that something takes, and its result."""
+    """Processor seconds of a call, and its result."""
     start = time.process_time()
     result = work()
     return time.process_time() - start, result
 
 
 def teapot_spans(design: Design, width: int, height: int, least: int = 1) -> tuple[Spans, FrameConstants]:
-    """Spans of a teapot in a picture of that size, each of so many pixels or more, and one light's constants.
+    """Spans of at least ``least`` pixels of a teapot's picture, and frame constants with one light.
 
-    The order is random, from a fixed seed: the first spans are then of the same lengths as all, which makes
-    the pixels a second of a short run comparable with those of a long one.
+    The order is random, from a fixed seed: the first spans then have lengths like all spans, so that the
+    pixels a second of a short run compare with those of a long run.
     """
     scene = scene_for(load_mesh("teapot").mesh, 20, width, height)
     spans = prepare(scene, design).spans
@@ -237,23 +237,23 @@ def teapot_spans(design: Design, width: int, height: int, least: int = 1) -> tup
 
 
 def picture_seconds(triangles: int = 50_000, size: str = "640x480", repeats: int = 3) -> tuple[float, float]:
-    """Seconds that ``blysk render`` takes for a teapot by the chord method, its model in the cache.
+    """Seconds of ``blysk render`` for a teapot by the chord method, with its model in the cache.
 
     Parameters
     ----------
     triangles : int
-        Of the teapot, about.
+        Number of triangles of the teapot, about.
     size : str
-        Of the picture.
+        Size of the picture.
     repeats : int
-        Pictures after the one that fills the cache; the fastest counts.
+        Number of pictures after the first, which fills the cache; the fastest counts.
 
     Returns
     -------
     wall : float
-        By the clock, from loading to the picture file, as the command reports them.
+        Wall-clock seconds from loading to the picture file, as the command reports them.
     processor : float
-        Of all threads of the process, from its first look at the command to its end.
+        Processor seconds of all threads of the process, from the call of the command line to its end.
     """
     wall, processor = [], []
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -269,22 +269,22 @@ def picture_seconds(triangles: int = 50_000, size: str = "640x480", repeats: int
 
 
 def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
-    """Measure, print, and judge.
+    """Measure, print, and compare with the targets.
 
-    The picture meets its target by the clock, or by the processor's time, which is what the clock would show
-    on a machine that does nothing else.
+    The picture meets its target by wall-clock or by processor seconds: on a machine without other work both
+    are alike.
 
     Parameters
     ----------
     width, height : int
-        Size of the picture that the speeds are measured with.
+        Size of the picture whose spans the engines shade.
     repeats : int
         Runs of the compiled engine and of Verilator's model; the fastest of each counts.
 
     Returns
     -------
     int
-        0, or 1 when the compiled engine missed a target.
+        0, or 1 if the compiled engine missed a target.
     """
     design = preset(method="chord", model="cosquad", lights=1)
     spans, constants = teapot_spans(design, width, height, LEAST_LENGTH)

@@ -1,10 +1,10 @@
-"""Pixels a cycle of several pipelines: how far meshes keep all of them busy.
+"""Pixels a cycle of several pipelines: how well the spans of meshes keep all of them busy.
 
 ``python -m blysk.bench.speed.pipes`` draws a coarse ring and teapots of about 1,000, 10,000 and 100,000
-triangles at 640x480 by 1, 2, 4 and 8 simulated pipelines of the method chord, each for the scanlines of a
-remainder of y. It prints a table in Markdown; ``--json`` prints the same as JSON. Every frame must be that of
-the bit-accurate model. The exit status is 1 when a frame differs, or four pipelines give less than 3.6 times
-the pixels a cycle of one on a mesh whose spans have four pixels and more, on average.
+triangles at 640x480 by 1, 2, 4 and 8 simulated pipelines of the method chord; pipeline k of n draws the
+scanlines with y mod n = k. It prints a table in Markdown; ``--json`` prints the same as JSON. Every frame
+must equal that of the bit-accurate model. The exit status is 1 if a frame differs, or if four pipelines give
+less than 3.6 times the pixels a cycle of one on a mesh whose spans have four pixels or more on average.
 """
 
 import argparse
@@ -27,10 +27,10 @@ from blysk.sim.meshes.teapot import teapot
 __all__ = ["LEAST", "MESHES", "Rate", "main", "measure", "mesh_of", "table"]
 
 MESHES = ("ring", "teapot 1000", "teapot 10000", "teapot 100000")
-"""A coarse ring, and teapots of about so many triangles."""
+"""Names of the meshes: a coarse ring, and teapots with their numbers of triangles, about."""
 
 LEAST = 3.6
-"""Target: so many times the pixels a cycle with `_OF` pipelines."""
+"""Target: least ratio of the pixels a cycle of `_OF` pipelines and of one."""
 
 _OF = 4
 _EXPONENT = 50
@@ -44,13 +44,13 @@ class Rate:
     Parameters
     ----------
     mesh : str
-        Of `MESHES`.
+        One of `MESHES`.
     triangles : int
-        Of the mesh.
+        Triangles of the mesh.
     pipes : int
-        Pipelines.
+        Number of pipelines.
     spans, pixels, cycles : int
-        Of the frame, cycles from the first write of a constant to the last pixel.
+        Numbers of the frame; cycles from the first write of a constant to the last pixel.
     same : bool
         Whether the picture is that of the bit-accurate model.
     """
@@ -83,18 +83,18 @@ def mesh_of(name: str) -> Mesh:
 def measure(
     pipes: int, meshes: Sequence[str] = MESHES, width: int = 640, height: int = 480, method: str = _METHOD
 ) -> Iterator[Rate]:
-    """Frames of meshes by so many pipelines.
+    """Draw meshes by a number of pipelines: a rate for each mesh.
 
     Parameters
     ----------
     pipes : int
-        Pipelines.
+        Number of pipelines.
     meshes : sequence of str
-        Of `MESHES`.
+        Some of `MESHES`.
     width, height : int
-        Of the pictures.
+        Size of the pictures.
     method : str
-        Of the design, of one light.
+        Method of the design, which has one light.
     """
     design = preset(method, "cosquad")
     simulator = FrameSimulator(design, "auto", pipes)
@@ -107,7 +107,7 @@ def measure(
 
 
 def times(rates: Sequence[Rate], rate: Rate) -> float:
-    """How many times the pixels a cycle of one pipeline; NaN where that was not measured."""
+    """Ratio of a rate's pixels a cycle to those of one pipeline; NaN if that was not measured."""
     ones = [one.cycles for one in rates if (one.mesh, one.pipes) == (rate.mesh, 1)]
     return ones[0] / rate.cycles if ones else float("nan")
 
@@ -129,7 +129,7 @@ def table(rates: Sequence[Rate]) -> str:
 
 
 def missed(rates: Sequence[Rate]) -> list[str]:
-    """What is not as it should be, in lines."""
+    """Frames that differ and targets that are missed, in lines."""
     lines = [f"{r.mesh}, {r.pipes} pipelines: the picture is another" for r in rates if not r.same]
     return lines + [
         f"{rate.mesh}: {times(rates, rate):.2f} times with {_OF} pipelines, not {LEAST}"
@@ -139,7 +139,7 @@ def missed(rates: Sequence[Rate]) -> list[str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, and judge.
+    """Print the table, and compare with the targets.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The golden renderer's time and memory, beside VTK's software renderer on the same scene.
+"""Time and memory of the golden renderer, and time of VTK's software renderer on the same scene.
 
 ``python -m blysk.bench.speed.renderer`` draws a teapot of 100,000 triangles at 1920x1080 with both, in one
 run, and ends with status 1 when the golden renderer takes 3 s or 2 GiB or more. Needs the ``bench`` extra
@@ -28,22 +28,22 @@ from blysk.sim.meshes.teapot import teapot
 __all__ = ["LARGEST_MEMORY", "LONGEST_SECONDS", "Timing", "main", "scene_for", "timed", "vtk_image"]
 
 LONGEST_SECONDS = 3.0
-"""Target: seconds for a frame on one core."""
+"""Target: most seconds for a frame on one core."""
 
 LARGEST_MEMORY = 2 * 2**30
-"""Target: bytes of a process that renders, at its largest."""
+"""Target: most bytes of memory of the rendering process."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """The fastest of several runs.
+    """Time of the fastest of several runs.
 
     Parameters
     ----------
     wall : float
-        Seconds by the clock.
+        Wall-clock seconds.
     cpu : float
-        Seconds of all threads of the process in that run.
+        Processor seconds of all threads of the process in that run.
     """
 
     wall: float
@@ -51,19 +51,19 @@ class Timing:
 
     @property
     def one_core(self) -> float:
-        """Seconds that the run takes, or would take if its threads had to share one core."""
+        """Seconds of the run if its threads share one core: the larger of both times."""
         return max(self.wall, self.cpu)
 
 
 def timed(action: Callable[[], Any], repeats: int) -> tuple[Timing, Any]:
-    """Fastest of several runs, by `Timing.one_core`, and the last result.
+    """Timing of the fastest of several runs, by `Timing.one_core`, and the last result.
 
     Parameters
     ----------
     action : callable
-        What to run.
+        Function to run.
     repeats : int
-        How often, at least 1.
+        Number of runs, at least 1.
     """
     timings = []
     for _ in range(repeats):
@@ -95,14 +95,14 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     Parameters
     ----------
     scene : Scene
-        What to draw: orthographic, one light, a coefficient's color in `Material.diffuse` only.
+        The scene: orthographic, one light, coloured in `Material.diffuse` only.
 
     Returns
     -------
     draw : callable
         Draws a frame and reads it back: uint8 array, shape (height, width, 3).
     name : str
-        The driver, in OpenGL's own words.
+        Name of the driver, as OpenGL gives it.
     """
     # Mesa reads these when it is loaded. 0 threads: llvmpipe draws in the calling one.
     os.environ["LP_NUM_THREADS"] = "0"
@@ -190,7 +190,7 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
 
 
 class _Golden(NamedTuple):
-    """What the golden renderer takes: a timing by model, the last frame, and bytes of its process."""
+    """Measurements of the golden renderer: timings by model, last frame, peak memory in bytes."""
 
     timings: dict[str, Timing]
     frame: Frame
@@ -198,7 +198,7 @@ class _Golden(NamedTuple):
 
 
 def _golden(triangles: int, width: int, height: int, repeats: int) -> _Golden:
-    """Measure the golden renderer, in a process that does nothing else."""
+    """Measure the golden renderer, in a process of its own."""
     scene = scene_for(triangles, width, height)
     timings = {}
     for model in ("blinn", "phong"):
@@ -209,7 +209,7 @@ def _golden(triangles: int, width: int, height: int, repeats: int) -> _Golden:
 
 
 def _peak_memory() -> int:
-    """Bytes of this process at its largest."""
+    """Peak memory of this process in bytes."""
     status = Path("/proc/self/status")
     if status.exists():
         # Of a process that another began, `ru_maxrss` on Linux counts what that one had.
@@ -220,7 +220,7 @@ def _peak_memory() -> int:
 
 
 def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeats: int = 3) -> int:
-    """Measure, print, and judge.
+    """Measure, print, and compare with the targets.
 
     Parameters
     ----------

