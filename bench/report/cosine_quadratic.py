@@ -1,4 +1,4 @@
-"""The report's section on [C]: its figures drawn again, and its published numbers beside ours."""
+"""The report's section on [C]: its figures drawn from our measurements, and its numbers beside ours."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -43,7 +43,7 @@ def tasks(quick: bool) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        Small pictures; the figures are all there.
+        Whether pictures are small; all figures are computed either way.
     """
     models = (*CURVES, *RELATED)
     size = {"width": 120, "height": 90} if quick else {"width": 240, "height": 180}

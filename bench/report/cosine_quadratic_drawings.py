@@ -95,7 +95,7 @@ def map_drawing(number: str, model: str, found: dict[str, Any]) -> Drawing:
 
 
 def slope_drawing(found: dict[str, Any]) -> Drawing:
-    """Slopes that hold the error down, against the exponent."""
+    """Slopes with a small error, exact and by [C]'s line, against the exponent."""
     figure, (left, right) = panels(columns=2)
     n, exact, line = (np.array(found[name]) for name in ("exponents", "exact", "line"))
     left.plot(n, exact, color="black", label="k of fQ, Q = 0.64")

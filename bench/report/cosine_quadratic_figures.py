@@ -41,11 +41,11 @@ __all__ = [
 
 
 EXPONENTS = range(2, 1001)
-"""Exponents that [C] speaks of."""
+"""Range of exponents in [C]."""
 
 ZONE = 0.59363
-"""Least brightness of Blinn's model in the "epicentre zone", which [C] does not define: it gives the 7.924 %
-that [C] states for f2."""
+"""Least brightness of Blinn's model in the "epicentre zone", which [C] does not define. This value gives the
+7.924 % that [C] states for f2."""
 
 _X = np.linspace(0, 30, 6001)
 """``n (1 - cos gamma)``, on which the models depend almost alone; above 30 Blinn is below 1e-13."""
@@ -55,7 +55,7 @@ CURVES = ("cosquad", "cosquad_q", "cosquad_lin")
 SHOWN = (5, 20, 100)
 
 SEEN = 0.1
-"""Least brightness of Blinn's model for a relative error to be drawn."""
+"""Least brightness of Blinn's model at which relative errors are drawn."""
 
 RELATED = ("cosquad7", "coscos2", "coscos4")
 
@@ -73,13 +73,13 @@ class Published:
     Parameters
     ----------
     what : str
-        What it is of.
+        Name of the figure.
     published : str
-        As published, digit by digit.
+        The published number, digit by digit.
     key : tuple of str
-        Where ours is: the name of a measurement, and of a figure in it.
+        Key of our figure: name of a measurement, and of a figure in it.
     percent : bool
-        Whether it is published in per cent; ours is not.
+        Whether it is published in per cent; our figure is not.
     """
 
     what: str
@@ -113,8 +113,8 @@ def errors(model: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``absolute``, and ``absolute_exponent`` where it is; ``relative``: largest relative one in the zone;
-        ``by_exponent``: exponent, absolute and relative error of some exponents.
+        ``absolute``, and its exponent, ``absolute_exponent``; ``relative``: largest relative error in the
+        zone; ``by_exponent``: exponent, absolute and relative error of some exponents.
     """
     found = []
     for exponent in EXPONENTS:
@@ -140,8 +140,8 @@ def slopes() -> dict[str, Any]:
     Returns
     -------
     dict
-        ``exponents``, ``exact``, ``line``, and ``error``: largest relative one over all of `EXPONENTS`;
-        ``refitted``: that of ``0.44813 n + 0.10235``.
+        ``exponents``, ``exact``, ``line``, and ``error``: largest relative error over all of `EXPONENTS`;
+        ``refitted``: the same error of ``0.44813 n + 0.10235``.
     """
     every = np.array(EXPONENTS)
     exact, line, refitted = (
@@ -159,17 +159,17 @@ def slopes() -> dict[str, Any]:
 
 
 def coefficients() -> dict[str, Any]:
-    """Ideal coef(n) of fQ2, one over ``2 pi integral_0^1 S(c) c dc``, and what [C]'s line makes of it.
+    """Ideal coef(n) of fQ2, ``1/(2 pi integral_0^1 S(c) c dc)``, and [C]'s line for it.
 
-    With k the slope, ``S = (1 - k (1-c))^2`` down to ``z = max(1 - 1/k, 0)``, and the integral of ``S c`` is
-    taken in closed form.
+    With the slope k, ``S = (1 - k (1-c))^2`` down to ``c = max(1 - 1/k, 0)``; the integral is taken in closed
+    form.
 
     Returns
     -------
     dict
-        ``exponents``, ``ideal`` and ``line`` of some exponents; ``deviation``: largest of ``coef(n)`` times
-    With k the slope, ``S = (1 - k (1-c))^2`` down to ``max(1 - 1/k, 0)``; the integral of ``S c`` is taken in
-    closed form.
+        ``exponents``, ``ideal`` and ``line`` of some exponents; ``deviation``: largest relative error of the
+        line over `EXPONENTS`, and its exponent, ``deviation_exponent``; the ideal at n = 2, 3, 4, 5 and 10,
+        with n as a text for its key.
     """
     n = np.array(EXPONENTS, dtype=np.float64)
     k = np.array([REFLECTION_MODELS["cosquad_lin"].slope(value) for value in n])
@@ -196,12 +196,12 @@ def curves(exponent: int) -> dict[str, Any]:
     Parameters
     ----------
     exponent : int
-        n; angles go up to where Blinn's model is about ``exp(-6)``, or to 90 degrees.
+        n; angles go up to that at which Blinn's model is about ``exp(-6)``, or to 90 degrees.
 
     Returns
     -------
     dict
-        ``degrees``, and by model the brightness.
+        ``degrees``, and the brightness by model.
     """
     degrees = np.linspace(0, math.degrees(math.acos(max(1 - 6 / exponent, 0))), 121)
     cosine = np.cos(np.radians(degrees))
@@ -219,12 +219,12 @@ def map_of_errors(model: str, size: int) -> dict[str, Any]:
     model : str
         Reflection model.
     size : int
-        Angles, and exponents.
+        Number of angles, and of exponents.
 
     Returns
     -------
     dict
-        ``degrees``, ``exponents`` and ``error``, exponents first.
+        ``degrees``, ``exponents`` and ``error``, an array of exponents by angles.
     """
     degrees, exponents = np.linspace(0, 90, size), np.geomspace(2, 1000, size)
     cosine = np.cos(np.radians(degrees))
@@ -259,14 +259,15 @@ def pictures(body: str, exponent: int, width: int, height: int) -> dict[str, Any
     body : str
         ``"sphere"`` or ``"teapot"``.
     exponent : int
-        Of the highlight.
+        Exponent of the highlight.
     width, height : int
         Size of each picture.
 
     Returns
     -------
     dict
-        By model, ``png`` in base 64, and ``max_lsb``, ``p999_lsb`` and ``psnr_db`` against Blinn's.
+        For each model ``png`` in base 64, and ``max_lsb``, ``p999_lsb`` and ``psnr_db`` against Blinn's
+        picture.
     """
     mesh = sphere(48) if body == "sphere" else teapot(10_000)
     scene = scene_for(mesh, exponent, width, height)

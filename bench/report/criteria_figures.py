@@ -32,7 +32,7 @@ BAD_INPUT = (
     ("a picture without pixels", ("render", "teapot", "--size", "0x0")),
     ("a place that cannot be written", ("render", "teapot", "-o", "no/such/folder/a.png")),
 )
-"""What is asked, and the command line."""
+"""Bad inputs: a description, and the command line."""
 
 
 @lru_cache(maxsize=1)
@@ -47,17 +47,17 @@ def frame(triangles: int, size: Sequence[int], methods: Sequence[str]) -> dict[s
     Parameters
     ----------
     triangles : int
-        Of the teapot, about.
+        Number of triangles of the teapot, about.
     size : sequence of int
         Width and height.
     methods : sequence of str
-        Of `METHODS`.
+        Some of `METHODS`.
 
     Returns
     -------
     dict
-        ``triangles`` there are, and, by method, ``cycles``, ``pixels``, ``spans`` after cutting,
-        ``uncut_spans`` and ``latency``.
+        ``triangles``, their exact number, and for each method ``cycles``, ``pixels``, ``spans`` after
+        cutting, ``uncut_spans`` and ``latency``.
     """
     scene, raster = _rastered(triangles, *size)
     found: dict[str, Any] = {"triangles": len(scene.mesh.faces)}
@@ -83,12 +83,12 @@ def simulated(method: str) -> dict[str, int]:
 
 
 def resources(lights: int) -> dict[str, int]:
-    """What the default pipeline takes of a netlist with so many lights, see `Cost.totals`."""
+    """Resources of the default pipeline with a number of lights, before synthesis; see `Cost.totals`."""
     return cost_of(cycle_model.unit_of(preset("chord", MODEL, lights=lights))).totals
 
 
 def refused() -> list[dict[str, Any]]:
-    """What the command line does with each of `BAD_INPUT`: ``what``, ``status``, ``lines``, ``traceback``."""
+    """Response of the command line to each of `BAD_INPUT`: ``what``, ``status``, ``lines``, ``traceback``."""
     found = []
     for what, arguments in BAD_INPUT:
         said = io.StringIO()

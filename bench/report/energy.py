@@ -1,6 +1,6 @@
-"""What switches while a frame is shaded: toggled register bits a pixel, gate off and on, as a section.
+"""The report's section on switching: toggled register bits a pixel of a frame, without and with the gate.
 
-A proxy of energy: CMOS takes most of it when bits change. See `toggles` for what is counted.
+They are a proxy of energy: CMOS takes most energy when bits change. `toggles` says which bits are counted.
 """
 
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ def by_block(toggles: dict[str, int]) -> dict[str, int]:
     Parameters
     ----------
     toggles : dict
-        By path, as `ToggleCounter` has them.
+        Toggles by path, as `ToggleCounter` counts them.
     """
     owner = {name: block for block, names in BLOCKS.items() for name in names}
     totals = dict.fromkeys(BLOCKS, 0)
@@ -74,7 +74,7 @@ def measure(
     gate : bool
         Whether it has a highlight gate.
     exponents : sequence of int
-        One frame each.
+        Exponents, with a frame for each.
     size : sequence of int
         Width, height and triangles.
     engine : str
@@ -83,8 +83,8 @@ def measure(
     Returns
     -------
     list of dict
-        By exponent: ``spans``, ``pixels``, ``cycles``, ``toggles`` by submodule, and ``same``, whether the
-        pixels are those of the model.
+        For each exponent ``spans``, ``pixels``, ``cycles``, ``toggles`` by submodule, and ``same``: whether
+        the pixels are those of the bit-accurate model.
     """
     design = preset("chord", model, gate=gate)
     counter = ToggleCounter(ShadingPipelineUnit(design))
@@ -108,7 +108,7 @@ def measure(
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Each model without and with the gate; the quick ones by Amaranth's own simulator."""
+    """Measurements of each model without and with the gate; quick ones in Amaranth's own simulator."""
     exponents = EXPONENTS[1:2] if quick else EXPONENTS
     common = {"exponents": list(exponents), "size": list(_QUICK if quick else _FULL)}
     common["engine"] = "pysim" if quick else "auto"
@@ -117,7 +117,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """Toggles a pixel by block."""
+    """The section: toggles a pixel by block."""
     found: dict[tuple[str, int], dict[bool, dict]] = {}
     for task, result in zip(tasks, results, strict=True):
         for exponent, frame in zip(task.settings["exponents"], result, strict=True):

@@ -1,4 +1,4 @@
-"""The report's section on errata: what the documents print, what is right, and computed evidence for it."""
+"""The report's section on errata: the documents' statements, the right ones, and computed evidence."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -51,18 +51,18 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Erratum:
-    """Something that a document prints and that is not so.
+    """A wrong statement of a document, its correction, and evidence.
 
     Parameters
     ----------
     place : str
         Document and place.
     published, right : str
-        What is published, and what it should be.
+        The published statement, and the right one.
     quantity : str
-        What is computed, with its unit.
+        Name of the computed quantity, with its unit.
     evidence : callable
-        Computes it: from what is published, and from what is right.
+        Computes the quantity twice: by the published and by the right statement.
     """
 
     place: str
@@ -74,16 +74,16 @@ class Erratum:
 
 @dataclass(frozen=True)
 class Unmatched:
-    """A figure stated for the project that does not come out, or not to all of its digits.
+    """A figure stated for the project that cannot be reproduced, or not to all of its digits.
 
     Parameters
     ----------
     what : str
         The figure.
     stated : str
-        As it was stated.
+        The figure as stated.
     found : str
-        What was found instead, in words.
+        The finding, in words.
     values : callable
         Computes the figure as stated, and another that explains it.
     """
@@ -331,17 +331,17 @@ OWN = {
 
 
 def evidence(own: bool) -> dict[str, list[float]]:
-    """Evidence of each entry.
+    """Compute the evidence of each entry.
 
     Parameters
     ----------
     own : bool
-        Of `OWN`, else of `ERRATA`.
+        Whether of `OWN`, else of `ERRATA`.
 
     Returns
     -------
     dict
-        By name, two figures: see `Erratum` and `Unmatched`.
+        Two figures by name: see `Erratum` and `Unmatched`.
     """
     if own:
         return {name: list(figure.values()) for name, figure in OWN.items()}

@@ -1,4 +1,4 @@
-"""Figures that show each erratum of the documents: from what is published, and from what is right."""
+"""Evidence of each erratum of the documents: figures by the published and by the right statement."""
 
 import math
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ FACTOR_PUBLISHED = (0.707, -0.341, 0.193, -0.059)
 _ROOT_DOMAIN = (math.sqrt(2), 2.0)
 
 Evidence = tuple[float, float]
-"""The same quantity twice: as the document has it, and as it should be."""
+"""A quantity twice: by the published and by the right statement."""
 
 
 def _by_cosine(r: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ def arccos_claim() -> Evidence:
 
 
 def arccos_at_one() -> Evidence:
-    """Largest error in rad near x = 1: of a quadratic in x, and of one times the root of 1 - x."""
+    """Largest error in rad near x = 1: of a quadratic in x, and of a quadratic times the root of 1 - x."""
     x = 1 - np.geomspace(1e-12, 0.04, 4001)
     error = np.polynomial.polynomial.polyval(x, Arccos("corrected").coefficients[4]) - np.arccos(x)
     # The well-posed form, over the same x.
@@ -133,7 +133,7 @@ def factor_claim() -> Evidence:
 
 
 def highlight_loss(exponent: int) -> Evidence:
-    """LSB lost at the peak of a highlight on a flat face, by the plain fit and by one held at angle 0."""
+    """LSB lost at the peak of a highlight on a flat face: by the plain fit, and by a fit exact at angle 0."""
 
     def lost(factor: float) -> float:
         return 255 * (1 - float(REFLECTION_MODELS["cosquad"].reflect(2 * factor, exponent)))
@@ -150,14 +150,14 @@ def second_lobe() -> Evidence:
 
 
 def shortcut(degrees: float) -> Evidence:
-    """``1 - cos d`` of the published shortcut over the exact one, for a span of so many degrees; and 1."""
+    """Ratio of ``1 - cos d`` by the published shortcut to the exact value, for a span's angle; and 1."""
     angle, steps = math.radians(degrees), 1000
     exact = 2 * math.sin(angle / steps / 2) ** 2
     return float((1 - shortcut_cosine(angle, steps)) / exact), 1.0
 
 
 def recurrence(pixels: int, degrees: float, bits: int) -> Evidence:
-    """Worst error over a span, as drawn and in Reinsch's form; the peak at 0.79 of the span."""
+    """Worst error of a recurrence over a span, with its peak at 0.79: as drawn, and in Reinsch's form."""
     angle = math.radians(degrees)
     step = angle / (pixels - 1)
     exact = np.cos(0.79 * angle - step * np.arange(pixels))
@@ -218,7 +218,7 @@ def extrapolated_end() -> Evidence:
 
 
 def scaled_twice() -> Evidence:
-    """The same span, turned so that x and z change: ``dN.x`` scaled twice, ``dN.z`` never."""
+    """Largest error at the end of the same span: with ``dN.x`` scaled twice and ``dN.z`` not, and correct."""
     angle, pixels = math.radians(10), 6
     left, right = np.array([0.0, 0, 1]), np.array([math.sin(angle), 0, math.cos(angle)])
     scale = 1 / (pixels - 1)
@@ -230,7 +230,7 @@ def scaled_twice() -> Evidence:
 
 
 def wrong_variable() -> Evidence:
-    """A plane ``P0 x + P1 y + P2`` through three corners, with ``P1 x`` for ``P1 y``: error at a corner."""
+    """Largest error of ``P0 x + P1 y + P2`` at its three corners: with ``P1 x`` for ``P1 y``, and right."""
     corners = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
     values = np.array([0.2, 0.4, 0.9])
     plane = np.linalg.solve(corners, values)
@@ -254,7 +254,7 @@ def tangent() -> Evidence:
 
 
 def energy(model: str, exponent: int) -> Evidence:
-    """Reflected energy, which the factor is to make 1: with the published one and the right one."""
+    """Reflected energy, ideally 1: with the published energy factor, and with the right one."""
     half = 2 if model == "blinn" else 1
     reflected = quad(
         lambda t: math.cos(t / half) ** exponent * math.cos(t) * math.sin(t), 0, math.pi / 2, epsabs=1e-13
@@ -268,7 +268,7 @@ def energy(model: str, exponent: int) -> Evidence:
 
 
 def mirror() -> Evidence:
-    """Length of R by vector products, as published, and by scalar ones; L at 54.7 degrees."""
+    """Length of R for L at 54.7 degrees: by vector products, as published, and by scalar products."""
     normal, light = np.array([0.0, 0, 1]), normalise(np.array([1.0, 1, 1]))
     published = 2 * np.cross(np.cross(light, normal), normal) - light
     right = 2 * (light @ normal) * normal - light
@@ -276,19 +276,19 @@ def mirror() -> Evidence:
 
 
 def zone_error(bound: float) -> float:
-    """Largest relative error of f2 where Blinn is at the bound or above, n from 2 to 1000."""
+    """Largest relative error of f2 where Blinn's model is at least ``bound``, for n from 2 to 1000."""
     exponents = np.arange(2, 1001)
     base = exponents / 2 * np.expm1(math.log(bound) / exponents) + 1
     return float(np.max(1 - base**2 / bound))
 
 
 def undefined_zone() -> Evidence:
-    """Largest relative error in the zone: as claimed, and of the zone that is found to fit."""
+    """Largest relative error in the zone: as claimed, and with the zone that fits the claim, `ZONE`."""
     return 0.07924, zone_error(ZONE)
 
 
 def four_times() -> Evidence:
-    """Exponent of Blinn over that of Phong: as published, and at 40 degrees."""
+    """Ratio of Blinn's exponent to Phong's: as published, and at 40 degrees."""
     return 4.0, float(exponent_ratio(math.cos(math.radians(40))))
 
 
@@ -298,12 +298,12 @@ def octaves() -> Evidence:
 
 
 def zone_bounds() -> Evidence:
-    """Largest relative error where Blinn is at least 0.594, and the bound at which it is 7.924 %."""
+    """Largest relative error where Blinn's model is at least 0.594, and the bound that gives 7.924 %."""
     return zone_error(0.594), float(brentq(lambda bound: zone_error(bound) - 0.07924, 0.5, 0.7))
 
 
 def quadratic_length() -> Evidence:
-    """Largest error of the length of a quadratic normal at 45 degrees, and where it is in the span."""
+    """Largest error of the length of a quadratic normal at 45 degrees, and its place in the span, 0 to 1."""
     angle = math.radians(45)
     ends = np.array([0.0, 0, 1]), np.array([math.sin(angle), 0, math.cos(angle)])
     t = np.linspace(0, 1, 100_001)
@@ -313,7 +313,7 @@ def quadratic_length() -> Evidence:
 
 
 def held_root() -> Evidence:
-    """Largest error of three terms for ``1/sqrt(2 + z)``, exact at angle 0: as shown, and the best ones."""
+    """Largest error of a cubic for ``1/sqrt(2 + z)``, exact at angle 0: as shown, and with the best terms."""
 
     def gap(v):
         return reciprocal_root(2 - v)

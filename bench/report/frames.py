@@ -54,7 +54,7 @@ __all__ = [
 
 
 EXPONENTS = accuracy.EXPONENTS
-"""Those of the full report."""
+"""Exponents of the full report."""
 
 _KINDS = {
     "model": "model error",
@@ -129,7 +129,7 @@ def _digest(mesh: Mesh) -> str:
 
 
 def scenes_of(view: Mapping[str, Any], exponents: Sequence[int]) -> list[Scene]:
-    """Scenes of `scene_for`, one for each exponent, of what `view_of` gives."""
+    """Scenes of `scene_for` for a view of `view_of`, one for each exponent."""
     mesh = _mesh(view["source"], view["triangles"])
     return [scene_for(mesh, exponent, view["width"], view["height"]) for exponent in exponents]
 
@@ -147,7 +147,8 @@ def frames(
     Each error is between two images, over the pixels that show the surface:
 
     - ``model``: Phong shading (normals interpolated over the triangle and normalised at every pixel, as on a
-      GPU) with the design's model, against the same with Blinn's; both in float64. No arithmetic cures it;
+      GPU) with the design's model, against the same with Blinn's model; both in float64. It does not depend
+      on the arithmetic;
     - ``arithmetic``: the frame against the same method and model in float64; coefficients as published
       count as arithmetic;
     - ``method``: the frame against Phong shading with the same model;
@@ -156,23 +157,23 @@ def frames(
     Parameters
     ----------
     method, model : str
-        Of a `Design`.
+        Method and model of a `Design`.
     view : dict
         ``source`` and ``triangles`` of the mesh (see `load_mesh`; ``None`` for a file), ``digest``
-        of its arrays, by which the result is kept, ``width`` and ``height`` of the picture.
+        of its arrays, part of the result's key in the cache, ``width`` and ``height`` of the picture.
     exponents : sequence of int
-        One frame each.
+        Exponents, with a frame for each.
     simulated : bool
-        Whether the frames are simulated; else they are those of the bit-accurate model, equal to the bit.
+        Whether the frames are simulated; else the bit-accurate model computes them, equal to the bit.
     operand : str, optional
-        Of the specular unit, where it is not that of the method.
+        Operand of the specular unit, if it is not that of the method.
 
     Returns
     -------
     list of dict
-        By exponent: ``settings``, ``errors`` (keys of `ERRORS`; no PSNR of equal images), ``verdicts``
-        (``total``, ``method``: whether they look identical), ``pictures`` (see `section`), ``pixels`` shaded,
-        ``shown`` ones, ``spans``, ``out_of_range_spans``, ``cycles`` (``None`` if not
+        For each exponent ``settings``, ``errors`` (keys of `ERRORS`; no PSNR of equal images), ``verdicts``
+        (whether both images look identical, by kind of error), ``pictures`` (see `section`), shaded
+        ``pixels``, ``shown`` pixels, ``spans``, ``out_of_range_spans``, ``cycles`` (``None`` if not
         simulated) and ``modelled_cycles``, by `frame_cycles`.
     """
     design = preset(method, model, operand=operand)
@@ -201,7 +202,7 @@ def frames(
 def software_frames(shading: str, view: Mapping[str, Any], exponents: Sequence[int]) -> list[dict[str, Any]]:
     """Frames of the golden renderer with Blinn's model, rounded to 8 bits: errors and pictures.
 
-    Errors are those of `frames`; the model's is 0, and the arithmetic error that of rounding the frame.
+    Errors are those of `frames`; the model error is 0, the arithmetic error that of rounding the frame.
 
     Parameters
     ----------
@@ -284,7 +285,7 @@ def _judged(
 
 
 def hardware(method: str, model: str, operand: Operand | None = None) -> dict[str, int]:
-    """What the pipeline of a design takes before technology mapping, and its ``latency`` in cycles.
+    """Resources of a design's pipeline before technology mapping, and its ``latency`` in cycles.
 
     Returns
     -------
@@ -313,8 +314,8 @@ def speeds(
     Returns
     -------
     list of dict
-        By exponent: ``simulated_pixels_per_second``, pixels that come out of the simulated pipeline, hidden
-        ones included, in a second of its simulation (``None`` if not simulated), and ``golden_ns_per_pixel``,
+        For each exponent ``simulated_pixels_per_second``, output pixels of the simulated pipeline, with
+        hidden ones, a second of simulation (``None`` if not simulated), and ``golden_ns_per_pixel``,
         nanoseconds a shown pixel to shade the same spans by the same method and model in float64 NumPy.
     """
     design = preset(method, model, operand=operand)
@@ -339,7 +340,7 @@ def speeds(
 def software_speeds(
     shading: str, view: Mapping[str, Any], exponents: Sequence[int]
 ) -> list[dict[str, float | None]]:
-    """Run times of `software_frames`, as from `speeds`."""
+    """Run times of `software_frames`, in the form of `speeds`."""
     results = []
     for scene in scenes_of(view, exponents):
         raster = rasterise(scene)
@@ -393,7 +394,7 @@ def _pictures(image: np.ndarray, references: Mapping[str, np.ndarray], mask: np.
 
 
 def _largest(values: np.ndarray, factor: int) -> np.ndarray:
-    """Largest value of each square of pixels: an error stays visible in a smaller picture."""
+    """Largest value of each square of pixels, so that an error stays visible in a smaller picture."""
     height, width = (-(-side // factor) for side in values.shape)
     padded = np.zeros((height * factor, width * factor))
     padded[: values.shape[0], : values.shape[1]] = values
@@ -401,14 +402,14 @@ def _largest(values: np.ndarray, factor: int) -> np.ndarray:
 
 
 def view_of(source: str, triangles: int, width: int, height: int) -> dict[str, Any]:
-    """What a frame shows, as settings of a `Task`: a mesh, with a hash of it, and a size.
+    """View of frames, as settings of a `Task`: a mesh, its hash, and a size.
 
     Parameters
     ----------
     source : str
         ``"teapot"`` or a mesh file.
     triangles : int
-        Of the teapot.
+        Triangles of the teapot, about.
     width, height : int
         Size of the picture.
 

@@ -1,4 +1,4 @@
-"""Error against run time over several meshes, sizes and exponents: the front, as sentence, drawing, table."""
+"""Pareto front of error against run time over several meshes, sizes and exponents: text, drawing, table."""
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from statistics import median
@@ -18,12 +18,12 @@ __all__ = ["conclusion", "spread_table", "summaries"]
 def summaries(
     points: Sequence[Mapping[str, Any]], spread: Mapping[tuple, Sequence[dict]]
 ) -> list[dict[str, Any]]:
-    """A dictionary a hardware design, over all scenes in which it was measured.
+    """Summary of each hardware design over all scenes in which it was measured.
 
     Parameters
     ----------
     points : sequence of dict
-        Those of the report.
+        Points of the report.
     spread : mapping
         Results of `front_scenes.measure` by method, model and perhaps operand.
 
@@ -85,7 +85,7 @@ _ALIKE_LSB, _ALIKE_TIMES = 0.15, 1.05
 
 
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
-    """The front of the largest total error, over all scenes, against cycles a pixel, in a few sentences."""
+    """Sentences on the front of the largest total error over all scenes against cycles a pixel."""
     timed = [of for of in found if of["cycles"]]
     if not timed:
         return None
@@ -164,7 +164,7 @@ def _costs(of: Mapping[str, Any]) -> str:
 
 
 def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
-    """Both errors side by side, against nanoseconds where most designs have been placed, else cycles."""
+    """Drawing of both errors against nanoseconds, if most designs have been placed, else against cycles."""
     # Where there are several scenes, a design of one is not comparable.
     several = [of for of in found if of["samples"] > 1]
     found = several if len(several) > 2 else found
@@ -261,7 +261,7 @@ def _short(of: Mapping[str, Any]) -> str:
 
 
 def _named(found: Sequence[Mapping[str, Any]], on: Container[str], kind: str) -> list[Mapping[str, Any]]:
-    """Which get a label, the more important first: the front, then the best and the worst of each method."""
+    """Designs that get a label, the more important first: the front, then each method's best and worst."""
     chosen = sorted((of for of in found if of["label"] in on), key=lambda of: of[kind][1])
     for method in dict.fromkeys(of["method"] for of in found):
         own = sorted((of for of in found if of["method"] == method), key=lambda of: of[kind][1])
@@ -272,7 +272,7 @@ def _named(found: Sequence[Mapping[str, Any]], on: Container[str], kind: str) ->
 
 
 def spread_table(found: Sequence[Mapping[str, Any]]) -> Table:
-    """What `summaries` gives, a row a design."""
+    """Table of `summaries`, a row for each design."""
     on_front = {of["label"] for of in _front([of for of in found if of["cycles"]], "total_error")}
     columns = ["design", "group", "on the front", "scenes"]
     columns += ["method error, smallest, LSB", "method error, largest, LSB"]

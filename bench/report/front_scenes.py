@@ -1,4 +1,4 @@
-"""Designs over several meshes, sizes and exponents: errors by the model, cycles by the cycle model."""
+"""Designs over several meshes, sizes and exponents: errors and cycles, without simulation."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -46,14 +46,14 @@ def measure(
     Parameters
     ----------
     method, model, operand
-        Of `preset`.
+        Arguments of `preset`.
     scenes : sequence
-        As `QUICK_SCENES`.
+        Scenes in the form of `QUICK_SCENES`.
 
     Returns
     -------
     list of dict
-        A scene and exponent each: ``mesh``, ``triangles``, ``width``, ``height``, ``exponent``,
+        For each scene and exponent ``mesh``, ``triangles``, ``width``, ``height``, ``exponent``,
         ``method_max_lsb``, ``total_max_lsb``, ``spans`` after cutting, ``uncut_spans``, ``pixels``,
         ``cycles``.
     """

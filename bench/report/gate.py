@@ -1,13 +1,13 @@
-"""What the highlight gate saves: pixels, cycles of the compact style, and toggled register bits.
+"""Savings of the highlight gate: pixels, cycles of the compact style, and toggled register bits.
 
 ``python -m blysk.bench.report.gate [MESH ...]`` renders each mesh (the teapot by default) at 320x240 by the
 chord method with one light, for the models cosquad, coscos4 and blinn and the exponents 2, 10, 50, 200 and
 1000, in the compact and the throughput style, without and with the gate. It prints three tables in Markdown:
-how many spans and pixels are gated, the cycles, and the register bits that change. The exit status is 1 when
-a frame is not the same, to the bit, in all four simulations and by the model; 2 for bad input.
+gated spans and pixels, cycles, and toggled register bits. The exit status is 1 if a frame is not equal, to
+the bit, in all four simulations and by the bit-accurate model; 2 for bad input.
 
-Toggles are those of registers: what happens inside a multiplier between two of them is not counted. The gate
-works once a span and saves once a pixel, so it is the frame's spans that decide which is more.
+Toggles are of registers: changes inside a multiplier between two registers are not counted. The gate works
+once a span and saves once a pixel, so the lengths of the frame's spans decide whether it saves toggles.
 """
 
 import sys
@@ -60,21 +60,20 @@ _GATE = ("interpolator.chord_spans.value_gate", "interpolator.chord_spans.decisi
 
 @dataclass(frozen=True)
 class Shares:
-    """How much of a frame the gate keeps from the specular unit, and how much it could, by the model.
+    """Spans and pixels of a frame that the gate keeps from the specular unit, and upper limits of them.
 
     Parameters
     ----------
     spans, pixels : int
-        Of the frame; spans of length 0 do not count.
+        Numbers of the frame; spans of length 0 do not count.
     gated_spans, gated_pixels : int
-        Those that the gate tells to be dark.
+        Spans that the gate finds dark, and their pixels.
     dark_spans, dark_span_pixels : int
-        Spans in which no pixel has a specular term over 0, and their pixels: the most that a gate of spans
-        could tell.
+        Spans in which no pixel has a specular term over 0, and their pixels: the limit of a gate for spans.
     dark_pixels : int
-        Pixels whose specular term is 0: the most that any gate could.
+        Pixels whose specular term is 0: the limit of any gate.
     behind_pixels : int
-        Those of them whose light is behind the surface. They are dark without a gate.
+        Pixels whose light is behind the surface, which are dark without a gate, too.
     """
 
     spans: int
@@ -97,7 +96,7 @@ class Activity(NamedTuple):
     gate : int
         Inside the gate and the FIFO of its decisions.
     pipeline : int
-        In the whole pipeline, both of these included.
+        In the whole pipeline, with specular unit and gate.
     """
 
     specular: int
@@ -107,22 +106,23 @@ class Activity(NamedTuple):
 
 @dataclass(frozen=True)
 class GateRow:
-    """A frame without and with the gate: pairs are in this order.
+    """A frame without and with the gate; pairs are in this order.
 
     Parameters
     ----------
     mesh, model : str
-        What is drawn, and the reflection model.
+        Names of the mesh and the reflection model.
     exponent : int
-        Of the highlight.
+        Exponent of the highlight.
     shares : Shares
-        What is gated.
+        Gated and dark parts of the frame.
     cycles, compact_cycles : pair of int
-        Of the throughput and of the compact style, from the first write of a constant to the last pixel.
+        Cycles of the throughput and of the compact style, from the first write of a constant to the last
+        pixel.
     activity : pair of Activity
-        Of the throughput style.
+        Toggles of the throughput style.
     identical : bool
-        Whether the pixels of all four simulations, hidden ones too, are those of the model.
+        Whether the pixels of all four simulations, hidden ones too, equal those of the bit-accurate model.
     """
 
     mesh: str
@@ -136,7 +136,7 @@ class GateRow:
 
 
 def shares_of(design: Design, spans: Spans, constants: FrameConstants) -> Shares:
-    """Count what the gate of a design of one light and one material would do; it need not have one."""
+    """Shares of a frame by the bit-accurate gate, for one light and material; the design may have no gate."""
     spans = spans[np.flatnonzero(spans.length)]
     length = np.asarray(spans.length, dtype=np.int64)
     operands = design.operands(spans, constants)
@@ -160,16 +160,16 @@ def shares_of(design: Design, spans: Spans, constants: FrameConstants) -> Shares
 def frames(
     units: Sequence[Component], spans: Spans, constants: FrameConstants, engine: str = "cxxrtl"
 ) -> list[Run]:
-    """Send spans through pipelines of one material, or toggle counters of such.
+    """Simulate pipelines of one material, or toggle counters of such pipelines, with the same spans.
 
     Parameters
     ----------
     units : sequence of Component
         Pipelines.
     spans : Spans
-        What each gets.
+        Input of each.
     constants : FrameConstants
-        Written first.
+        Constants that are written first.
     engine : str
         As `simulate` takes it.
     """
@@ -178,14 +178,14 @@ def frames(
 
 
 def same_pixels(run: Run, expected: Pixels) -> bool:
-    """Whether a run gave such pixels: view, colour and mark of a span's end of each, in their order."""
+    """Whether a run's pixels are the expected ones in order: coordinates, colour, mark of a span's end."""
     fields = {name: getattr(expected, name) for name in ("x", "y", "last")}
     fields |= {name: expected.color[:, channel] for channel, name in enumerate("rgb")}
     return all(np.array_equal(run.beats[name], codes) for name, codes in fields.items())
 
 
 class GateUnits:
-    """The four pipelines of a model, which serve every mesh and exponent.
+    """The four pipelines of a reflection model, which serve every mesh and exponent.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ class GateUnits:
         self._compact = [ShadingPipelineUnit(design.built(style="compact")) for design in designs]
 
     def compare(self, name: str, scene: Scene) -> GateRow:
-        """A scene of one light and one material through all four."""
+        """Row of a scene of one light and one material, simulated by all four pipelines."""
         spans = prepare(scene, self.design).spans
         constants = FrameConstants.of(scene, 1)
         expected = self.design.compute(spans, constants)
@@ -249,9 +249,9 @@ def measure(
     Parameters
     ----------
     meshes : sequence of blysk.sim.meshes.mesh.LoadedMesh
-        What is drawn.
+        The meshes.
     models, exponents : sequences
-        See `GateUnits`; an exponent is a constant of the frame, and needs no model of its own.
+        Reflection models and exponents. An exponent is a frame constant, and needs no pipeline of its own.
     width, height : int
         Size of a frame.
     engine : str
@@ -349,7 +349,7 @@ def _print(rows: Sequence[GateRow]) -> None:
 )
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
 def _command(meshes, size, models, exponents, figures) -> int:
-    """Measure what the highlight gate saves: pixels, cycles, and toggled register bits."""
+    """Measure the savings of the highlight gate: pixels, cycles, and toggled register bits."""
     if figures:
         check_writable(figures)
     loaded = [load_mesh(source) for source in meshes or ["teapot"]]
@@ -370,12 +370,12 @@ def _figures(row: GateRow) -> dict:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the tables, and judge.
+    """Print the tables, and compare the frames.
 
     Returns
     -------
     int
-        0; 1 when a frame differs or a simulation goes wrong, 2 for bad input, told in one line.
+        0; 1 if a frame differs or a simulation fails; 2 for bad input, printed in one line.
     """
     return run(_command, "blysk.bench.report.gate", arguments)
 

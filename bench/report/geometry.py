@@ -1,4 +1,4 @@
-"""Two whole designs from triangles to pixels: true normals and chord, true lines and renormalisation.
+"""Comparison of designs from triangles to pixels: exact normals with chord, exact lines with renormalisation.
 
 `python -m blysk.bench.report.geometry` prints the table of docs/theory/geometry.md: costs before synthesis,
 cycles of simulated frames, and errors of the bit-accurate models, which are those of the hardware.
@@ -36,13 +36,13 @@ class Candidate:
     Parameters
     ----------
     method : str
-        Of shading.
+        Method of shading.
     style : str
-        Of geometry and shading.
+        Style of geometry and shading.
     setup_interval : int or None
-        Of shading.
+        Setup interval of shading.
     setups : int
-        Lanes of the triangle setup.
+        Lanes of triangle setup.
     """
 
     method: str
@@ -58,7 +58,7 @@ class Candidate:
 
     @property
     def unit(self) -> RenderUnit:
-        """Its hardware; the memory of depths is outside."""
+        """Its hardware, without the memory of depths."""
         return RenderUnit(self.renderer, setups=self.setups)
 
 
@@ -70,7 +70,7 @@ CANDIDATES = {
     "chord, compact": Candidate("chord", style="compact"),
     "renormalise, compact": Candidate("renormalise", style="compact"),
 }
-"""What is compared."""
+"""Designs to compare, by name."""
 
 
 def cost(candidate: Candidate) -> tuple[int, Cost]:
@@ -91,7 +91,7 @@ def frames(candidate: Candidate) -> Iterator[SimulatedTriangleFrame]:
 
 
 def largest_error(candidate: Candidate, triangles: int) -> float:
-    """Against exact normals of every pixel with the same model, in LSB, the largest over `EXPONENTS`."""
+    """Largest method error over `EXPONENTS` in LSB: against exact normals at every pixel, same model."""
     renderer, errors = candidate.renderer, []
     for exponent in EXPONENTS:
         drawn = _scene(triangles, exponent=exponent)

@@ -51,13 +51,13 @@ __all__ = [
 ]
 
 SIZES = ((8, 16), (12, 16), (12, 32), (14, 32), (15, 16), (15, 32), (20, 16))
-"""Octaves and steps."""
+"""Sizes of the table to compare: octaves, and steps of each."""
 
 MESHES = ("teapot", "sphere", "torus", "waves")
 """Surfaces of the frames."""
 
 FRONT = ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")
-"""Models of the pipelines that are compared: the table, and its baselines."""
+"""Models of the pipelines to compare: the exact table, and its baselines."""
 
 EXPONENTS = (1, 10, 100, 1000)
 
@@ -66,7 +66,7 @@ ROUGHNESSES = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
 
 @dataclass(frozen=True)
 class Case:
-    """A model, and the exponents or alphas of its table."""
+    """A reflection model, and the exponents or alphas of its tables."""
 
     model: ReflectionModel
     label: str
@@ -82,7 +82,7 @@ CASES = (
     Case(BECKMANN, "alpha", (0.03, 0.1, 0.3, 0.6, 1)),
     Case(GGX, "alpha", (0.0025, 0.01, 0.03, 0.05, 0.1, 0.3, 0.6, 1)),
 )
-"""What the columns of the table are of."""
+"""Models and values of the columns of the table of sizes."""
 
 
 def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> float:
@@ -91,11 +91,11 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
     Parameters
     ----------
     lobe : Lobe
-        Of the operand ``one_minus_cosine``.
+        A lobe with the operand ``one_minus_cosine``.
     parameter : float or None
-        Of the model.
+        Parameter of the model.
     samples : int
-        Arguments in each step of the table, from its first to its last; all where there are no more.
+        Sampled operands in each step of the table, with its first and last; all of them in a smaller step.
     """
     knots = np.ldexp(lobe.knots, lobe.fraction_bits).astype(np.int64)
     first, last = knots[:-1, np.newaxis], knots[1:, np.newaxis] - 1
@@ -108,7 +108,7 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
 
 
 def errors_of_size(octaves: int, steps: int, samples: int = 256) -> list[list[float]]:
-    """For each of `CASES` its largest errors, see `largest_error`."""
+    """Largest errors of a table size for each of `CASES`, see `largest_error`."""
     lobe = Lobe(BLINN, "one_minus_cosine", octaves, steps)
     return [
         [
@@ -183,19 +183,19 @@ def frame_errors(
     mesh : str
         One of `MESHES`.
     model : str
-        Of `MODELS` or `LOBES`.
+        One of `MODELS` or `LOBES`.
     values : sequence of float
-        Exponents, or roughnesses of a model that has them.
+        Exponents, or roughnesses if the model has them.
     size : two ints
         Width and height.
 
     Returns
     -------
     list of dict
-        For each value: ``units``, against the method and the model in float64; ``total``, against the exact
-        frame, which is Blinn's, or of the model itself where a table has it; ``total_spans``, the same for
-        exact arithmetic and the exact model: what the spans of the method alone cost; ``everywhere``, the
-        total without regard to N·L.
+        For each value ``units``: error against method and model in float64; ``total``: error against the
+        exact frame, with Blinn's model, or with the model itself if it has a table; ``total_spans``: the same
+        error of the method in exact arithmetic with the exact model; ``everywhere``: the total error at
+        any N·L.
     """
     design, surface, found = preset("chord", model), mesh_of(mesh), []
     target = design.specular.model if design.loads_tables else BLINN
@@ -229,7 +229,7 @@ def frame_errors(
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Errors by size, costs of units and pipelines, errors of frames."""
+    """Measurements: errors by table size, costs of units and pipelines, errors of frames."""
     size = [160, 120] if quick else [640, 480]
     found = [
         Task(errors_of_size, {"octaves": octaves, "steps": steps, "samples": 16 if quick else 256})
@@ -247,7 +247,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """Tables of errors and costs, and the front."""
+    """The section: tables of errors and costs, and the drawing of the front."""
     made: dict[str, list[tuple[dict, Any]]] = {}
     for task, result in zip(tasks, results, strict=True):
         made.setdefault(task.function.__name__, []).append((task.settings, result))
@@ -329,7 +329,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _front(pipelines: dict[str, dict], worst: dict[str, float]) -> Drawing:
-    """Multipliers against the largest error."""
+    """Drawing of the largest error against the number of multipliers."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 3.6), layout="constrained")

@@ -1,4 +1,4 @@
-"""What sample scenes do not need: what their pipelines go without, and what that saves, as a section."""
+"""The report's section on specialisation: parts that sample scenes do not need, and the savings."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -91,8 +91,8 @@ SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]
     ),
     "teapot beside a lamp": (_lamp, {"method": "chord-local", "model": "cosquad_lin"}),
 }
-"""Scenes of a width, a height and about so many triangles; and the full pipeline, where it is not the chord
-method with the model cosquad and a highlight gate.
+"""Scenes, as functions of width, height and number of triangles (about), and options of the full pipeline; by
+default it is the chord method with the model cosquad and a highlight gate.
 """
 
 QUICK_SCENES = (
@@ -115,7 +115,9 @@ def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]
 
 
 def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
-    """Reductions of a scene's pipeline, each alone and all, and its frame against the full one's, by models.
+    """Savings of a scene's reductions, each alone and together, and its frame against the full pipeline's.
+
+    Both frames are those of the bit-accurate models.
 
     Parameters
     ----------
@@ -124,13 +126,13 @@ def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
     size : sequence of int
         Width, height and triangles.
     steps : bool
-        Whether each thing that is left out is counted on top of those before it; else all together.
+        Whether the savings are counted step by step, each reduction after those before it; else all at once.
 
     Returns
     -------
     dict
-        Those of `saving_figures` and `difference_figures`, and ``reasons``, what is left out and why,
-        ``alone``, what each saves by itself, in the netlist, ``method``, ``model`` and ``pixels``.
+        Figures of `saving_figures` and `difference_figures`; ``reasons`` of the reductions; ``alone``,
+        resources that each reduction saves by itself; ``method``, ``model`` and ``pixels``.
     """
     scene, found = _specialised(name, size)
     full, smaller = model_frame(scene, found.full), model_frame(found.scenes[0], found.design)
@@ -166,7 +168,7 @@ def simulate_both(name: str, size: Sequence[int]) -> dict[str, int]:
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Each scene by models and, if it need not be quick, by simulation."""
+    """Measurements of each scene by the bit-accurate models and, if not quick, by simulation."""
     size = list(_QUICK if quick else _FULL)
     settings = [{"name": name, "size": size} for name in (QUICK_SCENES if quick else SCENES)]
     counted = [Task(measure, each | {"steps": not quick}) for each in settings]
@@ -174,7 +176,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """What each scene goes without, what that saves, and whether its frame is the full pipeline's."""
+    """The section: reductions of each scene, their savings, and whether its frame stays the same."""
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
         # Pixels that differ in either are worth telling.
@@ -199,7 +201,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _shares_alone(found: dict[str, dict]) -> dict[str, list[tuple[str, dict[str, float]]]]:
-    """By kind of omission: scene, and share of each resource that it saves alone."""
+    """For each kind of reduction the scenes, and the share of each resource that it saves alone."""
     shares: dict[str, list[tuple[str, dict[str, float]]]] = {}
     for name, of in found.items():
         for reason, saves in zip(of["reasons"], of["alone"], strict=True):
@@ -210,7 +212,7 @@ def _shares_alone(found: dict[str, dict]) -> dict[str, list[tuple[str, dict[str,
 
 
 def _conclusion(found: dict[str, dict]) -> Conclusion:
-    """What leaving out saves, by scene, and the single omission that saves most."""
+    """Least and largest saving of a scene, and the single reduction that saves most."""
     least, most = (of(found, key=lambda name: _left(found[name], "cells")) for of in (min, max))
 
     def says(name):
@@ -290,7 +292,7 @@ def _alone(found: dict[str, dict]) -> Table:
 
 
 def _left(figures: dict, resource: str) -> float:
-    """Share of a resource that stays; of one that the full pipeline does not have, all."""
+    """Share of a resource that stays; 1 if the full pipeline has none of it."""
     full = figures["full"][resource]
     return figures["specialised"][resource] / full if full else 1.0
 

@@ -1,4 +1,4 @@
-"""The report as one page of HTML: its template, and values as a reader wants them."""
+"""The report as one page of HTML: its template, and numbers in readable form."""
 
 import base64
 import functools
@@ -46,17 +46,17 @@ AXES = {
     "golden_ns_per_pixel": "Time of the same method and model in float64 NumPy on this machine, over the "
     "pixels that show.",
 }
-"""What the measures of a point mean: by kind of error, by figure, and by run time. A sentence each."""
+"""Explanations of a point's measures, a sentence each: by kind of error, by figure, and by run time."""
 
 _DIGITS = 4
-"""That count, of a number as the page has it."""
+"""Significant digits of a number in the page."""
 
 
 # The page.
 
 
 def shown(value: Cell) -> str:
-    """A value as a reader wants it: numbers with four digits that count, thousands apart.
+    """Text of a value: numbers with four significant digits and separated thousands.
 
     Parameters
     ----------
@@ -98,23 +98,23 @@ def _kinds(table: Table) -> list[str]:
 
 
 def _data_uri(svg: str) -> str:
-    """A drawing on its own: class names in it mean nothing outside."""
+    """A drawing as a data URI, so that its class names do not act on the page."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
 
 
 def embedded(value: Any) -> str:
-    """JSON that may stand in a script element.
+    """JSON of a value, safe inside a script element.
 
     Parameters
     ----------
     value
-        Of what JSON has.
+        A value that JSON can hold.
     """
     return json.dumps(value, allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
 
 
 def without_pictures(value: Any) -> Any:
-    """Figures without the pictures in them, which are in the page."""
+    """Figures without their pictures, which the page holds already."""
     if isinstance(value, Mapping):
         return {
             key: without_pictures(item)
@@ -172,10 +172,10 @@ def page(sections: Sequence[Section], about: Mapping[str, Any]) -> str:
     Parameters
     ----------
     sections : sequence of Section
-        In their order, appendices last. One with ``points`` among its figures (see `section`) has the
-        drawing of error against run time. Conclusions stand at the top.
+        Sections in their order, appendices last. A section with ``points`` among its figures (see
+        `points.section`) gets the drawing of error against run time. Conclusions are at the top.
     about : dict
-        See `about`.
+        See `report.about`.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""Every method with every reflection model: simulated pixels beside those of the model.
+"""Every method with every reflection model: simulated pixels against those of the bit-accurate model.
 
 ``python -m blysk.bench.report.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
-exponents 1, 30 and 1000 with each pair, without specular light too, in the compiled engine, and compares
-every pixel that comes out, hidden ones too, with `Design.compute`. It prints a line a pair. The exit
-status is 1 when a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
+exponents 1, 30 and 1000 with each pair, also without specular light, in the compiled engine, and compares
+every output pixel, hidden ones too, with `Design.compute`. It prints a line for each pair. The exit status is
+1 if a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
 """
 
 import argparse
@@ -33,7 +33,7 @@ EXPONENTS = (1, 30, 1000)
 
 @dataclass(frozen=True)
 class Pair:
-    """A method and a model, and how their frames compare.
+    """A method and a model, and the comparison of their frames.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ class Pair:
     model : str or None
         Reflection model; ``None``: no specular light.
     frames, pixels : int
-        What was compared.
+        Numbers of compared frames and pixels.
     mismatches : int
-        Pixels that differ from the model's in view, colour or mark of a span's end.
+        Pixels that differ from the bit-accurate model's in coordinates, colour or mark of a span's end.
     failure : str
-        One line that says why frames are missing; empty where none are.
+        One line that says why frames are missing; empty if none are.
     """
 
     method: str
@@ -60,7 +60,7 @@ class Pair:
 def mismatches(
     unit: ShadingPipelineUnit, mesh: Mesh, exponent: int, width: int, height: int
 ) -> tuple[int, int]:
-    """Pixels of a frame, and how many of the simulated ones are not the model's.
+    """Number of pixels of a frame, and of simulated pixels that differ from the bit-accurate model's.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def mismatches(
     mesh : Mesh
         The surface.
     exponent : int
-        Of the highlight.
+        Exponent of the highlight.
     width, height : int
         Size of the picture.
 
@@ -110,11 +110,11 @@ def measure(
     Parameters
     ----------
     meshes : sequence of Mesh
-        What is drawn.
+        The meshes.
     methods, models : sequences
-        The pairs.
+        Methods and models of the pairs.
     exponents : sequence of int
-        A frame of each mesh for each.
+        Exponents, with a frame of each mesh for each.
     width, height : int
         Size of a frame.
     """
@@ -134,7 +134,7 @@ def measure(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a line a pair, and judge.
+    """Print a line for each pair; the exit status.
 
     Returns
     -------
