@@ -93,7 +93,7 @@ def order() -> Evidence:
 
 
 def arccos_claim() -> Evidence:
-    """Largest error in rad of the first four rows of the arccos table: as claimed, and as computed."""
+    """Largest relative error of the first four rows of the arccos table: as claimed, and as computed."""
     worst = [
         largest_error(np.arccos, PUBLISHED_COEFFICIENTS[k], *SEGMENT_BOUNDS[k : k + 2])[1] for k in range(4)
     ]

@@ -1,4 +1,4 @@
-"""How far one picture is from another to the eye: FLIP, CIEDE2000, and a verdict."""
+"""Perceived difference of two pictures: FLIP, CIEDE2000, and a verdict whether they look identical."""
 
 from dataclasses import dataclass
 from types import ModuleType
@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 LARGEST_LSB = 1.0
-"""Largest error of a channel that is taken for invisible whatever the other figures are."""
+"""Largest error of a channel, in LSB, that counts as invisible whatever the other figures are."""
 
 FLIP_P99 = 0.05
 FLIP_MAX = 0.10
@@ -37,7 +37,7 @@ class Perceived:
     flip_p99, flip_max : float
         99th percentile (linear between neighbours) and largest of the FLIP map, 0 to 1.
     ciede2000_p99, ciede2000_max : float
-        The same of the CIEDE2000 colour difference of each pixel.
+        The same two figures of the CIEDE2000 colour difference of each pixel.
     """
 
     flip_p99: float
@@ -67,10 +67,10 @@ def _color() -> ModuleType:
 def perceived(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> Perceived:
     """FLIP and CIEDE2000 between two pictures.
 
-    Channels are taken for sRGB as a display shows them. FLIP (Andersson and others 2020, LDR) is that of a
-    viewer who sees 67 pixels a degree, its default; a pixel's value depends on its neighbours, the background
-    among them. CIEDE2000 is that of each pixel by itself, under D65 for the 2 degree observer. The background
-    would dilute both, so only pixels of the mask count.
+    Channels are read as sRGB. FLIP (Andersson and others 2020, LDR) is for a viewer who sees 67 pixels a
+    degree, its default; a pixel's value depends on its neighbours, also on the background. CIEDE2000 is of
+    each pixel alone, under D65 for the 2 degree observer. Only pixels of the mask count, since the background
+    would make both figures too small.
 
     Parameters
     ----------
@@ -110,8 +110,8 @@ def perceived(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> Per
 def identical_to_the_eye(largest_lsb: float, difference: Perceived) -> bool:
     """Whether two pictures look the same.
 
-    They do when no channel is more than `LARGEST_LSB` off; else when FLIP is at most `FLIP_P99` in 99 % of
-    the pixels and `FLIP_MAX` in all, and CIEDE2000 at most `CIEDE2000_P99` and `CIEDE2000_MAX`.
+    They do if no channel's error is over `LARGEST_LSB`. Else they do if FLIP is at most `FLIP_P99` in 99 % of
+    the pixels and `FLIP_MAX` in all, and CIEDE2000 at most `CIEDE2000_P99` and `CIEDE2000_MAX` likewise.
 
     Parameters
     ----------

@@ -40,10 +40,10 @@ FEWER_OPERATIONS = (0.20, 0.35)
 """[P]: share of operations that Blinn's model saves against Phong's."""
 
 LESS_TIME = (0.40, 0.45)
-"""[P]: share of a frame's time, up to so much at a million polygons and 1920x1080."""
+"""[P]: largest share of a frame's time that Blinn's model saves, at a million polygons and 1920x1080."""
 
 PIXELS = 1 << 14
-"""Pixels that the ways in software work on at once; their arrays stay in a cache."""
+"""Pixels that the ways in software compute at once: their arrays stay in a processor's cache."""
 
 _METHOD = "chord"
 _HARDWARE_MODELS = ("cosquad", "blinn_product")
@@ -84,11 +84,11 @@ WAYS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
     "Phong, 2 (N·L)(N·V) - L·V": _phong_scalar,
     "Blinn": _blinn,
 }
-"""Ways to a pixel's brightness in one channel, with diffuse and ambient light, from N, L and V."""
+"""Functions from N, L and V to a pixel's brightness in one channel, with diffuse and ambient light."""
 
 
 def _vectors(local: bool) -> list[np.ndarray]:
-    """Random unit N, and L and V: of every pixel, or of the frame."""
+    """Random unit N of every pixel, and L and V of every pixel or of the frame."""
     rng = np.random.default_rng(1)
     columns = (PIXELS, PIXELS if local else 1, PIXELS if local else 1)
     vectors = [rng.normal(size=(3, count)) for count in columns]
@@ -108,20 +108,20 @@ def exponents() -> dict[str, list[float]]:
 
 
 def operations(way: str, local: bool) -> dict[str, float]:
-    """Operations of a pixel, by kind, counted as they are done.
+    """Operations of a pixel, by kind, counted during the computation.
 
     Parameters
     ----------
     way : str
         One of `WAYS`.
     local : bool
-        Whether every pixel has an L and V of its own; else they, L·V and H are of the whole frame, and hardly
+        Whether every pixel has its own L and V; else L, V, L·V and H are computed once a frame, and hardly
         count.
 
     Returns
     -------
     dict
-        A pixel's, by kind: see `Counted`.
+        Operations of a pixel by kind: see `Counted`.
     """
     counts: Counter[str] = Counter()
     WAYS[way](*(Counted.of(vector, counts) for vector in _vectors(local)))
@@ -129,7 +129,7 @@ def operations(way: str, local: bool) -> dict[str, float]:
 
 
 def shading_times(local: bool, repeats: int) -> dict[str, float]:
-    """Times of the ways on the same pixels, in one run, over that of Phong's vector R.
+    """Times of the ways on the same pixels, in one run, as ratios to that of Phong's vector R.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
     Parameters
     ----------
     triangles : int
-        Of the teapot.
+        Triangles of the teapot, about.
     width, height : int
         Size of the picture.
     repeats : int
@@ -158,8 +158,8 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
     Returns
     -------
     dict
-        ``triangles``, ``pixels`` that show it; ``raster``, ``phong`` and ``blinn``: seconds of geometry, and
-        of either's shading.
+        ``triangles``; ``pixels`` that show the teapot; ``raster``, ``phong`` and ``blinn``: seconds of
+        geometry, and of shading by each model.
     """
     scene = scene_for(teapot(triangles), _EXPONENT, width, height)
     raster = rasterise(scene)
@@ -179,7 +179,7 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
 
 
 def hardware_cycles(model: str, triangles: int, width: int, height: int) -> dict[str, int]:
-    """Cycles of the same frame in the simulated pipeline, method chord.
+    """Cycles of the frame of `frame_times` in the simulated pipeline with the method chord.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def tasks(quick: bool) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        Up to 10,000 triangles at 320x240, else up to a million at 1920x1080.
+        Whether frames have up to 10,000 triangles at 320x240; else up to a million at 1920x1080.
     """
     found = [Task(exponents)]
     for local in (False, True):

@@ -1,4 +1,4 @@
-"""The report's section on place and route: parts and clock rate of the pipeline, a table a family."""
+"""The report's section on place and route: parts and clock rate of the pipeline, a table for each family."""
 
 from collections.abc import Sequence
 from statistics import median
@@ -34,18 +34,18 @@ _FIGURES = {
 
 
 def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, str | None]) -> dict[str, Any]:
-    """Layout of a pipeline with one light: `Layout.as_dict`, or a ``reason`` why there is none.
+    """Place and route a pipeline with one light: `Layout.as_dict`, or the ``reason`` of a failure.
 
     Parameters
     ----------
     method, model : str
         The design.
     family : str
-        Of `FAMILIES`.
+        One of `FAMILIES`.
     seeds : int
-        Placements.
+        Number of placements.
     tools : dict of str to str or None
-        Versions of the tools, which the result depends on.
+        Versions of the tools, as the result depends on them.
     """
     design = ShadingPipelineUnit(preset(method, model))
     if None in tools.values():
@@ -57,7 +57,7 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
 
 
 def task(method: str, model: str = MODEL, family: str = "ecp5") -> Task:
-    """`measure` of a pipeline; one seed for published methods and other models than `MODEL`.
+    """Task that measures a pipeline; with one seed for published methods and other models than `MODEL`.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ def task(method: str, model: str = MODEL, family: str = "ecp5") -> Task:
 
 
 def tasks(quick: bool) -> list[Task]:
-    """A task a method and family, of minutes each: every method for one family, some for the others.
+    """Tasks of some minutes each: every method for the first family, `OTHERS` for the others.
 
     Parameters
     ----------
     quick : bool
-        None.
+        Whether there are no tasks.
     """
     if quick:
         return []
@@ -89,14 +89,14 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """A table a family, or why there is none.
+    """The section: for each family a table, or the reason why there is none.
 
     Parameters
     ----------
     tasks : sequence of Task
         See `tasks`.
     results : sequence of dict
-        Of `measure`, in their order.
+        Results of `measure`, in their order.
     """
     name, title = "place-and-route", "Place and route"
     if not tasks:
@@ -120,7 +120,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _committed() -> tuple[list[str], list[Table]]:
-    """What a quick report says: the figures of the store, each with its date and command."""
+    """Text and table of a quick report: the figures of the store, each with its date and command."""
     rows: list[list[Cell]] = [
         [
             *(
@@ -154,7 +154,7 @@ def _committed() -> tuple[list[str], list[Table]]:
 
 
 def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[str, Table | None]:
-    """What is to say of a family, and its table; results are pairs of settings and figures."""
+    """Text and table of a family; ``results`` are pairs of settings and figures."""
     device = FAMILIES[family].device
     settings = results[0][0]
     versions = settings["tools"]

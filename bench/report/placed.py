@@ -1,4 +1,4 @@
-"""Place and route that was measured before: parts and clock rates of pipelines, each with its date.
+"""Committed results of place and route: parts and clock rates of pipelines, each with its date.
 
 A quick report reads them here, as placing a design takes minutes. ``blysk fpga --json FILE`` measures more,
 and ``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
@@ -30,9 +30,9 @@ _PARTS = ("luts", "flip_flops", "multipliers", "block_rams", "distributed_rams")
 
 
 def design_of(name: str) -> tuple[str, ...] | None:
-    """Method, model and perhaps operand, of a name that ``blysk fpga`` gives a pipeline.
+    """Method, model and perhaps operand of a pipeline, from its name in ``blysk fpga``.
 
-    ``None`` of another number of lights, another style and what is no pipeline.
+    ``None`` for more than one light, another style, and names that are no pipeline's.
     """
     found = _NAME.fullmatch(name)
     return tuple(word for word in found.groups() if word) if found else None
@@ -41,24 +41,24 @@ def design_of(name: str) -> tuple[str, ...] | None:
 def merged(
     entries: Iterable[Mapping[str, Any]], measured: Mapping[str, Any], date: str, command: str
 ) -> list[dict[str, Any]]:
-    """Entries with what ``blysk fpga --json`` measured, in place of older figures of the same designs.
+    """Entries with the figures of ``blysk fpga --json``, which replace older figures of the same designs.
 
     Parameters
     ----------
     entries : iterable of dict
-        So far.
+        Entries so far.
     measured : dict
-        Of ``blysk fpga --json``.
+        Figures of ``blysk fpga --json``.
     date : str
-        Of the measurement, as 2026-11-23.
+        Date of the measurement, as 2026-11-23.
     command : str
-        That made it.
+        Command of the measurement.
 
     Returns
     -------
     list of dict
-        By device and name: ``design``, ``device``, the parts, ``fmax_mhz`` of each seed, ``tools``, ``date``
-        and ``command``.
+        Entries in the order of device and name: ``design``, ``device``, the parts, ``fmax_mhz`` of each seed,
+        ``tools``, ``date`` and ``command``.
     """
     found = {(entry["device"], entry["design"]): dict(entry) for entry in entries}
     for design in measured["designs"]:
@@ -80,7 +80,7 @@ def read_store(path: Path = STORE) -> list[dict[str, Any]]:
 
 
 def placed(device: str, path: Path = STORE) -> dict[tuple[str, ...], dict[str, Any]]:
-    """Committed figures of pipelines of one light on a device, by `design_of`, with ``fmax_median_mhz``."""
+    """Committed figures, with ``fmax_median_mhz``, of pipelines of one light on a device, by `design_of`."""
     found = {}
     for entry in read_store(path):
         design = design_of(entry["design"])

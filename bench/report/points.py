@@ -1,7 +1,7 @@
 """Error against run time: frames of every method and model, baselines and variants as published.
 
-A point is a frame: a design on a mesh at an exponent. It has errors of four kinds, run times of four kinds,
-what the hardware takes, its picture with two maps of errors, and the settings that make it again.
+A point is a frame: a design on a mesh at an exponent. It has errors of four kinds, run times, the resources
+of the hardware, its picture with two error maps, and the settings that reproduce it.
 """
 
 import json
@@ -57,7 +57,7 @@ GROUPS = {
     "published": "as published",
     "software": "golden renderer, software alone",
 }
-"""What kinds of points there are."""
+"""Groups of points, with their titles."""
 
 DESIGNS = [(method, "cosquad") for method in METHODS]
 
@@ -66,35 +66,36 @@ DESIGNS += [("chord", model) for model in ("blinn", *MODELS) if model != "cosqua
 DESIGNS += [("renormalise", "exp"), ("renormalise", "blinn_product"), ("linear", "blinn_product")]
 
 DESIGNS += [(method, "cosquad") for method in PUBLISHED]
-"""Method and model of the hardware's points, the operand of the specular unit being that of the method."""
+"""Method and model of the hardware's points, with the method's own operand of the specular unit."""
 
 BEST = [method for method, interpolator in METHODS.items() if interpolator.operand == "cosine"]
-"""Methods with the operand of their documents, N·H, that are more exact with 1 - N·H: they have points of
-both, so that each method is compared in its best form too. Those as published are `PUBLISHED`."""
+"""Methods whose own operand is N·H, as in their documents. They are more exact with 1 - N·H, and have points
+with both, so that each method is also compared in its best form. Variants as published are in `PUBLISHED`."""
 
 _BEST_OPERAND = {"operand": "one_minus_cosine"}
 
 _BEST_MODEL = "blinn"
-"""The exact lobe table, with which each method in its best form has points, too."""
+"""Model, an exact lobe table, with which each method in its best form also has points."""
 
 QUICK_SIMULATED = [(method, "cosquad") for method in (*METHODS, *PUBLISHED)]
-"""Those that the quick report simulates: a pipeline of every method. Of the others it has the model's
-frames, and the cycles of the same method, whose spans are the same, with the difference of latency."""
+"""Designs that the quick report simulates: one pipeline of every method. The others have frames of the
+bit-accurate model, and the cycles of the same method with the same spans, plus the difference of latency."""
 
 _SPREAD_MODELS = ("cosquad", "exp", "blinn", "blinn_product")
 """Models of the designs that are measured over several scenes."""
 
 
 def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
-    """What to measure.
+    """Measurements of the section.
 
     Parameters
     ----------
     quick : bool
-        A teapot of 992 triangles at 160x120 and exponent 100, `QUICK_SIMULATED` designs through the
-        simulation, the others through the model, and committed clock rates (`placed`). Else one of 10,712
-        triangles at 640x480, all `EXPONENTS`, every design simulated, and placed and routed where the tools
-        are installed. Without a C++ compiler nothing is simulated. Further scenes: see `front_scenes`.
+        A teapot of 992 triangles at 160x120 and exponent 100; the designs of `QUICK_SIMULATED` are simulated,
+        the others computed by the bit-accurate model; clock rates are the committed ones (`placed`). If not
+        quick, a teapot of 10,712 triangles at 640x480 and all `EXPONENTS`; every design is simulated, and
+        placed and routed if the tools are installed. Without a C++ compiler nothing is simulated. Further
+        scenes: see `front_scenes`.
     meshes : sequence of str
         Files of further meshes.
 
@@ -153,7 +154,7 @@ def _group(method: str) -> str:
 
 
 def _command(settings: Mapping[str, Any]) -> str:
-    """What makes a point again: `blysk render`, or Python for the golden renderer's shadings."""
+    """Command line that reproduces a point: `blysk render`, or Python for the golden renderer's shadings."""
     if settings["engine"] == "float64":
         view = {name: settings[name] for name in ("source", "triangles", "width", "height")}
         call = f"software_frames({settings['method']!r}, {view}, [{settings['exponent']}])"
@@ -256,7 +257,7 @@ def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, di
 
 
 class _Cycles:
-    """Cycles a pixel of frames: their own, those of the same method and spans, or the cycle model's."""
+    """Cycles a pixel of frames: simulated, of a simulated frame of the same method, or modelled."""
 
     def __init__(self, tasks: Sequence[Task], results: Sequence[Any], of_design: Mapping[tuple, dict]):
         self._of_design = of_design
@@ -285,7 +286,7 @@ def _label(settings: Mapping[str, Any]) -> str:
 
 
 def _keys(task: Task) -> list[tuple]:
-    """What tells the points of a task apart."""
+    """Keys of a task's points: mesh, design and exponent."""
     settings = task.settings
     design = (settings["shading"],) if "shading" in settings else _design_of(settings)
     return [(settings["view"]["source"], *design, exponent) for exponent in settings["exponents"]]
@@ -299,31 +300,30 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     - ``points``: a dictionary each, with
 
       - ``id``, ``label``: texts; ``group``: a key of ``groups``;
-      - ``settings``: everything that the frame depends on; among them ``source`` (the mesh), ``exponent``,
-        ``method``, ``model``, ``width``, ``height``, ``operand`` if it is not the method's own,
-        ``engine`` (``cxxrtl``: simulated, ``model``: its
-        bit-accurate model, ``float64``: the golden renderer);
-      - ``command``: a line for a shell that makes it again;
-      - ``errors``: value or ``None`` by key of ``errors``; ``times``: by key of ``times``;
-      - ``verdicts``: whether both frames look identical, by kind of error: ``total``, ``method``,
+      - ``settings``: all settings of the frame, such as ``source`` (the mesh), ``exponent``, ``method``,
+        ``model``, ``width``, ``height``, ``operand`` if it is not the method's own, and ``engine``
+        (``cxxrtl``: simulated, ``model``: by the bit-accurate model, ``float64``: by the golden renderer);
+      - ``command``: a line for a shell that reproduces it;
+      - ``errors``, ``times``: value or ``None`` for each key of ``errors`` or ``times`` below;
+      - ``verdicts``: whether both frames look identical, for each kind of error: ``total``, ``method``,
         ``arithmetic``, ``model``;
-      - ``colors``: of its method, on light and on dark paper;
+      - ``colors``: colours of its method, on light and on dark paper;
       - ``hardware``: ``multipliers``, ``cells``, ``register_bits``, ``memory_bits``; after place and route
-        ``luts``, ``fmax_mhz``, the median, ``seeds_mhz``, and ``placed``, when; or ``None``;
+        ``luts``, ``fmax_mhz`` (the median), ``seeds_mhz``, and ``placed`` (the date); or ``None``;
       - ``counts``: ``pixels``, ``shown``, ``spans``, ``out_of_range_spans``, ``cycles``;
-      - ``pictures``: ``frame``, ``error`` (map of the method error) and ``total`` (of the total error), data
-        URIs of PNGs of one size, the maps transparent where no surface is;
+      - ``pictures``: ``frame``, ``error`` (map of the method error) and ``total`` (map of the total error),
+        data URIs of PNGs of one size; maps are transparent where there is no surface;
 
     - ``groups``: ``[{key, title}]``;
     - ``errors``, ``times``: ``[{key, title, unit, better}]``, ``better`` being ``"less"`` or ``"more"``;
     - ``fronts``: ``{"error|time": [ids]}``, points on the Pareto front of each mesh and exponent;
-    - ``error_map``: ``{"colors": [...], "limits": [...]}``: the one scale of all maps, ``#rrggbb`` and the
-      largest error in LSB of each step.
+    - ``error_map``: ``{"colors": [...], "limits": [...]}``: the scale of all maps, with the colour
+      ``#rrggbb`` and the largest error in LSB of each step.
 
     Parameters
     ----------
     tasks, results
-        Those of `tasks`, in any order.
+        Tasks of `tasks` and their results, in any order.
     """
     points = _points(tasks, results)
     fronts = fronts_of(points)

@@ -34,18 +34,17 @@ __all__ = [
 
 
 def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.ndarray:
-    """Which points are on the Pareto front: no other is better in one measure and at least as good in both.
+    """Whether points are on the Pareto front: no other is better in one measure and as good in both.
 
     Parameters
     ----------
     error, time : sequences of float
-        Of each point; less is better. A point without one of them (``None`` or NaN) is not on the front, and
-        beats none.
+        Measures of each point; less is better. A point that lacks one of them (``None`` or NaN) is not on the
+        front, and beats none.
 
     Returns
     -------
-    bool array
-        By point.
+    bool array, shape (points,)
     """
     values = np.array([error, time], dtype=np.float64)
     values[:, np.isnan(values).any(axis=0)] = np.nan
@@ -56,7 +55,7 @@ def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.nda
 
 
 def _by_scene(points: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], list[Mapping[str, Any]]]:
-    """Points by mesh and exponent: no others can be compared."""
+    """Points by mesh and exponent: only points of one mesh and exponent can be compared."""
     found: dict[tuple[str, int], list] = {}
     for point in points:
         found.setdefault((point["settings"]["source"], point["settings"]["exponent"]), []).append(point)
@@ -64,7 +63,7 @@ def _by_scene(points: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], list
 
 
 def _measured(points: Sequence[Mapping[str, Any]], kind: str, axis: Mapping[str, str]) -> list[float | None]:
-    """A measure of points, made so that less is better."""
+    """A measure of points, with its sign so that less is better."""
     # PSNR falls as RMSE grows, and equal images have no PSNR that JSON could hold.
     values = [point[kind][axis["key"].replace("psnr_db", "rmse_lsb")] for point in points]
     if axis["better"] == "less" or axis["key"].endswith("psnr_db"):
@@ -73,7 +72,7 @@ def _measured(points: Sequence[Mapping[str, Any]], kind: str, axis: Mapping[str,
 
 
 def fronts_of(points: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
-    """Ids on the front of each pair of measures, over the meshes and exponents."""
+    """Ids of the points on the front of each pair of measures, for all meshes and exponents."""
     found = {}
     scenes = _by_scene(points).values()
     for error in ERRORS:
@@ -89,7 +88,7 @@ def fronts_of(points: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
 
 
 def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the points say, and what they are."""
+    """Paragraphs on the points: the trade of each mesh and exponent, and explanations of the measures."""
     of_error = (
         "Errors are steps (LSB) of an 8-bit channel, over the pixels that show the surface. *Model*: the "
         "reflection model against Blinn's, both in float64 with exact normals: no arithmetic cures it. "
@@ -131,7 +130,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
-    """The trade of a mesh and an exponent in a few sentences."""
+    """The trade between error and time at a mesh and exponent, in a few sentences."""
     settings = scene[0]["settings"]
     hardware = [point for point in scene if point["group"] != "software"]
     alike = sum(point["verdicts"]["total"] for point in hardware)
@@ -161,7 +160,7 @@ def _heading(axis: Mapping[str, str]) -> str:
 
 
 def table(points: Sequence[Mapping[str, Any]]) -> Table:
-    """Every point with every measure."""
+    """Table of every point with every measure."""
     largest = [axis for axis in ERRORS if axis["key"].endswith("max_lsb")]
     others = [axis for axis in ERRORS if axis not in largest]
     hardware = {
@@ -211,7 +210,7 @@ def _getter(kind: str, key: str) -> Callable[[Mapping[str, Any]], Cell]:
 
 
 def front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Sequence[str]]) -> Table:
-    """Designs on the fronts of the largest total and method error."""
+    """Table of the designs on the fronts of the largest total and method error."""
     rows = []
     for (source, exponent), scene in _by_scene(points).items():
         for error in (axis for axis in ERRORS if axis["key"] in ("total_max_lsb", "method_max_lsb")):
@@ -249,7 +248,7 @@ def readme_table(points: Sequence[Mapping[str, Any]]) -> str:
     Parameters
     ----------
     points : sequence of dict
-        Those of `section`; every design was simulated, and exponent 100 is among the exponents.
+        Points of `section`. Every design must be simulated, and exponent 100 be among the exponents.
     """
     points = [p for p in points if p["group"] != "software" and "operand" not in p["settings"]]
     exponents = sorted({point["settings"]["exponent"] for point in points})

@@ -1,6 +1,6 @@
 """``blysk bench``: every measurement in one report, a page to read and files for other programs.
 
-The page is one file: styles, script, pictures and figures are in it, and it asks for nothing from a network.
+The page is one file with styles, script, pictures and figures; it loads nothing from a network.
 """
 
 import csv
@@ -98,16 +98,16 @@ def _processor() -> str:
 
 
 def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
-    """What a report is of: settings, date, machine and versions.
+    """Description of a report: settings, date, machine and versions.
 
     Parameters
     ----------
     quick : bool
-        Whether it is a quick one.
+        Whether it is a quick report.
     meshes : sequence of str
         Files of further meshes.
     names : sequence of str
-        Of its sections.
+        Names of its sections.
     """
     return {
         "program": "blysk",
@@ -140,7 +140,7 @@ def _tables(sections: Sequence[Section]) -> Iterator[Table]:
 
 
 def _earlier(folder: Path) -> dict[str, Any] | None:
-    """``report.json`` of a folder, if it is one of ours."""
+    """``report.json`` of a folder, if this program wrote it; else ``None``."""
     try:
         earlier = json.loads((folder / _JSON).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -154,12 +154,12 @@ def check_folder(folder: Path) -> None:
     Parameters
     ----------
     folder : Path
-        It is new, empty, or holds an earlier report.
+        A folder that is new, is empty, or holds an earlier report.
 
     Raises
     ------
     InputError
-        If it is a file, holds anything else, or may not be written.
+        If it is a file, holds other files, or may not be written.
     """
     names = files_within(folder, _PAGE)
     others = [name for name in names if name not in (_PAGE, _JSON) and not name.endswith((".csv", ".svg"))]
@@ -169,15 +169,15 @@ def check_folder(folder: Path) -> None:
 
 
 def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, Any]) -> None:
-    """Write the page, a CSV a table, an SVG a conclusion, and every figure as ``report.json``.
+    """Write the page, a CSV file for each table, an SVG file for each conclusion, and ``report.json``.
 
-    Each file is whole or not there. Tables and drawings of an earlier report in the folder go, if this one
-    has not got them.
+    Each file is whole or not there. Tables and drawings of an earlier report that this one does not have are
+    removed from the folder.
 
     Parameters
     ----------
     folder : Path
-        New, or see `check_folder`.
+        See `check_folder`.
     sections, about
         See `page`.
 
@@ -221,7 +221,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
 
 
 def _begin(folder: str) -> None:
-    """In a worker: the programs that it runs end with it, and their files go with a folder of ours."""
+    """Set up a worker: its child programs end with it, and its temporary files are in ``folder``."""
     os.environ["TMPDIR"] = folder
     tempfile.tempdir = None
     if hasattr(os, "setpgrp"):
@@ -234,24 +234,24 @@ def measure_all(
 ) -> list[Any]:
     """Results of tasks in their order; times are measured at the end, alone, with all models built.
 
-    Processes that an interrupt ends take with them what they began, and their files. A cluster measures what
-    is the same on every machine; times are always those of this one.
+    If an interrupt ends the processes, their child programs end and their files are removed, too. A cluster
+    runs the measurements that are the same on every machine; times are always measured on this one.
 
     Parameters
     ----------
     tasks : sequence of Task
-        What to measure; what was measured before comes from the cache.
+        Measurements; earlier results come from the cache.
     jobs : int
-        Processes.
+        Number of processes.
     progress : callable
-        Called after each.
+        Called after each task.
     address : str, optional
-        Dask scheduler, whose workers take the place of the processes.
+        Address of a Dask scheduler, whose workers replace the processes.
 
     Returns
     -------
     list
-        See `results_of`, which also says what it raises.
+        See `results_of`, also for the exceptions.
     """
     timed = [task for task in tasks if task.timed]
     others = [task for task in tasks if not task.timed]
@@ -267,7 +267,7 @@ def measure_all(
 def chosen_tasks(
     quick: bool, meshes: Sequence[str] = (), names: Sequence[str] = tuple(SECTIONS)
 ) -> list[tuple[ModuleType, list[Task]]]:
-    """What is to be measured: sections, in the order of the page, and the tasks of each.
+    """Sections to measure, in the order of the page, with their tasks.
 
     Parameters
     ----------
@@ -292,14 +292,14 @@ def measured(
     progress: Callable[[], object],
     address: str | None = None,
 ) -> list[Section]:
-    """The sections of `chosen_tasks`; what was measured before comes from the cache.
+    """Measure the sections of `chosen_tasks`; earlier results come from the cache.
 
     Parameters
     ----------
     chosen
-        From `chosen_tasks`.
+        Sections and tasks of `chosen_tasks`.
     jobs : int
-        Processes.
+        Number of processes.
     progress : callable
         Called after each task.
     address : str, optional
@@ -310,7 +310,7 @@ def measured(
 
 
 class _Name(click.ParamType):
-    """A name of a section."""
+    """Type of an option: a name of a section."""
 
     name = "section"
 
@@ -352,12 +352,12 @@ class _Name(click.ParamType):
     help="Dask scheduler, tcp://host:8786, whose workers measure what is no time; times are this machine's.",
 )
 def command(folder, quick, meshes, names, jobs, address):
-    """Measure error against run time, and all else there is to say, and write a report into FOLDER.
+    """Measure error against run time and everything else in the report, and write it into FOLDER.
 
-    FOLDER is report if left out; it is made, or an earlier report in it replaced. The page index.html is one
-    file that any browser opens from disk; each table is also a CSV file, each conclusion's drawing an SVG
-    file, and report.json has every figure. Measurements are kept in the cache as they are done: a report that
-    was stopped goes on where it was, if the code is the same.
+    FOLDER is report by default; it is made, or an earlier report in it is replaced. The page index.html is
+    one file that any browser opens from disk; each table is also a CSV file, each conclusion's drawing an SVG
+    file, and report.json has every figure. Each measurement is kept in the cache: a report that was stopped
+    continues from there, if the code is the same.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""What a section of the report holds: text, tables and drawings, as plain values."""
+"""Parts of a section of the report: text, tables and drawings, as plain values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,35 +7,35 @@ from typing import Any, Literal
 __all__ = ["Cell", "Conclusion", "Drawing", "Grade", "Mark", "Section", "Table"]
 
 Cell = str | int | float | bool | None
-"""Of a table. ``None``: there is no such figure."""
+"""Value of a table's cell; ``None``: there is no such figure."""
 
 Grade = Literal["", "good", "fair", "poor", "bad"]
-"""How the cell of a table is coloured; what each means stands in the table's note."""
+"""Colour of a table's cell; the table's note explains each."""
 
 Mark = Literal["", "stated", "silent"]
-"""What else is to say of an error: it is stated in the documentation or flagged; or nothing tells of it."""
+"""Mark of an error: ``stated`` in the documentation or flagged, or ``silent``: without any sign."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of figures: shown in the page, and written as CSV and JSON under its name.
+    """Table of figures: shown in the page, and written as CSV and JSON under its name.
 
     Parameters
     ----------
     name : str
-        Of its files, in small letters with dashes.
+        Name of its files, in small letters with dashes.
     title : str
         One line.
     columns : sequence of str
         Headings, with the unit behind a comma: "largest error, LSB".
     rows : sequence of sequences of cells
-        Figures as they are, not rounded: the page rounds them.
+        Figures, not rounded: the page rounds them.
     note : str
-        What was measured, and how: a sentence or some.
+        One or more sentences on the quantity and its measurement.
     grades : sequence of sequences of grades, optional
-        One a cell.
+        A grade for each cell.
     marks : sequence of sequences of marks, optional
-        One a cell.
+        A mark for each cell.
     """
 
     name: str
@@ -66,13 +66,13 @@ class Drawing:
     Parameters
     ----------
     name : str
-        Of its file, in small letters with dashes.
+        Name of its file, in small letters with dashes.
     title : str
-        One line: what is drawn against what.
+        One line that names the quantities of both axes.
     svg : str
         The drawing; see `svg`.
     note : str
-        What a reader should see in it; where the published figure is.
+        The main finding in the drawing, and the place of the published figure.
     """
 
     name: str
@@ -83,7 +83,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What a section comes to, at the top of the report: a sentence with its figures, and a drawing.
+    """Conclusion of a section, at the top of the report: a sentence with its figures, and a drawing.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Conclusion:
     sentence : str
         The answer, as Markdown, made from the measurements.
     drawing : Drawing
-        Which shows it.
+        Drawing of the answer.
     """
 
     title: str
@@ -107,7 +107,7 @@ class Section:
     Parameters
     ----------
     name : str
-        Of its anchor, in small letters with dashes.
+        Name of its anchor, in small letters with dashes.
     title : str
         Heading.
     text : sequence of str
@@ -115,11 +115,11 @@ class Section:
     parts : sequence of Table, Drawing
         In the order of the page.
     figures : dict
-        What the page's script or other programs read besides the tables; plain values for JSON.
+        Further values for the page's script and other programs; plain values for JSON.
     conclusion : Conclusion, optional
-        What it comes to, if that stands at the top.
+        Its conclusion, if the top of the report has one.
     appendix : bool
-        Whether it is for those who check the documents, and so comes last.
+        Whether it is only for readers who check the documents, and comes last.
     """
 
     name: str

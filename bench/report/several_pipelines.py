@@ -18,7 +18,7 @@ def measure(count: int, meshes: Sequence[str], size: Sequence[int], method: str)
     Parameters
     ----------
     count : int
-        Pipelines.
+        Number of pipelines.
     meshes, method
         As for `pipes.measure`.
     size : sequence of int
@@ -28,7 +28,7 @@ def measure(count: int, meshes: Sequence[str], size: Sequence[int], method: str)
 
 
 def tasks(quick: bool) -> list[Task]:
-    """A task a number of pipelines; quick ones are small."""
+    """A task for each number of pipelines; quick ones have small pictures."""
     counts = (1, 2) if quick else PIPES
     meshes = pipes.MESHES[:2] if quick else pipes.MESHES
     settings = {
@@ -40,7 +40,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """Pixels a cycle, what limits them, and whether the pictures are those of one pipeline."""
+    """The section: pixels a cycle, their limits, and whether the pictures equal those of one pipeline."""
     rates = [pipes.Rate(**fields) for result in results for fields in result]
     same = sum(rate.same for rate in rates)
     settings = tasks[0].settings

@@ -1,8 +1,8 @@
 """Stiff and extreme cases: every method in each, as a section of the report.
 
-A case is a scene and its spans. Every method shades it twice: with the spans as they come, which is what the
-pipeline does to somebody who prepares spans without `spans`, and cut first, which is what `blysk` does.
-The same functions grade the cases for the report and for the tests.
+A case is a scene and its spans. Every method shades it twice: with the spans as given, as the pipeline does
+for a user who prepares spans without the module `spans`, and with spans cut first, as `blysk` does. The same
+functions grade the cases for the report and for the tests.
 """
 
 from collections.abc import Sequence
@@ -43,13 +43,13 @@ QUICK_SIMULATED = ("renormalise", "chord")
 """Methods that the quick report simulates."""
 
 _LIMITS: dict[Grade, float] = {"good": GOOD, "fair": 4.0, "poor": 16.0}
-"""Largest error in LSB of each colour; larger ones are bad."""
+"""Largest error in LSB of each colour; larger errors are bad."""
 
 _MARKS: dict[Grade, Mark] = {"fair": "stated", "bad": "silent"}
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Every method in every case, and in simulation; if it is to be quick, `QUICK_SIMULATED` there."""
+    """Measurements: every method in every case, and in simulation; if quick, only `QUICK_SIMULATED` there."""
     simulated = QUICK_SIMULATED if quick else METHODS
     settings = [{"method": method} for method in METHODS]
     result = [Task(function, each) for function in (measure, measure_ranges) for each in settings]
@@ -57,7 +57,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The grades of every method in every group, its safe range, and every case."""
+    """The section: grades of every method in every group, its safe range, and every case."""
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
         found.setdefault(task.function.__name__, {})[task.settings["method"]] = result
@@ -143,7 +143,7 @@ def _worst(figures: Sequence[dict], way: str) -> tuple[float | None, Grade]:
 
 
 def _stream_cell(cases: Sequence[dict] | None) -> tuple[float | None, Grade]:
-    """Pixels of another colour are no small error: their number, in place of LSB."""
+    """Cell of the simulated group: the number of wrong pixels in place of LSB; each is a bad error."""
     if cases is None:
         return None, ""
     if any(case["wrong"] is None for case in cases):
@@ -181,7 +181,7 @@ def _magnitude(error: float | None) -> Grade:
 
 
 def _shown(rows: Sequence[Sequence], grades: Sequence[Sequence[Grade]]) -> dict[str, Any]:
-    """Colours by the error of each graded cell, and marks by its grade."""
+    """Grades and marks of a table: colours by the error of each graded cell, marks by its grade."""
     return {
         "grades": [
             [_magnitude(cell) if grade else "" for cell, grade in zip(row, of, strict=True)]

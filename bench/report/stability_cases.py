@@ -43,10 +43,10 @@ GROUPS = {
     9: "triangles without area, slivers, at the edges",
     10: "intensities over 1, many lights",
 }
-"""Groups of cases."""
+"""Groups of cases by number: the quantity that is extreme."""
 
 STREAM_GROUP = 8
-"""The group that is simulated."""
+"""Number of the group that is simulated."""
 
 EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
 
@@ -65,21 +65,21 @@ _COLORS = (0.05,) * 3, (0.4,) * 3, (0.55,) * 3
 
 @dataclass(frozen=True)
 class Case:
-    """Spans to be shaded, and in what light.
+    """A case: spans to shade, and their light and material.
 
     Parameters
     ----------
     group : int
         One of `GROUPS`.
     name : str
-        What is extreme about it.
+        Description of its extreme property.
     scene : Scene
         Size, material, lights and viewer.
     raster : Raster
-        The spans; a reference picture of them has every pixel once.
+        The spans; they cover every pixel of their reference picture once.
     codes : pair of int arrays, shape (spans, 3), optional
-        Normals that the pipeline gets as they are, where those of the raster, which then are their values,
-        are not of unit length.
+        Codes of the end normals for the pipeline, if they are not of unit length; the raster's normals are
+        then the values of these codes.
     """
 
     group: int
@@ -101,15 +101,15 @@ def arcs(
     Parameters
     ----------
     rng : Generator
-        Of the planes.
+        Source of the random planes.
     centre : array, shape (3,)
         Unit vector.
     degrees : array, shape (spans,)
         Angle between the ends.
     at : array, shape (spans,)
-        Share of the span at which it is nearest to the vector; under 0 and over 1 before and behind it.
+        Place in the span at which it is nearest to the vector, 0 to 1; values outside lie before or after it.
     off : array, shape (spans,)
-        Angle, in degrees, at which it is there.
+        Angle, in degrees, between the vector and the span at that place.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def single_spans(
 
 
 def cases_of(group: int) -> Iterator[Case]:
-    """The cases of a group but `STREAM_GROUP`, the same on every call.
+    """The cases of a group, the same on every call.
 
     Parameters
     ----------
@@ -290,7 +290,7 @@ def _codes(vectors: np.ndarray) -> np.ndarray:
 
 
 def _mended_mesh() -> Case:
-    """A file with normals that are no number, 0 and too long; what the loader makes of them."""
+    """Case of a mesh that `load_mesh` repaired: its file has normals that are NaN, 0 and too long."""
     text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn nan 0 1\nvn 0 0 0\nvn 0.3 0 3\nvn 0 0.2 1\n"
     with TemporaryDirectory() as folder:
         path = Path(folder, "broken.obj")

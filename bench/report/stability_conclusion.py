@@ -1,4 +1,4 @@
-"""What stiff and extreme cases come to: the worst of each method inside its range, and where that ends."""
+"""Conclusion of stiff and extreme cases: each method's worst error inside its range, and the range's end."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -22,7 +22,7 @@ def _cases(groups: Mapping[str, Sequence[dict]]) -> Iterator[dict]:
 
 
 def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str]:
-    """Largest error in a span inside the range, cut or served whole, without a flag; and its case."""
+    """Largest error, with its case, in spans without a flag inside the range, whether cut or served whole."""
     errors = [
         *((of["prepared"]["silent"], of["case"]) for of in _cases(groups) if of["prepared"]),
         *((of["given"]["safe"], of["case"]) for of in _cases(groups) if of["inside"]),
@@ -31,17 +31,17 @@ def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str]:
 
 
 def _lit(groups: Mapping[str, Sequence[dict]]) -> Mapping[str, Sequence[dict]]:
-    """Without the group in which light goes out, where a bright highlight ends within a pixel."""
+    """Groups without `TERMINATOR`, in which a bright highlight may end within a pixel."""
     return {group: found for group, found in groups.items() if group != TERMINATOR}
 
 
 def _outside(groups: Mapping[str, Sequence[dict]]) -> float:
-    """Largest error in a span without a flag, served or not."""
+    """Largest error in spans without a flag, inside or outside the range."""
     return max((of["given"]["silent"] for of in _cases(groups)), default=0.0)
 
 
 def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusion:
-    """Worst case inside the range and where the range ends, of every method.
+    """Conclusion: worst case inside the range, and the end of the range, of every method.
 
     Parameters
     ----------

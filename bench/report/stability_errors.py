@@ -59,16 +59,16 @@ SWEEP_EXPONENT = 50
 """Exponent of the spans of `measure_ranges`."""
 
 SWEEP = tuple(np.geomspace(1, 180, 40).round(2).tolist())
-"""Their angles in degrees."""
+"""Angles of the spans of `measure_ranges`, in degrees."""
 
 FACTORS = (1.0, 1.2, 2.0)
-"""Multiples of the widest span at which a method is tried."""
+"""Multiples of the widest span at which a method is measured."""
 
 GOOD = 1.0
 """Largest error in LSB that is good."""
 
 LENGTH_TOLERANCE = 1 / 256
-"""How far the length of a normal may be from 1, by the methods' documentation."""
+"""Largest distance of a normal's length from 1, by the methods' documentation."""
 
 _STEP = COMPONENT.step
 
@@ -80,7 +80,7 @@ _COLOR_ERROR = 3 * Intensity.COLOR_FORMAT.step / 2
 
 
 class _Shaded(NamedTuple):
-    """By pixel that shows: largest error of a channel in LSB, what is stated, span; by span: flagged."""
+    """Largest error of a channel, stated error (both in LSB) and span of each shown pixel; flags of spans."""
 
     error: np.ndarray
     stated: np.ndarray
@@ -93,7 +93,7 @@ def _design(case: Case, method: str) -> Design:
 
 
 def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
-    """Spans of a case as a design takes them: as `spans_for` makes them, or of the case's own codes."""
+    """Spans of a case for a design, made by `spans_for` or of the case's own codes."""
     if case.codes is None:
         return spans_for(case.scene, raster, design)
     left, right = case.codes
@@ -108,7 +108,7 @@ def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
 
 
 def _middle_codes(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Codes of bisectors, as long as the ends are on average; of opposite ends 0."""
+    """Codes of bisectors with the mean length of the ends; 0 for opposite ends."""
     total = left + right
     length = (np.linalg.norm(left, axis=1) + np.linalg.norm(right, axis=1))[:, np.newaxis] / 2
     middle = length * np.where(total.any(axis=1, keepdims=True), normalise(total), 0.0)
@@ -116,7 +116,7 @@ def _middle_codes(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _flagged(design: Design, spans: Spans, constants: FrameConstants) -> np.ndarray:
-    """Spans that the pipeline counts as out of range or as wide; bool, shape (spans,)."""
+    """Whether the pipeline counts each span as out of range or as wide; bool, shape (spans,)."""
     flagged = design.operands(spans, constants).out_of_range
     if design.span_limit is None:
         return flagged
@@ -128,14 +128,14 @@ def _flagged(design: Design, spans: Spans, constants: FrameConstants) -> np.ndar
 def _three_values(
     design: Design, spans: Spans, constants: FrameConstants
 ) -> tuple[SpanValues, tuple[Fixed, Fixed, Fixed]]:
-    """Values of the chord method, and the normals that they are of."""
+    """Values of the chord method, and the three normals of which they are computed."""
     codes = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
     *normals, direction, halfway = (Fixed(COMPONENT, of) for of in codes)
     return design.interpolator.values(*normals, direction, halfway), tuple(normals)
 
 
 def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray:
-    """Picture of the method's own curve in float64, from the codes on."""
+    """Picture of the method's own curve in float64, computed from the codes of the spans."""
     scene, model, method = case.scene, REFLECTION_MODELS[MODEL], design.interpolator
     if method.TAKES_MIDDLE or design.takes_values:
         values = spans.values
@@ -150,7 +150,7 @@ def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray
 
 
 def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
-    """Errors of the model against exact normals in float64, perspective-correct and normalised per pixel."""
+    """Errors of the bit-accurate model against exact normals: perspective-correct, normalised per pixel."""
     scene, material = case.scene, case.scene.materials[0]
     spans, constants = spans_of(case, design, raster), FrameConstants.of(scene)
     color = design.compute(spans, constants).color
@@ -200,7 +200,7 @@ def _angles(raster: Raster) -> np.ndarray:
 
 
 def _line_angles(spans: Spans) -> np.ndarray:
-    """Angle, in degrees, between ends of length 1 with a line that comes as near to 0 as that of a span."""
+    """Angle in degrees of a span with ends of length 1 whose chord is as near to 0 as each span's line."""
     left, right = (
         codes / Renormaliser.VECTOR_FORMAT.max_code for codes in (spans.normal_left, spans.normal_right)
     )
@@ -212,7 +212,7 @@ def _line_angles(spans: Spans) -> np.ndarray:
 
 
 def _has_unit_length(design: Design, codes: Sequence[np.ndarray]) -> np.ndarray:
-    """Whether both ends of spans have length 1 within `LENGTH_TOLERANCE`, of a line the longer end."""
+    """Whether both ends of spans have length 1 within `LENGTH_TOLERANCE`; for a line, the longer end."""
     lengths = np.linalg.norm(np.stack(codes) / ONE, axis=2)
     if design.interpolator.takes_line:
         lengths = lengths.max(axis=0, keepdims=True)
@@ -220,20 +220,20 @@ def _has_unit_length(design: Design, codes: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _length_excess(codes: Sequence[np.ndarray]) -> float:
-    """How far the length of a normal is from 1, but for its rounding."""
+    """Largest distance of a normal's length from 1; 0 if rounding explains it."""
     lengths = np.linalg.norm(np.concatenate(codes) / ONE, axis=1)
     excess = float(np.abs(lengths - 1).max(initial=0))
     return excess if excess > 2 * _STEP else 0.0
 
 
 def grade_of(grades: Sequence[Grade]) -> Grade:
-    """The worst of some grades; none, of none."""
+    """The worst of some grades; the empty grade if there are none."""
     order: tuple[Grade, ...] = ("bad", "fair", "good", "")
     return min(grades, key=order.index, default="")
 
 
 def _figures(shaded: _Shaded, inside: np.ndarray) -> dict[str, Any]:
-    """Largest error of a case, that in spans that are not flagged, and its grades."""
+    """Figures of a case: largest error, largest error in spans without a flag, and grades."""
     flagged, served = shaded.out_of_range[shaded.span], inside[shaded.span]
     large = shaded.error > GOOD
     bad = large & ~flagged & (~served | (shaded.error > shaded.stated))
@@ -257,26 +257,26 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
     """Errors of a method in a case, by the bit-accurate model.
 
     The error is the largest of a channel against exact normals of each pixel in float64 with the same
-    model, in LSB; 0.5 is a correctly rounded pixel. Where N·L is 0 but for the stated errors, lit and dark
+    model, in LSB; 0.5 is a correctly rounded pixel. Where N·L is 0 within the stated errors, lit and dark
     are both right. An error is
 
-    - good to `GOOD`;
-    - fair where it is larger but the pipeline flags the span, or the method serves the span and states such
-      an error: its own curve in float64 is as far off, and the error bounds of its units, times the
-      exponent in a highlight, come to the rest;
+    - good up to `GOOD`;
+    - fair if it is larger, but the pipeline flags the span, or the method serves the span and states such an
+      error: the error is at most that of its own curve in float64 plus the error bounds of its units, which
+      count times the exponent in a highlight;
     - bad otherwise: nothing tells of it.
 
-    A method serves spans that `cut_spans` leaves whole, or, of one that takes two normals, to its
-    `Interpolator.widest_span`; with normals of length 1 within `LENGTH_TOLERANCE`.
+    A method serves a span that `cut_spans` leaves whole; a method that takes two normals and has no span
+    limit serves spans up to its `Interpolator.widest_span`. Normals have length 1 within `LENGTH_TOLERANCE`.
 
     Returns
     -------
     dict
-        ``case``; ``spans``; ``inside``, how many of them the method serves; ``cut``, how many are cut; for
-        the spans ``given`` as they are, and ``prepared``, cut where need be, dictionaries of ``error``,
-        ``silent``, that in spans without a flag, ``safe``, that in the spans that the method serves,
-        ``flagged`` spans, ``grade`` and ``safe_grade``, that of the spans that the method serves.
-        ``prepared`` is ``None`` where the spans are refused.
+        ``case``; numbers of ``spans``, of spans ``inside``, which the method serves, and of ``cut`` ones. For
+        the spans as ``given``, and ``prepared``, that is cut if need be, dictionaries of ``error``;
+        ``silent``, the error in spans without a flag; ``safe``, the error in served spans; ``flagged``, the
+        number of flagged spans; ``grade``, and ``safe_grade`` of served spans. ``prepared`` is ``None`` if
+        the case has its own codes.
     """
     design = _design(case, method)
     raster = case.raster
@@ -304,7 +304,7 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
 
 
 def measure(method: str) -> dict[str, list[dict[str, Any]]]:
-    """`measure_case` of a method in the cases of every group but `STREAM_GROUP`, by group."""
+    """Results of `measure_case` for a method and all cases, by group, without `STREAM_GROUP`."""
     return {
         str(group): [measure_case(case, method) for case in cases_of(group)]
         for group in GROUPS
@@ -320,7 +320,7 @@ def _span_case(degrees: float, exponent: int, count: int = 30) -> Case:
 
 
 def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
-    """Which spans of such angles the pipeline flags."""
+    """Whether the pipeline flags spans of the given angles."""
     rng = np.random.default_rng(0)
     ends = arcs(rng, HALFWAY, degrees, rng.uniform(0, 1, len(degrees)), rng.uniform(0, 30, len(degrees)))
     case = single_spans(2, "", ends, 5, SWEEP_EXPONENT)
@@ -331,8 +331,8 @@ def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
 def widest_span(method: str, exponent: int) -> float:
     """Widest span in degrees that a method serves.
 
-    Of a method with a span limit, the widest lit one that is not flagged as wide; of ``chord-local``, that of
-    which none of a sample is cut; else the widest that is left whole.
+    For a method with a span limit it is the widest lit span that is not flagged as wide; for ``chord-local``
+    the widest angle at which no span of a sample is cut; else the widest span that is not cut.
     """
     design = preset(method, MODEL)
     if design.span_limit is not None:
@@ -349,15 +349,15 @@ def widest_span(method: str, exponent: int) -> float:
 
 
 def measure_ranges(method: str) -> dict[str, Any]:
-    """Which spans a method serves, and what it does with wider ones.
+    """Range of spans that a method serves, and its errors inside and outside.
 
     Returns
     -------
     dict
-        ``widest``, the widest span by each of `RANGE_EXPONENTS`; ``none_flagged`` and ``all_flagged``, the
-        last whole number of degrees to which no span is flagged, and the first from which all are; ``sweep``,
-        for each angle of `SWEEP`, `measure_case` of spans at `SWEEP_EXPONENT`; ``outside``, the same at
-        `FACTORS` times the widest span, with ``factor`` and ``degrees``.
+        ``widest``: widest span in degrees at each of `RANGE_EXPONENTS`; ``none_flagged``: largest whole
+        number of degrees up to which no span is flagged; ``all_flagged``: the least from which all are;
+        ``sweep``: `measure_case` of spans at each angle of `SWEEP` and `SWEEP_EXPONENT`; ``outside``: the
+        same at `FACTORS` times the widest span, with ``factor`` and ``degrees``.
     """
     sweep = [measure_case(_span_case(degrees, SWEEP_EXPONENT), method) for degrees in SWEEP]
     angles = np.arange(181)

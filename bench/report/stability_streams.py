@@ -25,10 +25,10 @@ __all__ = [
 
 
 class _Interrupted(wiring.Component):
-    """A pipeline that shades other spans first, and is reset while they are inside."""
+    """A pipeline that takes other spans first, and is reset while they are inside."""
 
     def __init__(self, unit: wiring.Component, before: dict[str, Sequence[int]], cycles: int):
-        """Words of ``write`` and ``i`` before the reset, which comes after so many cycles."""
+        """Take the words of ``write`` and ``i`` before the reset, and the cycles until it ends."""
         super().__init__(dict(unit.signature.members))
         self._unit, self._before, self._cycles = unit, before, cycles
 
@@ -71,9 +71,10 @@ def _words(shape, beats) -> list[int]:
 
 
 def stream_patterns(unit: ShadingPipelineUnit) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Names and stalls of the runs of `STREAM_GROUP`: options of `simulate`.
+    """Runs of `STREAM_GROUP`: a name, and the stalls as options of `simulate`.
 
-    Random stalls, and a single one on each cycle on which something of `measure_stream` moves.
+    One run has no stalls, three have random ones, and one for each side and cycle of the stream of
+    `measure_stream` has a single stall.
 
     Parameters
     ----------
@@ -103,13 +104,13 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
     method : str
         One of `METHODS`.
     quick : bool
-        Whether it is Amaranth's own simulator that takes some patterns; else compiled RTL takes all.
+        Whether Amaranth's own simulator runs some of the patterns; else compiled RTL runs all.
 
     Returns
     -------
     list of dict
-        ``case``; ``runs``; ``pixels`` of a run; ``wrong``, pixels of all runs that are not the model's, or
-        ``None`` where a run came to a halt.
+        ``case``; number of ``runs``; ``pixels`` of a run; ``wrong``, pixels of all runs that differ from the
+        bit-accurate model's, or ``None`` if a run stopped early.
     """
     design = preset(method, MODEL)
     unit = ShadingPipelineUnit(design)

@@ -42,8 +42,8 @@ def tasks(quick: bool) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        Few, of some seconds together: two lengths of span, the units of a pixel without place and route,
-        small frames.
+        Whether the measurements take only some seconds: two lengths of spans, the units of a pixel without
+        place and route, and small frames.
     """
     found = []
     for claim in CLAIMS:
@@ -80,7 +80,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     Parameters
     ----------
     tasks : sequence of Task
-        As `tasks` gives them.
+        Tasks of `tasks`.
     results : sequence
         Their results.
     """
@@ -181,7 +181,7 @@ def _software_table(results: Sequence[tuple[dict, dict]]) -> Table:
 
 
 def _price(published: float, result: dict[str, Any]) -> float | None:
-    """Cost of a dear operation, in cheap ones, from which on the counts give the published ratio."""
+    """Least cost of a dear operation, in cheap ones, at which the counts give the published ratio."""
     cheap, dear = (
         [sum(result[of].get(kind, 0.0) for kind in kinds) for of in ("operations", "baseline_operations")]
         for kinds in (_OPERATIONS[:2], _OPERATIONS[2:])
@@ -369,7 +369,7 @@ def _squares_table(results: Sequence[tuple[dict, dict]]) -> Table:
 
 
 def _turned(squares: Table) -> str:
-    """Two methods that the published form puts in the other order than NMSE does."""
+    """Sentence on two methods whose order differs between the published form and NMSE, if any."""
     rows = squares.records()
     for better in rows:
         for worse in rows:

@@ -50,45 +50,46 @@ UNITS = {
     "quadratic interpolator": ("quadratic_interpolator", "quadratic"),
     "recurrence interpolator": ("recurrence_interpolator", "recurrence"),
 }
-"""Unit and variant of the table of ``blysk blocks``. An interpolator has its setup with it, and gives N·L
-and N·H; the others are the unit of a pixel alone."""
+"""Units of the claims: unit and variant in the table of ``blysk blocks``. An interpolator includes its setup,
+and gives N·L and N·H; the others are only the unit of a pixel."""
 
 
 def fastest(actions: Sequence[Callable[[], Any]], repeats: int) -> list[float]:
-    """Least processor time of each of several actions, in seconds; run in turn, on the same machine then.
+    """Least processor time of each of several actions, in seconds; they run in turn, in the same minutes.
 
-    Of all threads, as if they had to share one core; what other processes take does not count.
+    It is the time of all threads, as if they shared one core; other processes do not count.
 
     Parameters
     ----------
     actions : sequence of callables
-        What to time.
+        Actions to time.
     repeats : int
-        How often each.
+        Number of runs of each.
     """
     times = [[timed(action, 1)[0].cpu for action in actions] for _ in range(repeats)]
     return np.min(times, axis=0).tolist()
 
 
 def software(way: str, baseline: str, pixels: int, repeats: int) -> dict[str, Any]:
-    """Two ways in software on the same spans: times as a ratio, operations a pixel, and how far they differ.
+    """Two ways in software on the same spans: ratio of times, operations a result, and largest difference.
 
     Both are NumPy in float64, vectorised over `SPANS` random spans of up to 45 degrees, their setup included.
 
     Parameters
     ----------
     way, baseline : str
-        Of `WAYS`.
+        Two of `WAYS`.
     pixels : int
-        Pixels of each span: of a bisection, one more, a power of two.
+        Pixels of each span; for a bisection a power of two, one more than its results.
     repeats : int
         Runs of each; the fastest counts.
 
     Returns
     -------
     dict
-        ``ratio``: time of the baseline over time of the way. ``operations``, ``baseline_operations``: a
-        result, by kind (see `Counted`). ``difference``: largest of a component of a normal, or of a cosine.
+        ``ratio``: time of the baseline over time of the way. ``operations``, ``baseline_operations``:
+        operations a result, by kind (see `Counted`). ``difference``: largest difference of a component of a
+        normal, or of a cosine.
     """
     operands = random_operands()
     pair = WAYS[way], WAYS[baseline]
@@ -113,7 +114,7 @@ def software(way: str, baseline: str, pixels: int, repeats: int) -> dict[str, An
 
 
 def prices(repeats: int) -> dict[str, float]:
-    """What a division, a root and a cosine cost in NumPy, in multiplications of as many numbers.
+    """Times of a division, a root and a cosine in NumPy, as ratios to a multiplication.
 
     Parameters
     ----------
@@ -139,8 +140,8 @@ def hardware(name: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``latency`` and ``interval`` in cycles, ``cells``, ``multipliers``, ``register_bits``, and
-        ``memory_bits``.
+        ``latency`` and ``interval`` (initiation interval) in cycles, ``cells``, ``multipliers``,
+        ``register_bits``, and ``memory_bits``.
     """
     row = row_of(_entry(name), None)
     return {
@@ -158,14 +159,14 @@ def clock_rate(name: str, seeds: int, tools: dict[str, str | None]) -> dict[str,
     name : str
         The unit.
     seeds : int
-        Placements.
+        Number of placements.
     tools : dict of str to str or None
-        Versions of the tools, which the result depends on.
+        Versions of the tools, as the result depends on them.
 
     Returns
     -------
     dict
-        ``fmax``: median, MHz, or ``None``; ``reason`` why.
+        ``fmax``: median clock rate in MHz, or ``None`` with the ``reason``.
     """
     if None in tools.values():
         return {"fmax": None, "reason": "place and route is not installed: pip install 'blysk[fpga]'"}
@@ -184,7 +185,7 @@ def frame_cycles(name: str, triangles: int, width: int, height: int) -> float:
     name : str
         The interpolator.
     triangles : int
-        Of the teapot.
+        Triangles of the teapot, about.
     width, height : int
         Size of the picture.
     """
@@ -201,7 +202,7 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
     Parameters
     ----------
     triangles : int
-        Of the teapot.
+        Triangles of the teapot, about.
     width, height : int
         Size of the picture.
     repeats : int
@@ -225,27 +226,27 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
 
 
 def square_errors(method: str, triangles: int, width: int, height: int) -> dict[str, Any]:
-    """MNSE of a frame as published in [T] 4.1, and its well-posed form.
+    """MNSE of a frame as published in [T] 4.1, and its well-posed form NMSE.
 
-    The frame is that of the bit-accurate model with the model cosquad, which the RTL equals to the bit; the
-    reference is the exact one, Phong shading with Blinn's model; both over the pixels of the surface.
+    The frame is by the bit-accurate model with the reflection model cosquad; the reference is the exact
+    frame, Phong shading with Blinn's model. Only pixels of the surface count.
 
     Parameters
     ----------
     method : str
         One of `METHODS` or `PUBLISHED`.
     triangles : int
-        Of the teapot.
+        Triangles of the teapot, about.
     width, height : int
         Size of the picture.
 
     Returns
     -------
     dict
-        ``nmse``, ``published``, ``defined`` (share of values where the published form is), ``max_lsb`` and
-        ``p999_lsb``; ``nearest``: share of the published form that the hundredth of the values nearest the
-        mean makes; ``worst`` and ``least``: the published form for the reference itself with 1 LSB more in
-        one value, where it counts most and least, and ``one``: NMSE of either.
+        ``nmse``, ``published``, ``defined`` (share of values for which the published form is defined),
+        ``max_lsb`` and ``p999_lsb``; ``nearest``: share of the published form that comes from the 1 % of the
+        values nearest the mean; ``worst`` and ``least``: the published form for the reference itself with
+        1 LSB more in the one value that counts most, or least; ``one``: NMSE of either.
     """
     scene = scene_for(teapot(triangles), 50, width, height)
     design = preset(method, "cosquad")

@@ -24,7 +24,7 @@ __all__ = [
 
 
 SPANS = 4096
-"""Spans that the ways in software work on together: few enough for their arrays to stay in a cache."""
+"""Spans that the ways in software compute at once: few, so that their arrays stay in a processor's cache."""
 
 WIDEST = 45.0
 
@@ -36,7 +36,7 @@ Way = Callable[[np.ndarray, np.ndarray, np.ndarray, int], Iterator[np.ndarray]]
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Dot products of columns, of arrays of three rows; operations that `Counted` counts."""
+    """Dot products of the columns of two arrays of three rows, by operations that `Counted` counts."""
     product = a * b
     return product[0] + product[1] + product[2]
 
@@ -50,7 +50,7 @@ def _scaled(vector: np.ndarray) -> np.ndarray:
 
 
 def _polynomial(coefficients: Sequence[float], x: np.ndarray) -> np.ndarray:
-    """Horner's rule; coefficients in ascending order."""
+    """Value of a polynomial by Horner's rule; coefficients in ascending order."""
     *rest, total = coefficients
     for coefficient in reversed(rest):
         total = total * x + coefficient
@@ -71,7 +71,7 @@ def _lines(normalised, left, right, vectors, pixels):
 
 
 def _forward_differences(left, right, vectors, pixels):
-    """[T] 2.2 and figure 2.10."""
+    """Normals by forward differences of the quadratic method ([T] 2.2 and figure 2.10)."""
     middle = 4 * _middle(left, right)
     dt = 1 / (pixels - 1)
     curvature = (2 * (left + right) - middle) * dt
@@ -93,7 +93,7 @@ def _middles_by_factor(left, right, vectors, pixels):
 
 
 def _halves(half, left, right, pixels):
-    """Normals between two others by bisection, from left to right; half takes both and the level."""
+    """Normals between two others by bisection, from left to right; ``half(left, right, level)`` halves."""
     levels = pixels.bit_length() - 1
 
     def between(left, right, level):
@@ -112,13 +112,13 @@ def _bisection_normalised(normalised, left, right, vectors, pixels):
 
 
 def _bisection(left, right, vectors, pixels):
-    """[T] 2.1: ``(N_a + N_b) p(z)``, ``z = 2 N_a·N_b``."""
+    """Bisection by ``(N_a + N_b) p(z)``, ``z = 2 N_a·N_b`` ([T] 2.1)."""
     folded = [coefficient * 2.0**power for power, coefficient in enumerate(ROOT_PUBLISHED[2])]
     return _halves(lambda a, b, level: (a + b) * _polynomial(folded, dot(a, b)), left, right, pixels)
 
 
 def _bisection_by_levels(left, right, vectors, pixels):
-    """The same with one factor for all arcs of a level: ``z`` becomes ``sqrt(2 + z)``."""
+    """`_bisection` with one factor for all arcs of a level: in the next, ``z`` becomes ``sqrt(2 + z)``."""
     z = 2 * dot(left, right)
     factors = []
     for _ in range(pixels.bit_length() - 1):
@@ -134,7 +134,7 @@ def _cosines_normalised(normalised, left, right, vectors, pixels):
 
 
 def _turn(left, right, vectors):
-    """Angle across the spans, and of both vectors: cosines to the left end, and to what follows it."""
+    """Angle of the spans, and cosines of both vectors to the left end and to the unit tangent there."""
     cosine = dot(left, right)
     angle = np.arccos(cosine)
     first, last = (np.stack([dot(end, vector) for vector in vectors]) for end in (left, right))
@@ -142,7 +142,7 @@ def _turn(left, right, vectors):
 
 
 def _cosines_by_angles(left, right, vectors, pixels):
-    """[T] 3.1: ``cos beta cos(lambda - t psi)``."""
+    """N·L and N·H by ``cos beta cos(lambda - t psi)`` ([T] 3.1)."""
     angle, cosines, sines = _turn(left, right, vectors)
     amplitude = np.sqrt(cosines * cosines + sines * sines)
     phase = np.arctan2(sines, cosines)
@@ -153,7 +153,7 @@ def _cosines_by_angles(left, right, vectors, pixels):
 
 
 def _recurrence(left, right, vectors, pixels):
-    """[T] 3.3: ``x(t+1) = 2 cos d x(t) - x(t-1)``."""
+    """N·L and N·H by the recurrence ``x(t+1) = 2 cos d x(t) - x(t-1)`` ([T] 3.3)."""
     angle, before, sines = _turn(left, right, vectors)
     step = angle / (pixels - 1)
     cosine = np.cos(step)
@@ -186,8 +186,8 @@ WAYS: dict[str, Way] = {
 }
 """Ways to the normals, or to N·L and N·H, of a span's pixels: functions of both ends, (L, H) and the pixels.
 
-Vectors are arrays of shape (3, spans), or (3, 1); a way gives an array of shape (3, spans), or of N·L and N·H
-(2, spans), after the other.
+Vectors are arrays of shape (3, spans) or (3, 1). A way yields an array for each pixel in turn: normals, shape
+(3, spans), or N·L and N·H, shape (2, spans).
 """
 
 
@@ -198,17 +198,17 @@ class Claim:
     Parameters
     ----------
     name : str
-        What is said to be faster.
+        The way that is said to be faster.
     source : str
-        Where.
+        Its place in [T].
     published : float
-        How many times.
+        The claimed ratio of speeds.
     ways, baselines : tuple of str
-        Of `WAYS`, to be compared each with each.
+        Some of `WAYS`: each way is compared with each baseline.
     units, baseline_units : tuple of str
-        The same in hardware, of `UNITS`.
+        Some of `UNITS`: the same in hardware.
     in_pixels : bool
-        Whether it depends on how long spans are.
+        Whether the ratio depends on the length of spans.
     """
 
     name: str
@@ -268,9 +268,9 @@ CLAIMS = (
 
 
 class Counted(np.ndarray):
-    """An array that counts the operations done with it, and with what comes of it, in `counts`.
+    """An array that counts in `counts` the operations on it and on their results.
 
-    An operation on arrays counts once an element. Made by `Counted.of`.
+    An operation on arrays counts once for each element. It is made by `Counted.of`.
     """
 
     counts: Counter[str]
@@ -292,8 +292,8 @@ class Counted(np.ndarray):
 
     @classmethod
     def of(cls, values: np.ndarray, counts: Counter[str]) -> "Counted":
-        """Values that count in ``counts``: multiplications, additions (subtractions are), divisions, roots,
-        functions, and comparisons.
+        """Values whose operations count in ``counts``: multiplications, additions and subtractions (both as
+        additions), divisions, roots, functions, and comparisons.
         """
         counted = np.asarray(values, dtype=np.float64).view(cls)
         counted.counts = counts
@@ -303,12 +303,12 @@ class Counted(np.ndarray):
         self.counts = getattr(source, "counts", Counter())
 
     def __array_function__(self, function, types, arguments, options):
-        """Keep counting in what arrays are joined to."""
+        """Keep counting in the results of functions, such as stacks of arrays."""
         result = super().__array_function__(function, types, arguments, options)
         return self.of(result, self.counts) if isinstance(result, np.ndarray) else result
 
     def __array_ufunc__(self, ufunc, method, *inputs, **options):
-        """Count, and work on plain arrays."""
+        """Count the operation, and do it on plain arrays."""
         plain = [x.view(np.ndarray) if isinstance(x, Counted) else x for x in inputs]
         counts = next(x.counts for x in inputs if isinstance(x, Counted))
         result = getattr(ufunc, method)(*plain, **options)
@@ -328,6 +328,6 @@ def random_operands(seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def finish(way: Way, operands: tuple, pixels: int) -> None:
-    """Run a way to its end."""
+    """Run a way for all pixels, without keeping its results."""
     for _ in way(*operands, pixels):
         pass

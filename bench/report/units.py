@@ -15,7 +15,7 @@ _QUICK = (
     *("dot_product", "middle_normal", "gpq", "difference_accumulator", "quadratic_evaluator"),
     *("diffuse", "specular", "power", "chord", "intensity"),
 )
-"""Units of a quick report: those that take least time."""
+"""Units of a quick report, which take least time."""
 
 _COLUMNS = (
     *("unit", "variant", "source", "as published", "unit of the errors", "model error", "arithmetic error"),
@@ -32,19 +32,19 @@ def measure(unit: str, variant: str, samples: int) -> dict[str, Any]:
     unit, variant : str
         Names.
     samples : int
-        About how many random operands.
+        Number of random operands, about.
     """
     (row,) = rows([entry_of(unit, variant)], samples)
     return row.as_dict()
 
 
 def tasks(quick: bool) -> list[Task]:
-    """A task a variant of a unit.
+    """A task for each variant of a unit.
 
     Parameters
     ----------
     quick : bool
-        The units that are measured soonest, each with `QUICK_SAMPLES` samples.
+        Whether only the quickest units are measured, each with `QUICK_SAMPLES` samples.
     """
     samples = QUICK_SAMPLES if quick else SAMPLES
     return [
@@ -59,14 +59,14 @@ def _is_slow(entry: Entry) -> bool:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The table of the units, with a column that tells variants as published from the others.
+    """The section: the table of the units, with a column that marks variants as published.
 
     Parameters
     ----------
     tasks : sequence of Task
         See `tasks`.
     results : sequence of dict
-        Of `measure`, in their order.
+        Results of `measure`, in their order.
     """
     lines = [
         (

@@ -1,7 +1,7 @@
-"""The core of this project beside others: rate, device, resources, light per pixel, verification.
+"""The core of this project beside other cores: rate, device, resources, light per pixel, verification.
 
-The figures of others are theirs, as their sources state them (docs/theory/references.md#other-hardware);
-none was measured here. What a source does not say is "not stated".
+The figures of other cores are those of their sources (docs/theory/references.md#other-hardware); none was
+measured here. A figure that a source does not give is "not stated".
 """
 
 from collections.abc import Sequence
@@ -25,15 +25,15 @@ class Core:
     Parameters
     ----------
     name : str
-        With its key among the references.
+        Name, with its key among the references.
     rate, device, resources : str
         As its source states them.
     per_pixel : str
-        What light it computes at every pixel.
+        Lighting that it computes at every pixel.
     verified : str
-        What its source says of that.
+        Its verification, as the source states it.
     source : str
-        Address.
+        Address of the source.
     """
 
     name: str
@@ -113,7 +113,7 @@ OTHERS = (
         "https://en.wikipedia.org/wiki/PICA200, https://3dbrew.org",
     ),
 )
-"""As their sources state."""
+"""Other cores, as their sources state."""
 
 
 def own(method: str, model: str, operand: tuple[str, ...], text: str) -> Core:
@@ -136,18 +136,18 @@ def own(method: str, model: str, operand: tuple[str, ...], text: str) -> Core:
 
 
 def tasks(quick: bool) -> list[Task]:
-    """None: nothing is measured here.
+    """No tasks: nothing is measured here.
 
     Parameters
     ----------
     quick : bool
-        Either way.
+        Without effect.
     """
     return []
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The table, and what in it cannot be compared."""
+    """The section: the table, and a text on figures that cannot be compared."""
     exact = "Phong shading with exact Blinn highlights at every pixel, {}"
     cores = [
         own("chord", "blinn", (), exact.format("no normal computed: two additions a pixel")),
