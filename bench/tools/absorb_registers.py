@@ -1,11 +1,10 @@
-"""Registers beside multipliers and memories moved into them: a step on an ECP5 netlist before nextpnr.
+"""Moves registers into the multipliers and memories beside them: a step on an ECP5 netlist before nextpnr.
 
-An ECP5 multiplier, MULT18X18D, has registers of its own for either operand and for the product, and a block
-RAM, DP16KD, has one behind the word that it reads. Yosys uses none of them. `absorb_registers` takes Yosys's
-JSON netlist and moves flip-flops that stand directly before or behind a multiplier, or behind a block RAM,
-into it. It also takes the carry from the end of chains that nobody reads, for which nextpnr would add a pair
-of look-up tables. Nothing else of the netlist changes, and what it does stays the same on every cycle from
-power-up on.
+An ECP5 multiplier, MULT18X18D, has registers for each operand and for the product, and a block RAM, DP16KD,
+has one for the word that it reads. Yosys uses none of them. `absorb_registers` takes Yosys's JSON netlist and
+moves flip-flops that are directly before or behind a multiplier, or behind a block RAM, into it. It also
+disconnects the last carry of a chain if it has no reader, since nextpnr would add a pair of look-up tables
+for it. Nothing else of the netlist changes, and its function stays the same in every cycle from power-up on.
 """
 
 from collections import defaultdict
@@ -27,27 +26,27 @@ _INVERTER = f"{0x5555:016b}"
 """Look-up table of the negated first input."""
 
 Pin = tuple[str, str, int]
-"""Of a cell: its name, that of the port, the bit."""
+"""A pin of a cell: names of the cell and the port, and the bit."""
 
 
 @dataclass(frozen=True)
 class Absorbed:
-    """What `absorb_registers` moved.
+    """Counts of `absorb_registers`.
 
     Parameters
     ----------
     operands, products : int
         Operands and products that have registers inside a multiplier.
     removed : int
-        Flip-flops that are gone; one with another reader stays.
+        Removed flip-flops; one with another reader stays.
     inverters : int
-        Look-up tables added, one for each enable that flip-flops used inverted, which multipliers cannot.
+        Added look-up tables, one for each enable that flip-flops used inverted, as multipliers cannot.
     closed : int
         Multipliers with registers for both operands and the product.
     words : int
         Read ports of block RAMs that have a register inside.
     carries : int
-        Chains whose last carry nobody reads.
+        Chains whose last carry was disconnected.
     """
 
     operands: int = 0
@@ -114,10 +113,11 @@ class _Netlist:
             self.pins[bit].discard((cell, port, 0))
 
     def control(self, cell: str) -> _Control | None:
-        """Control of a flip-flop that a multiplier's register can stand for; ``None`` if none can.
+        """Control of a flip-flop that a multiplier's register can replace; ``None`` if it cannot.
 
-        A multiplier's registers are 0 at power-up and are clocked by the rising edge. Whether reset or enable
-        comes first is not known, so that one with a reset stays. One at a port stands for another unit.
+        A multiplier's registers are 0 at power-up and have a rising clock edge. It is not documented whether
+        their reset or enable has priority, so flip-flops with a reset stay. Flip-flops at a port stay, too:
+        they represent another unit.
         """
         parameters = self.cells[cell]["parameters"]
         mode = {key: str(value).strip() for key, value in parameters.items()}
@@ -139,7 +139,7 @@ class _Netlist:
         return _Control(clock, enable, mode["CEMUX"] == "INV")
 
     def enable_of(self, control: _Control) -> Any:
-        """Net that is high while a register of this control is enabled; made by an inverter where needed."""
+        """Net that is high while a register of this control is enabled; with a new inverter if needed."""
         if not control.inverted:
             return control.enable
         if control.enable not in self.inverted:
@@ -160,7 +160,7 @@ class _Netlist:
         return self.inverted[control.enable]
 
     def use(self, cell: str, register: str, control: _Control) -> None:
-        """Switch a register of a multiplier on: the first clock, and an enable that it has, or the next."""
+        """Switch on a register of a multiplier, with its first clock and an equal or free enable input."""
         multiplier, enable = self.cells[cell], self.enable_of(control)
         names = [f"CE{k}" for k in range(4)]
         free = [name for name in names if multiplier["connections"].get(name, [enable]) == [enable]]
@@ -180,7 +180,7 @@ class _Netlist:
         }
 
     def fits(self, cell: str, controls: set[_Control | None]) -> _Control | None:
-        """The one control of a register's bits, of the clock that the multiplier has; else ``None``."""
+        """Common control of a register's bits; ``None`` if there is none or the clock does not fit."""
         if len(controls) != 1:
             return None
         (control,) = controls
@@ -210,7 +210,7 @@ class _Netlist:
         return True
 
     def inverse_of(self, net: Any) -> Any:
-        """What a look-up table makes a net of by inverting it; ``None`` if nothing does."""
+        """Net of which a look-up table makes ``net`` by inverting it; ``None`` if there is no such table."""
         drivers = [name for name, port, _ in self.pins[net] if port == "Z"]
         if not drivers or self.cells[drivers[0]]["type"] != "LUT4":
             return None
@@ -227,17 +227,16 @@ class _Netlist:
         return sources.pop() if low & 1 and not high & 1 else None
 
     def absorb_word(self, cell: str, ports: str) -> bool:
-        """Move the flip-flops behind the word that a block RAM reads into it.
+        """Move the flip-flops behind a block RAM's read word into it, if their enable is the read port's.
 
-        Where the flip-flops are enabled with the read port itself: whether its enable counts for the register
-        behind it, too, then does not matter.
+        With equal enables it does not matter whether the read port's enable also acts on its output register.
 
         Parameters
         ----------
         cell : str
             The block RAM.
         ports : str
-            ``A`` or ``B``, or both where these are one of 36 bits, which is read as ``B``.
+            ``A``, ``B``, or ``AB`` if both form one port of 36 bits, which is read as ``B``.
         """
         moved: dict[str, str] = {}
         for port in ports:
@@ -270,14 +269,14 @@ class _Netlist:
         return True
 
     def absorb_words(self, cell: str) -> int:
-        """Move the flip-flops behind either port of a block RAM into it; how many ports."""
+        """Move the flip-flops behind each read port of a block RAM into it; the number of ports."""
         # A parameter that is left out has its default, 18.
         bits = self.cells[cell].get("parameters", {}).get("DATA_WIDTH_B", f"{_WORD_BITS:b}")
         wide = int(str(bits), 2) == 2 * _WORD_BITS
         return sum(self.absorb_word(cell, ports) for ports in (("AB",) if wide else "AB"))
 
     def end_carry(self, cell: str) -> bool:
-        """Take the carry from the end of a chain, where nobody reads it."""
+        """Disconnect the last carry of a chain if it has no reader; whether it was."""
         bit = self.net(cell, "COUT")
         if not isinstance(bit, int) or bit in self.ports or self.pins[bit] != {(cell, "COUT", 0)}:
             return False
@@ -285,7 +284,7 @@ class _Netlist:
         return True
 
     def beside_operand(self, cell: str, operand: str) -> tuple[_Control, dict[str, str]] | None:
-        """Control of the flip-flops before an operand, and these by port; ``None`` if they cannot move."""
+        """Control of an operand's flip-flops, and their names by port; ``None`` if they cannot move."""
         found: dict[str, str] = {}
         for k in range(_OPERAND_BITS):
             bit = self.net(cell, f"{operand}{k}")
@@ -299,11 +298,11 @@ class _Netlist:
         return None if control is None else (control, found)
 
     def absorb_operands(self, cell: str, closes: bool) -> int:
-        """Move the flip-flops before both operands in, or of one behind other flip-flops; how many operands.
+        """Move the flip-flops before both operands, or before one, into a multiplier; number of operands.
 
-        nextpnr times a multiplier with a register for one operand alone as if it had none there. What is
-        before that register is then on a path through the multiplier: with a register of the product, and
-        nothing but flip-flops before, such a path is still short.
+        If one operand alone has a register, nextpnr times the multiplier as if it had none: the logic before
+        that register is then on a path through the multiplier. So those of one operand move only if the
+        product has a register (``closes``) and they follow other flip-flops: such a path is still short.
         """
         beside = {operand: self.beside_operand(cell, operand) for operand in "AB"}
         if None in beside.values():
@@ -332,11 +331,11 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
 
     All bits of an operand, or of a product, must be flip-flops of one clock and one enable that have no
     reset, are 0 at power-up, and are not at a port of the module. Bits of an operand may also be constant 0.
-    A product must have no reader but its flip-flops, one each. A flip-flop of an operand that has another
-    reader stays for that one. Of one operand alone they move only if flip-flops are before them and the
-    product has a register, too. An enable that flip-flops use inverted gets one look-up table, for all
-    multipliers. The word that a block RAM reads has no reader but its flip-flops, which have the enable of
-    the read port.
+    Each bit of a product must have one reader, its flip-flop. A flip-flop of an operand with another reader
+    also stays for that reader. The flip-flops of only one operand move if there are flip-flops before them
+    and the product has a register, too. An enable that flip-flops use inverted gets one look-up table for
+    all multipliers. The word that a block RAM reads must have no reader but its flip-flops, with the enable
+    of the read port.
 
     Parameters
     ----------
@@ -349,11 +348,11 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     Returns
     -------
     netlist : dict
-        With ``REG_INPUTA``, ``REG_INPUTB`` and ``REG_OUTPUT`` of its multipliers in use: clock ``CLK0``,
-        enables ``CE0`` to ``CE2``, reset ``RST0`` constant 0; ``REGMODE`` and ``OCE`` of its block RAMs; and
-        no ``COUT`` at the end of a chain.
+        Netlist whose multipliers use ``REG_INPUTA``, ``REG_INPUTB`` and ``REG_OUTPUT``, with clock ``CLK0``,
+        enables ``CE0`` to ``CE2`` and the constant 0 at reset ``RST0``; whose block RAMs use ``REGMODE`` and
+        ``OCE``; and whose chains have no unread ``COUT`` at the end.
     absorbed : Absorbed
-        What was moved.
+        Counts of the moved registers.
     """
     module = netlist["modules"][top]
     work = _Netlist(module)

@@ -1,7 +1,7 @@
-"""The table of the units: how much each variant errs, how fast it is and what it costs.
+"""The table of the units: errors, latency, interval and cost of each variant.
 
-``blysk blocks`` prints it, of the records of `blysk.sim.units`. Errors come from the bit-accurate models and
-float64 mathematics, times from the units or a simulation of them, parts from their netlists.
+``blysk blocks`` prints it, from the records of `blysk.sim.units`. Errors come from the bit-accurate models
+and float64 mathematics, times from the units or a simulation of them, parts from their netlists.
 """
 
 import os
@@ -43,7 +43,7 @@ SAMPLES = 1_000_000
 """Random operands of a line."""
 
 SEED = 1
-"""Of the operands."""
+"""Seed of the random operands."""
 
 _CHUNK = 1 << 17
 """Samples that are measured at once; bounds the memory."""
@@ -58,9 +58,9 @@ class Entry:
     Parameters
     ----------
     record : Record
-        Of the unit.
+        Record of the unit.
     name : str
-        Of the variant.
+        Name of the variant.
     """
 
     record: Record
@@ -68,17 +68,17 @@ class Entry:
 
     @property
     def variant(self) -> Variant:
-        """What the record holds of it."""
+        """The variant in the unit's record."""
         return self.record.variants[self.name]
 
     @property
     def title(self) -> str:
-        """Names of the unit and the variant, as the baselines and ``blysk fpga`` have them."""
+        """Name of unit and variant, as in the baselines and in ``blysk fpga``."""
         return f"{self.record.name} {self.name}".rstrip()
 
 
 def entries_of(record: Record) -> tuple[Entry, ...]:
-    """Variants of a unit of which errors are measured."""
+    """Entries of a unit's variants whose errors are measured."""
     return tuple(Entry(record, name) for name, variant in record.variants.items() if variant.measure)
 
 
@@ -101,22 +101,22 @@ ENTRIES: tuple[Entry, ...] = tuple(entry for record in RECORDS.values() for entr
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table with its figures.
+    """Figures of a line of the table.
 
     Parameters
     ----------
     entry : Entry
         The variant.
     samples : int
-        Results that were compared, a component of a vector being one.
+        Number of compared results; each component of a vector counts.
     errors : tuple of float or None
         Model, arithmetic and total error.
     latency : int
         Cycles from an input to its first result.
     interval : int
-        Cycles from a result to the next.
+        Initiation interval: cycles from a result to the next.
     cost : Cost
-        Parts.
+        Parts of the netlist.
     """
 
     entry: Entry
@@ -155,7 +155,7 @@ class Row:
 
 
 def _times(entry: Entry, unit: Component) -> tuple[int, int]:
-    """Latency, and cycles from a result to the next: stated by the unit, else found by simulation."""
+    """Latency, and cycles from a result to the next: stated by the unit, or measured by simulation."""
     variant, latency = entry.variant, getattr(unit, "latency", None)
     interval = getattr(unit, "initiation_interval", getattr(unit, "cycles_per_pixel", None))
     if isinstance(latency, int) and isinstance(interval, int):
@@ -183,11 +183,11 @@ def rows(
     entries : sequence of Entry
         Variants.
     samples : int
-        About how many random operands; 40 or more.
+        Number of random operands, about; 40 or more.
     seed : int
-        Of the operands. Every entry starts from it, so that a line does not depend on the others.
+        Seed of the operands. Every entry starts from it, so that a line does not depend on the others.
     jobs : int
-        Processes that the entries are spread over. The lines are the same, and in the same order.
+        Number of processes. It does not change the lines or their order.
     """
     if jobs == 1 or len(entries) < 2:
         for entry in entries:
@@ -207,7 +207,7 @@ def _found(unit: str, variant: str, samples: int, seed: int) -> tuple:
 
 
 def _row(entry: Entry, samples: int, seed: int) -> Row:
-    """Row of an entry, of whose results only the worst are kept."""
+    """Row of an entry, measured in parts whose results are not kept."""
     count, worst = 0, []
     for sample in _chunks(entry, samples, seed):
         count += np.size(sample.found)
@@ -229,7 +229,7 @@ def sample_of(entry: Entry, samples: int = SAMPLES, seed: int = SEED) -> Sample:
 
 
 def row_of(entry: Entry, sample: Sample | None) -> Row:
-    """Row of an entry whose errors have been measured; `None`: they have not."""
+    """Row of an entry and its measured errors; ``None``: without errors."""
     count, errors = (0, (None, None, None)) if sample is None else (np.size(sample.found), sample.errors)
     unit = entry.variant.unit()
     return Row(entry, count, errors, *_times(entry, unit), cost_of(unit))
@@ -261,7 +261,7 @@ def _figure(error: float | None) -> str:
 
 
 def cells_of(row: Row) -> tuple[str, ...]:
-    """A line's cells, as the printed table has them."""
+    """A line's cells in the printed table."""
     cost = row.cost
     errors = map(_figure, row.errors)
     widths = sorted(cost.multipliers.items(), reverse=True)
@@ -308,13 +308,13 @@ def table(lines: Sequence[Row]) -> str:
 def command(samples, seed, jobs, figures):
     """Measure every variant of every unit, and print a table.
 
-    Errors are the largest found: of the model, the formula of the unit in float64 against the exact function;
-    of the arithmetic, the unit against that formula; and in total. They are in units of a full term or a
-    vector's length, or as the third column says; rate: of a gate's decisions, those that let a dark span
-    through, those that stop a lit one, and both. Of units of whole spans a sample is a pixel. lat: cycles
-    from an input to its first result; int: cycles from a result to the next; ROM and regs in bits;
-    multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. Of a bisection the variant is the
-    degree and the widest span in degrees.
+    Errors are the largest ones found: model error, of the unit's formula in float64 against the exact
+    function; arithmetic error, of the unit against that formula; and total error. Their unit is a full term
+    or a vector's length, or the third column names it; rate: the shares of a gate's decisions that let a dark
+    span through, that stop a lit one, and both. For units of whole spans a sample is a pixel. lat: cycles
+    from an input to its first result; int: cycles from a result to the next; ROM and regs are in bits;
+    multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. The variant of a bisection gives its
+    degree and its widest span in degrees.
 
     \b
     Example:

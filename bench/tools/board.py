@@ -1,10 +1,10 @@
 """``blysk board``: a mesh on a monitor, as a bitstream for a board, or simulated down to the lanes.
 
-The same top goes both ways: `GpuUnit`, which draws the turning mesh from block RAM in bands and sends them
-to a monitor at 640x480 and 60 Hz. For a bitstream it gets the board's pins and a PLL, is mapped, placed and
-routed by tools that pip installs, held against the clocks that it needs, and read back. Simulated, its output
-cells are our models; the bits of the four lanes are decoded as a monitor does, and the frames compared with
-those of the bit-accurate model.
+Both use the same top module, `GpuUnit`, which draws the turning mesh from block RAM in bands and sends them
+to a monitor at 640x480 and 60 Hz. For a bitstream it gets the board's pins and a PLL, and tools that pip
+installs map, place and route it; its clock rates are compared with the needed ones, and the bitstream is read
+back. In simulation its output cells are our models; the bits of the four lanes are decoded as in a monitor,
+and the frames compared with those of the bit-accurate model.
 """
 
 import json
@@ -81,12 +81,12 @@ def command(
 ):
     """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
-    Without --simulate a bitstream is made; parts and clock rates are printed against what the board has and
-    the design needs, and the exit status is 1 if a clock is not met. With it, frames are decoded from the
-    simulated lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or
-    if the frames are too heavy for 60 Hz.
+    Without --simulate a bitstream is made. Used and available parts and reached and needed clock rates are
+    printed, and the exit status is 1 if a clock is not met. With it, frames are decoded from the simulated
+    lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or if the
+    frames are too heavy for 60 Hz.
 
-    On a 25F the default model is cosquad: with blinn no placement of its design has been routed so far.
+    On a 25F the default model is cosquad: so far no placement of the design with blinn has been routed.
 
     The buttons of the board stop the motion, turn it round, and change the material and the light.
 
@@ -151,13 +151,13 @@ def command(
 
 
 def _figures(built: Built) -> dict[str, Any]:
-    """What is recorded of a bitstream."""
+    """Figures of a bitstream for the JSON file."""
     clocks = {clock.name: asdict(clock) for clock in built.clocks}
     return {"seed": built.seed, "bytes": len(built.bitstream), "parts": built.parts, "clocks": clocks}
 
 
 def _recorded(path: str | None) -> dict[str, Any]:
-    """What a JSON file of figures has, which may not be there yet; checked before long work."""
+    """Figures of a JSON file, empty if there is no such file yet; checked before long work."""
     if path is None:
         return {}
     check_writable(path)
@@ -193,7 +193,7 @@ def _frame_cycles(gpu: Gpu, plan: ClockPlan) -> float:
 
 
 def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
-    """Refuse what cannot be drawn in time however simple its spans are."""
+    """Refuse a mesh whose triangles and vertices alone take longer than a frame of the display."""
     least, most = least_cycles(gpu.drawing), _frame_cycles(gpu, plan)
     if least > most:
         raise InputError(
@@ -207,7 +207,7 @@ def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
 def _simulate(
     board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
 ) -> dict[str, Any]:
-    """Frames through the lanes, written, and held against the model and the exact frame; their figures."""
+    """Simulate and write frames, and compare them with the model's and the exact frame; their figures."""
     paths = [folder / f"frame-{number:04}.png" for number in range(1, count + 1)]
     made = not folder.exists()
     try:
@@ -251,7 +251,7 @@ def _simulate(
 
 
 def _toggles(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
-    """Register bits that toggle in a frame, those of the drawing and of the display."""
+    """Toggled register bits a frame, of the drawing and of the display."""
     rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
     top = ToggleCounter(OneClock(GpuUnit(gpu, compact=board.compact), rate))
     counts = show(top, gpu.buffer.mode, count).status
@@ -269,21 +269,21 @@ def _toggles_line(counted: Mapping[str, int]) -> str:
 
 
 def _busy(gpu: Gpu, shown: Shown) -> float:
-    """Cycles of drawing a frame: of all bands begun, but for those in which nothing was asked for."""
+    """Mean busy cycles of drawing a frame, from all begun bands; cycles without a request do not count."""
     return shown.status["busy"] / max(shown.status["bands"], 1) * gpu.drawing.bands
 
 
 def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected: np.ndarray) -> Iterator[str]:
-    """What was simulated: frames, cycles, errors.
+    """Lines on a simulation: frames, cycles, errors.
 
     Parameters
     ----------
     gpu, scene, plan
-        What was simulated.
+        Drawing, first scene and clocks of the simulation.
     shown : Shown
-        What came of it.
+        Its result.
     expected : uint8 array, shape (n, height, width, 3)
-        The model's frames.
+        Frames of the bit-accurate model.
     """
     count = len(shown.frames)
     equal = sum((found == wanted).all() for found, wanted in zip(shown.frames, expected, strict=True))
@@ -306,7 +306,7 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
 
 
 def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
-    """By how much frames are too heavy for the display, in one line; empty if none is."""
+    """One line that says by how much frames are too heavy for the display; empty if none is."""
     late = shown.status["late_bands"]
     if not late:
         return ""
@@ -317,7 +317,7 @@ def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
 
 
 def built_lines(built: Built) -> Iterator[str]:
-    """Parts and clocks of a bitstream, each against what there is or what is needed."""
+    """Lines on a bitstream: used and available parts, reached and needed clock rates."""
     for name, (used, available) in built.parts.items():
         yield f"{name:<16}{used:>7,} of {available:,}"
     for clock in built.clocks:
@@ -329,7 +329,7 @@ def built_lines(built: Built) -> Iterator[str]:
 
 
 def missed(built: Built) -> str:
-    """The clock that is missed by most, in one line; empty if all are met."""
+    """One line on the clock that is missed by the largest factor; empty if all are met."""
     clock = min(built.clocks, key=lambda clock: clock.reached / clock.needed)
     if clock.met:
         return ""

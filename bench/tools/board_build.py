@@ -1,4 +1,4 @@
-"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, and the clocks reached."""
+"""Bitstreams: a board's top by Yosys, nextpnr and ecppack, with its pins and the reached clock rates."""
 
 import contextlib
 import importlib
@@ -42,7 +42,7 @@ __all__ = [
 _REMEDY = "pip install 'blysk[board]'"
 
 PERIODS = 1
-"""Periods of the reader's clock that a path between two clocks may take: what crosses stays for longer."""
+"""Periods of the reader's clock that a path between two clocks may take; crossing words stay longer."""
 
 _LIBRARY = """\
 read_verilog -lib -specify +/lattice/cells_sim_ecp5.v
@@ -50,10 +50,10 @@ read_verilog -lib +/lattice/cells_bb_ecp5.v
 """
 
 _FEWEST = 16
-"""Registers of an enable, or of a reset: one with fewer becomes logic in front of them.
+"""Least number of registers of an enable or a reset; with fewer it becomes logic before the registers.
 
-The wires of enables are few in each tile. On a nearly full 25F 865 wires were used twice at best with all of
-them, and 7 with this limit, both without `_SETTINGS`.
+Each tile has few wires for enables. On a nearly full 25F at least 865 wires were used twice with all enables,
+and 7 with this limit, both without `_SETTINGS`.
 """
 
 _LEGALISE = f"""\
@@ -61,19 +61,19 @@ opt_clean
 dfflegalize -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r -cell $_DFFE_??_ 01 \
 -cell $_DFFE_?P??_ r -cell $_SDFFE_?P??_ r -mince {_FEWEST} -minsrst {_FEWEST}
 """
-"""What Yosys does in the step ``map_ffs``, with that limit."""
+"""Commands of Yosys's step ``map_ffs`` with the limit `_FEWEST`."""
 
 _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
-"""Of nextpnr. The placer makes the shortest wires. Where they are scarce, the other router takes up as many
-as it lays, and does not end on a 25F."""
+"""Options of nextpnr. This placer makes the shortest wires. Where wires are scarce, nextpnr's other router
+removes as many as it lays, and does not end on a 25F."""
 
 _ROUNDS, _FEW = 100, 10
-"""Rounds of the router after which it may be given up, and wires used twice of which it is not."""
+"""Rounds of the router after which it may be given up, and least number of wires used twice for that."""
 
 _SETTINGS = {"router2/currCongWeightMult": "0.2"}
-"""Settings of nextpnr, from the netlist: by how much a wire that is used twice costs more in each round.
+"""Settings of nextpnr, put into the netlist: the cost of a wire that is used twice grows by this each round.
 
-By default it costs the same for ever, and where wires are scarce some hundred stay in use twice.
+By default the cost is constant, and where wires are scarce some hundreds stay in use twice.
 """
 
 _PARTS = {
@@ -83,7 +83,7 @@ _PARTS = {
     "block RAMs": "DP16KD",
     "PLLs": "EHXPLLL",
 }
-"""What is counted, and what nextpnr calls it."""
+"""Parts that are counted, with nextpnr's names."""
 
 
 @dataclass(frozen=True)
@@ -93,23 +93,23 @@ class Board:
     Parameters
     ----------
     name : str
-        On the command line.
+        Name on the command line.
     module, platform : str
-        Where `amaranth_boards` has it.
+        Module and class in `amaranth_boards`.
     options : tuple of str
-        Of nextpnr: device, package, speed grade.
+        Options of nextpnr: device, package, speed grade.
     reference : int
         Rate of its clock, Hz.
     buttons : tuple of (str, int)
-        Resources, up to six: what the top does with each is the top's.
+        Name and number of up to six button resources; the top gives each its meaning.
     luts, block_rams, multipliers : int
-        Of its device, which has as many flip-flops as look-up tables.
+        Parts of its device, which has as many flip-flops as look-up tables.
     lines : int
-        Of a band: the device has the memory.
+        Lines of a band, by the memory of the device.
     loader : str
-        What openFPGALoader calls it.
+        Name of the board for openFPGALoader.
     compact : bool
-        Whether the device is small: compact geometry, shading that takes a span each 9 cycles.
+        Whether the device is small: geometry of compact style, and shading with setup interval 9.
     """
 
     name: str
@@ -195,7 +195,7 @@ def board_named(name: str) -> Board:
     Raises
     ------
     InputError
-        If there is none of that name; the line has the list.
+        If there is none of that name; the message lists the names.
     """
     if name not in BOARDS:
         raise InputError(f"board {name}", "unknown", f"use {', '.join(BOARDS)}")
@@ -208,7 +208,7 @@ def packages_missing() -> None:
     Raises
     ------
     InputError
-        If one is not, naming all that are missing.
+        If tools are missing; the message names all of them.
     """
     needed = ("amaranth-boards", "pyosys", ECP5.package)
     missing = [package for package in needed if version_of(package) is None]
@@ -224,7 +224,7 @@ class Clock:
     Parameters
     ----------
     name : str
-        Its domain, or ``one to another``.
+        Its domain, or two domains as ``one to another``.
     needed, reached : float
         Rates, MHz.
     path : str
@@ -238,13 +238,13 @@ class Clock:
 
     @property
     def met(self) -> bool:
-        """Whether it is fast enough."""
+        """Whether it reaches the needed rate."""
         return self.reached >= self.needed
 
 
 @dataclass(frozen=True)
 class Built:
-    """A bitstream, and what it took.
+    """A bitstream, its parts and its clocks.
 
     Parameters
     ----------
@@ -255,11 +255,11 @@ class Built:
     closed : int
         Multipliers with registers inside on both sides, between which nextpnr does not time.
     seed : int
-        Of the placement.
+        Seed of the placement.
     bitstream : bytes
-        As the FPGA loads it.
+        Bitstream that the FPGA loads.
     words : int
-        Words of memory that were read back from the bitstream and are equal.
+        Number of memory words that were read back from the bitstream and are equal.
     """
 
     parts: dict[str, tuple[int, int]]
@@ -271,13 +271,13 @@ class Built:
 
 
 def _script(draw: float) -> str:
-    """Yosys's commands: as for a unit, with the cells of pins and PLL known, for a drawing clock in MHz.
+    """Yosys's commands for a drawing clock in MHz: those of a unit, with the cells of pins and PLL.
 
-    Small enables become logic. Multiplexers that join two look-up tables are left out: they hold both beside
-    each other, and save few (20,150 instead of 20,101 on a 25F, with 1,336 of them).
+    Small enables become logic. Multiplexers that join two look-up tables are not used: both tables would have
+    to be placed side by side, and few are saved (20,101 instead of 20,150 on a 25F, with 1,336 of them).
 
-    The mapper saves look-up tables where paths take less than a third of the clock's period by its estimate,
-    whose wires are a third as long as those of a device that is nearly full.
+    The mapper saves look-up tables on paths that take less than a third of the clock's period by its
+    estimate: wires on a nearly full device are three times as long as it assumes.
     """
     mapped = re.sub(r"(?<=abc9\.D )\d+", str(round(1e6 / draw / 3)), ECP5.synthesis)
     *before, synthesis = mapped.splitlines(keepends=True)
@@ -287,9 +287,9 @@ def _script(draw: float) -> str:
 
 
 def _stuck(said: str) -> str:
-    """Why the router will not end, from what it says of its rounds; empty while it may.
+    """Reason why the router will not end, from its log; empty while it may end.
 
-    Where it ended, wires that are used twice halved at least as the rounds doubled.
+    In all runs that ended, the number of wires used twice at least halved when the rounds doubled.
     """
     twice = [int(number) for number in re.findall(r"^Info:\s+iter=\d+ wires=\d+ overused=(\d+)", said, re.M)]
     if len(twice) >= _ROUNDS and twice[-1] >= _FEW and 2 * min(twice) > twice[len(twice) // 2]:
@@ -316,11 +316,11 @@ def build(
     board : Board
         The board.
     top : Elaboratable
-        Its domains are its own.
+        The top, which makes its clock domains itself.
     rates : dict of str to float
-        Of the clocks, MHz, by domain: what its PLL makes.
+        Clock rates of its PLL in MHz, by domain.
     seeds : int
-        Placements to try until every clock is met; of none that does, the best is the result.
+        Most placements to try until every clock is met; if none meets all, the result is the best one.
     progress : callable
         Called with the name of each step.
 
@@ -383,7 +383,7 @@ def build(
 
 
 def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
-    """Refuse what has no place: the placer would say so after minutes, or try for ever.
+    """Refuse a netlist that does not fit: the placer would fail after minutes, or try for ever.
 
     Parameters
     ----------
@@ -395,7 +395,7 @@ def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
     Raises
     ------
     TooLarge
-        If it takes more of something than the device has, naming all of it.
+        If it takes more of some part than the device has; the message names all such parts.
     """
     kinds = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
     counts = {
@@ -432,7 +432,7 @@ def _used(report: Mapping[str, Any], kind: str) -> tuple[int, int]:
 
 
 def _clocks(report: Mapping[str, Any], rates: Mapping[str, float]) -> tuple[Clock, ...]:
-    """Clocks of nextpnr's report, with the path that limits each; then paths between clocks."""
+    """Clocks of nextpnr's report, each with its slowest path; then the paths between clocks."""
     names, result = {}, []
     for net, rate in report["fmax"].items():
         name = next(
@@ -467,13 +467,13 @@ def _told(path: Sequence[Mapping[str, Any]], delay: float) -> str:
 def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
     """Make ``top.bit`` of a configuration in text, read it back, and compare.
 
-    What is read back names some settings otherwise, as several names are one bit. So it is packed again,
-    which must give the same bytes; contents of memories are compared as they are.
+    The read-back text may name settings differently, as several names stand for one bit. So it is packed
+    again, which must give the same bytes; the contents of memories are compared directly.
 
     Returns
     -------
     int
-        Words of memory that are equal.
+        Number of memory words, all of them equal.
     """
     steps = (
         ("ecppack", configuration, "--bit", "top.bit"),

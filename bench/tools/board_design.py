@@ -1,4 +1,4 @@
-"""What a board draws: a scene with its presets for the buttons, and the top with the board's pins."""
+"""Design of a board: a scene with its presets for the buttons, and the top with the board's pins."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -34,26 +34,26 @@ from blysk.sim.errors import InputError
 __all__ = ["COLOURS", "OPTIONS", "BoardTop", "gpu_of", "least_cycles"]
 
 COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
-"""Bits of a pixel in the band buffer."""
+"""Pixel formats of the band buffer."""
 
 _LEFT_OUT = ("size", "projection", "viewer", "target", "method", "operand", "gate", "setup_interval", "style")
 
 OPTIONS = {name: option for name, option in {**SCENE, **DESIGN}.items() if name not in _LEFT_OUT}
-"""Options of the command: the picture's size is the display's, the camera a perspective one."""
+"""Options of the command; the size is that of the display, and the camera a perspective one."""
 
 _DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
 
 _COMPACT = {"setup_interval": 9, "model": "cosquad"}
-"""Defaults on a small device: cycles from a span to the next, and a model with which it has been routed."""
+"""Defaults on a small device: setup interval, and a model whose design has been routed."""
 
 MAX_LIGHTS = 4
-"""Lights of a board's scene."""
+"""Largest number of lights of a board's scene."""
 
 _SHINIER = 4
-"""How many times the exponent of the second material."""
+"""Factor of the second material's exponent over the first's."""
 
 _RENDERER_BLOCKS = 16
-"""Block RAMs of the renderer's own tables and buffers, as placed, of lists of commands and of motion."""
+"""Block RAMs, as placed, of the renderer's tables and buffers, of command lists and of motion."""
 
 
 def gpu_of(
@@ -67,13 +67,13 @@ def gpu_of(
     Parameters
     ----------
     board : Board
-        Whose memory the mesh must fit.
+        Board with the memory for the mesh.
     mesh : str
-        File, scene file, or ``teapot``.
+        Mesh file, scene file, or ``teapot``.
     given : dict
         Options of `OPTIONS`.
     colours : str, optional
-        Of `COLOURS`; by default the larger ones, or on a small device the smaller ones.
+        One of `COLOURS`; by default ``rgb888``, on a small device ``rgb565``.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def gpu_of(
 
 
 def _presets(scene: Scene, up: Any) -> list[Scene]:
-    """Two lights by two materials, the material changing first."""
+    """Presets of two lights by two materials; the material changes first."""
     shiny = tuple(
         replace(material, exponent=min(_SHINIER * material.exponent, MAX_EXPONENT))
         for material in scene.materials
@@ -125,7 +125,7 @@ def _presets(scene: Scene, up: Any) -> list[Scene]:
 
 
 def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer) -> None:
-    """Refuse a mesh that does not fit beside the bands."""
+    """Refuse a mesh that does not fit into the block RAMs beside the bands."""
     colours = block_rams(2 * buffer.pixels, sum(buffer.colour_bits))
     depths = block_rams(buffer.pixels, 27)
     left = board.block_rams - colours - depths - _RENDERER_BLOCKS
@@ -142,7 +142,7 @@ def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer) -> 
 
 
 def least_cycles(drawing: Drawing) -> int:
-    """Cycles that a frame of a drawing takes at least: walking its triangles for every band, its vertices."""
+    """Least cycles of a frame of a drawing: for its vertices, and for its triangles in every band."""
     return 3 * drawing.mesh.triangles * drawing.bands + 30 * drawing.mesh.vertices
 
 
@@ -156,7 +156,7 @@ class BoardTop(Elaboratable):
     gpu : Component
         A `GpuUnit`, or another component with ``pairs``, and ``buttons`` if it has some.
     plan : ClockPlan
-        Of the board's clock.
+        Clocks made from the board's clock.
     """
 
     def __init__(self, board: Board, gpu: Component, plan: ClockPlan):

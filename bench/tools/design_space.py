@@ -51,7 +51,7 @@ COSTS = {
     "registers": "register_bits",
     "memory": "memory_bits",
 }
-"""Names of the costs, and of the figures of `Cost.totals`."""
+"""Names of the costs, with their figures in `Cost.totals`."""
 
 OPERANDS = get_args(Operand)
 """Operands of the specular unit."""
@@ -75,10 +75,10 @@ class Candidate:
     method, model, lights, operand
         See `Design`.
     degree : int, optional
-        Of the method's polynomial in the angle: of the middle normal (``quadratic`` and its forms: 2, a plain
-        minimax fit, or 3), or of the bisection's factor (1 or 2).
+        Degree of the method's polynomial in the angle: for the middle normal (``quadratic`` and its forms: 2,
+        a plain minimax fit, or 3), or for the bisection's factor (1 or 2).
     fraction_bits : int, optional
-        Of the chord method's differences.
+        Fraction bits of the chord method's differences.
     style : str
         See `ShadingPipelineUnit`.
 
@@ -101,7 +101,7 @@ class Candidate:
 
     @cached_property
     def design(self) -> Design:
-        """Its pipeline, and bit-accurate model."""
+        """Its `Design`: the bit-accurate model of the pipeline."""
         usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
         interpolator, changes = usual.interpolator, {}
         if self.fraction_bits is not None and not isinstance(interpolator, ChordInterpolator):
@@ -122,7 +122,7 @@ class Candidate:
 
     @property
     def command(self) -> str:
-        """What prints it as Verilog, in a shell."""
+        """Shell command that prints it as Verilog."""
         usual = preset(self.method, "cosquad", operand=self.operand).interpolator
         if self.method in METHODS and self.design.interpolator == usual:
             words = ["blysk", "verilog", "--method", self.method, "--model", self.model]
@@ -142,7 +142,7 @@ def _degrees(method: str) -> Sequence[int]:
 
 
 class Sweep(NamedTuple):
-    """Values that are tried with each other. A method without a choice is taken once.
+    """Values to combine in all ways. A method that lacks a choice is taken once.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class Sweep(NamedTuple):
     styles: Sequence[str] = STYLES
 
     def candidates(self) -> tuple[list[Candidate], dict[str, int]]:
-        """Every design once, and how many combinations are impossible, by the reason."""
+        """Every design once, and the number of impossible combinations for each reason."""
         found: dict[Candidate, None] = {}
         refused: dict[str, list[str]] = {}
         for method in self.methods:
@@ -184,7 +184,7 @@ class Sweep(NamedTuple):
 
 
 def _lit(scene: Scene, lights: int) -> Scene:
-    """The scene with so many lights in place of its one: evenly round an upright axis, together as bright."""
+    """The scene with its light replaced by several, evenly round an upright axis, together as bright."""
     (light,) = scene.lights
     directions = turned(light.direction, (0, 1, 0), lights).tolist()
     return replace(scene, lights=[Light(tuple(one), (1 / lights,) * 3) for one in directions])
@@ -196,18 +196,18 @@ def errors_of(candidate: Mapping[str, Any], view: Mapping[str, Any], exponent: i
     Parameters
     ----------
     candidate : dict
-        Of a `Candidate`.
+        Fields of a `Candidate`.
     view : dict
         Mesh and size, as for `frames`.
     exponent : int
-        Of the highlight.
+        Exponent of the highlight.
 
     Returns
     -------
     dict
-        ``errors``: by each of `ERRORS`, ``max_lsb``, ``p999_lsb`` and ``rmse_lsb``;
-        ``out_of_range_spans``: spans that are too wide for the design, whose pixels are not to be trusted;
-        ``lengths``: pairs of a length of spans and how many have it.
+        ``errors``: for each of `ERRORS` ``max_lsb``, ``p999_lsb`` and ``rmse_lsb``;
+        ``out_of_range_spans``: number of spans that are too wide for the design, whose pixels may be wrong;
+        ``lengths``: pairs of a length and the number of spans that have it.
     """
     tried = Candidate(**candidate)
     (scene,) = scenes_of(view, [exponent])
@@ -224,7 +224,7 @@ def errors_of(candidate: Mapping[str, Any], view: Mapping[str, Any], exponent: i
 
 
 def costs_of(candidate: Mapping[str, Any]) -> dict[str, int]:
-    """What a design takes, by `Cost.totals`; ``cycles_per_pixel`` and ``setup_interval``."""
+    """Resources of a design by `Cost.totals`, with its ``cycles_per_pixel`` and ``setup_interval``."""
     unit = Candidate(**candidate).unit()
     return cost_of(unit).totals | {
         "cycles_per_pixel": unit.cycles_per_pixel,
@@ -233,7 +233,7 @@ def costs_of(candidate: Mapping[str, Any]) -> dict[str, int]:
 
 
 def tasks_of(candidates: Iterable[Candidate], view: Mapping[str, Any], exponent: int) -> list[Task]:
-    """Measurements of designs on a scene; what designs of two styles have in common is one."""
+    """Measurements of designs on a scene; the errors of a design are one task for both styles."""
     found = []
     for candidate in candidates:
         found.append(Task(costs_of, {"candidate": asdict(candidate)}))
@@ -251,16 +251,16 @@ class Explored:
     candidate : Candidate
         The design.
     errors : dict of dict
-        Of `errors_of`.
+        Errors of `errors_of`.
     costs : dict
-        Of `Cost.totals`.
+        Figures of `Cost.totals`.
     cycles_per_pixel : float or None
-        At most, as the units state it: of each span ``max(cycles_per_pixel length, setup_interval)``, over
-        the pixels. Besides, a frame takes its constants' writes and the latency. It takes fewer where long
-        spans pay for short ones or pixels lack terms. ``None`` for ``bisection``, which states no interval
-        of the spans that it divides.
+        Upper bound from the figures of the units: the sum of ``max(cycles_per_pixel length, setup_interval)``
+        of all spans, over the number of pixels; writes of constants and latency come on top. A frame takes
+        less where a span is set up during the pixels of a longer one, or pixels lack terms. ``None`` for
+        ``bisection``, which states no interval of the spans that it divides.
     out_of_range_spans : int
-        Of `errors_of`.
+        Number of spans that are too wide, of `errors_of`.
     """
 
     candidate: Candidate
@@ -276,7 +276,7 @@ class Explored:
 
 
 def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
-    """Designs, from the results of `tasks_of`."""
+    """Measured designs, from the results of `tasks_of`."""
     measured = {
         (task.function, Candidate(**task.settings["candidate"])): result
         for task, result in zip(tasks, results, strict=True)
@@ -302,9 +302,9 @@ def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
 
 
 def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values: bool = True) -> np.ndarray:
-    """Which designs are on the Pareto front of largest error and cost: bool array.
+    """Whether each design is on the Pareto front of largest error and cost: bool array.
 
-    A design that flags spans as too wide is not on it.
+    A design that flags spans as too wide is not on the front.
 
     Parameters
     ----------
@@ -315,8 +315,8 @@ def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values
     cost : str
         One of `COSTS`.
     given_values : bool
-        Whether designs count that are given values of each light with a span, in place of normals: what it
-        takes to work these out is not in their cost.
+        Whether to include designs whose spans carry values of each light in place of normals: their cost does
+        not contain the computation of the values.
     """
     errors = [
         None
@@ -328,16 +328,16 @@ def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values
 
 
 def cheapest(designs: Sequence[Explored], error: str, largest: float, cost: str) -> list[int]:
-    """Indices of the designs whose largest error is at most that, the cheapest first.
+    """Indices of the designs whose largest error is at most ``largest``, the cheapest first.
 
-    Of equally cheap ones the more exact comes first. Designs that flag spans as too wide are left out.
+    Designs of equal cost are sorted by error. Designs that flag spans as too wide are left out.
 
     Parameters
     ----------
     designs, error, cost
         As for `front_of`.
     largest : float
-        LSB.
+        Limit of the largest error, in LSB.
     """
     usable = [
         (one.costs[COSTS[cost]], one.errors[error]["max_lsb"], index)

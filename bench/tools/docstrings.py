@@ -1,4 +1,4 @@
-"""Docstrings in the manner of the project as Markdown."""
+"""Conversion of the project's docstrings to Markdown."""
 
 import re
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ __all__ = [
 
 
 def inline(text: str) -> str:
-    """Inline literals, and what Markdown would take for its own."""
+    """A text as Markdown: literals in backticks, and characters of Markdown's syntax escaped."""
     parts = re.split(r"(``.+?``|:\w+:`[^`]+`|`[^`]+`)", text)
     for k, part in enumerate(parts):
         if k % 2:
@@ -28,7 +28,7 @@ def inline(text: str) -> str:
 
 
 def _table(lines: Sequence[str]) -> list[str]:
-    """A table whose columns are marked by runs of ``=``, as one of Markdown."""
+    """A table whose columns are marked by runs of ``=``, as a table of Markdown."""
     starts = [match.start() for match in re.finditer("=+", lines[0])]
     spans = list(pairwise([*starts, None]))
     rules = [k for k, line in enumerate(lines) if set(line.strip()) <= {"=", " "}]
@@ -65,7 +65,7 @@ _SECTIONS = {"Parameters", "Members", "Attributes", "Raises", "Returns", "Yields
 
 
 def markdown(text: str) -> str:
-    """A docstring in the project's manner as Markdown.
+    """Markdown of a docstring in the project's form.
 
     Parameters
     ----------

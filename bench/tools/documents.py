@@ -14,7 +14,7 @@ DOCUMENTS = {
     "theory": ("Theory", "models, methods, error bounds, sources"),
     "blocks": ("Units", "equations, formats, structure, timing and errors of each"),
 }
-"""Folders that a site may have: title, and what is there."""
+"""Folders that a site may have: title, and contents."""
 
 _LINK = re.compile(r'<a href="([^"#:]*)(#[^"]*)?"([^>]*)>(.*?)</a>', re.DOTALL)
 _IMAGE = re.compile(r'<img src="(\.\./[^":]*)"')
@@ -22,7 +22,7 @@ _HEADING = re.compile(r"<(h[1-6])>(.*?)</\1>", re.DOTALL)
 
 
 def slug(heading: str) -> str:
-    """Name of the anchor of a heading, as hosts of Markdown make it; HTML inside does not count."""
+    """Anchor of a heading, as hosts of Markdown name it; HTML in the heading is ignored."""
     text = re.sub(r"<[^>]+>|&\w+;", "", heading).strip().lower()
     return re.sub(r"[^\w\- ]", "", text).replace(" ", "-")
 
@@ -35,14 +35,14 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
     Parameters
     ----------
     folders : mapping of str to Path
-        By their names in the site, of `DOCUMENTS`.
+        Folders by their names in the site, keys of `DOCUMENTS`.
 
     Returns
     -------
     pages : dict of str to str
-        By file of the site; ``README.md`` is ``index.html``.
+        HTML by file of the site; ``README.md`` becomes ``index.html``.
     pictures : dict of str to Path
-        The same of SVG and PNG files, as they are.
+        SVG and PNG files to copy, by file of the site.
     """
     from markdown_it import MarkdownIt
 
@@ -77,7 +77,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
 
 
 def _image(match: re.Match, name: str, folder: Path, pictures: dict[str, Path]) -> str:
-    """A picture from outside of its folder, which comes with the folder's own."""
+    """Reference to a picture; one from outside the folder is added to the folder's pictures."""
     path = (folder / match[1]).resolve()
     if path.is_file() and path.suffix in (".svg", ".png"):
         pictures[f"{name}/{path.name}"] = path
@@ -86,7 +86,7 @@ def _image(match: re.Match, name: str, folder: Path, pictures: dict[str, Path]) 
 
 
 def _link(match: re.Match, name: str, folders: Mapping[str, Path]) -> str:
-    """A link of a page of a folder, as the site has it."""
+    """A link of a page, changed to the files of the site."""
     address, anchor, others, text = match[1], match[2] or "", match[3], match[4]
     if not address:
         return match[0]

@@ -1,7 +1,7 @@
 """Drawing of a structure: boxes in columns from left to right, arrows between them.
 
-A wide one is folded: its columns stand in bands below each other, and an arrow from a band to another ends
-at a tag and goes on from one of the same number.
+A wide drawing is folded: its columns are in bands below each other, and an arrow from one band to another
+ends at a tag and continues at a tag of the same number.
 """
 
 from collections import Counter, defaultdict
@@ -26,11 +26,11 @@ _WIDEST = 860.0
 _BETWEEN = 30.0
 """Width between columns, about."""
 _FORMULAS, _LONGEST, _SHORT = 4, 40, 20
-"""Formulas in a box, and characters of one in a box and in a tag; in place of a longer one is the name."""
+"""Most formulas in a box, and most characters of one in a box and in a tag; a name replaces a longer one."""
 _TAGS = 70.0
-"""Width that tags take on a side of a band, about."""
+"""Width of the tags on a side of a band, about."""
 _BAND = 6
-"""Cut arrows that a band more is worth."""
+"""Number of cut arrows that weigh as much as a further band."""
 _FACES = {
     "input": "#ffffff",
     "output": "#ffffff",
@@ -66,11 +66,11 @@ class _Band:
     graph : Graph
         Boxes and tags.
     columns : dict of int to int
-        Their columns, from 0 on, each with a box or a tag.
+        Column of each box and tag, from 0 on.
     back : set of (int, int)
         Arrows that lead back.
     sources : dict of int to int
-        Of a tag the box that its arrow comes from, in the whole graph.
+        For each tag the box in the whole graph from which its arrow comes.
     """
 
     graph: Graph
@@ -80,7 +80,7 @@ class _Band:
 
 
 def _shown(operations: Counter[str]) -> Counter[str]:
-    """Operations as they are written: a constant is named only as a multiplier's, which makes it none."""
+    """Operations as a box shows them: constants are marked at products only, which need no multiplier."""
     shown: Counter[str] = Counter()
     for symbol, number in operations.items():
         shown["× const" if symbol == "×c" else symbol.removesuffix("c")] += number
@@ -88,7 +88,7 @@ def _shown(operations: Counter[str]) -> Counter[str]:
 
 
 def _called(node: Node) -> str:
-    """What a tag calls a box: its only formula, or its name."""
+    """Text of a tag for a box: its only formula, or its name."""
     return node.formulas[0] if len(node.formulas) == 1 and len(node.formulas[0]) <= _SHORT else node.name
 
 
@@ -128,7 +128,7 @@ def _size(node: Node) -> tuple[float, float]:
 
 
 def _spread(wanted: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Places of a column's boxes in their order, without overlap, as near as can be to those wanted."""
+    """Places of a column's boxes in their order, without overlap, as near as possible to the wanted ones."""
     steps = np.r_[0.0, np.cumsum((heights[:-1] + heights[1:]) / 2 + _GAP)]
     blocks: list[list[float]] = []
     for value in wanted - steps:
@@ -197,7 +197,7 @@ class _Layout:
         return count
 
     def _order(self) -> None:
-        """Order each column by its neighbours' mean places; the order with fewest crossings counts."""
+        """Order each column by its neighbours' mean places; the order with the fewest crossings is kept."""
         best, fewest = [list(c) for c in self.columns], self._crossings()
         last = len(self.columns) - 1
         for sweep in range(40):
@@ -236,7 +236,7 @@ class _Layout:
                     self.places[k].y = float(y)
 
     def _close_gaps(self) -> None:
-        """Take out empty stripes, as between parts that no arrow joins."""
+        """Remove empty stripes, such as between parts without an arrow between them."""
         shift, bottom = 0.0, -np.inf
         for place in sorted(self.places, key=lambda p: p.y - p.height / 2):
             top = place.y - place.height / 2
@@ -247,7 +247,7 @@ class _Layout:
 
     @property
     def width(self) -> float:
-        """Distance of the outermost sides."""
+        """Width between the outermost sides."""
         return max(p.x + p.width / 2 for p in self.places) - min(p.x - p.width / 2 for p in self.places)
 
     def _set_columns(self) -> None:
@@ -285,7 +285,7 @@ def _cuts(graph: Graph, columns: dict[int, int]) -> list[int]:
 
 
 def _bands(graph: Graph) -> list[_Band]:
-    """A graph's boxes in one band, or in several where they would be too wide."""
+    """A graph's boxes in one band, or in several if one would be too wide."""
     columns, back = layers(graph)
     whole = _Band(graph, columns, back)
     starts = _cuts(graph, columns)
@@ -335,7 +335,7 @@ def draw_structure(graph: Graph) -> Figure:
     Parameters
     ----------
     graph : Graph
-        Structure, as `graph_of` gives it.
+        Structure, made by `graph_of`.
 
     Returns
     -------

@@ -24,7 +24,7 @@ _PUBLISHED = "total, as published"
 
 
 def _envelope(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Largest error in each interval; NaN where there is none."""
+    """Largest error in each interval; NaN in an interval without operands."""
     place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, len(edges) - 2)
     largest = np.full(len(edges) - 1, -1.0)
     np.maximum.at(largest, place, errors)
@@ -32,7 +32,7 @@ def _envelope(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 
 def _shares(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Share of errors in each interval; NaN where there is nothing."""
+    """Share of errors in each interval; NaN in an interval without operands."""
     counts, wrong = np.histogram(at.ravel(), edges)[0], np.histogram(at.ravel()[errors], edges)[0]
     return np.divide(wrong, counts, out=np.full(len(counts), np.nan), where=counts > 0)
 
@@ -45,7 +45,7 @@ class _Measured:
 
 
 def _distinct(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> list[_Measured]:
-    """Entries that were measured, those of equal results as one."""
+    """Measured entries; entries with equal results are merged."""
     found: list[_Measured] = []
     for entry, sample in zip(entries, samples, strict=True):
         if sample is None:
@@ -61,7 +61,7 @@ def _distinct(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> lis
 
 
 def _with_published(measured: Sequence[_Measured]) -> list[tuple[_Measured, _Measured | None]]:
-    """Panels: each variant of the project with the same one as published, if there are both."""
+    """Panels: each variant of the project with its form as published, if both exist."""
 
     def parts(label):
         return set(label.split(", ")) - {"as published", "as_published", ""}
@@ -93,14 +93,14 @@ def _intervals(
 
 
 def draw_errors(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> Figure:
-    """Largest errors against the axis of a unit, a panel a variant, with the one as published in it.
+    """Draw the largest errors against the axis of a unit: a panel for each variant and its published form.
 
     Parameters
     ----------
     entries : sequence of Entry
         Variants of the unit.
     samples : sequence of Sample or None
-        Of each; ``None`` for a variant that was not measured.
+        Sample of each variant; ``None`` if it was not measured.
     """
     panels = _with_published(_distinct(entries, samples))
     columns = 2 if len(panels) == 4 else min(len(panels), 3)
@@ -152,7 +152,7 @@ def draw_errors(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> F
 
 
 def _label(figure: Figure, axes: np.ndarray, record: Record, scale: str, decides: bool) -> None:
-    """Scales of the axes and what stands at them."""
+    """Set the scales and labels of the axes."""
     if record.logarithmic:
         axes[0, 0].set_xscale("log")
     if not decides:

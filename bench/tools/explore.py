@@ -1,9 +1,9 @@
-"""The design space: which pipelines draw a scene within an error, and what they cost.
+"""The design space: pipelines that draw a scene within an error limit, and their costs.
 
 ``blysk explore`` draws a scene with every design of a sweep over method, model, lights, polynomial degree,
-word length, operand and style, and lists the cheapest ones under a given error. Frames are those of the
-bit-accurate model, which are the simulated ones to the bit; costs are counted in the netlist. Every design is
-measured once: results are kept, so that a run that was stopped goes on where it was.
+word length, operand and style, and lists the cheapest ones under a given error. Frames are computed by the
+bit-accurate model, which the simulation equals to the bit; costs are counted in the netlist. Results are
+kept, so that every design is measured once, and a run that was stopped can continue.
 """
 
 import math
@@ -64,10 +64,10 @@ _WORDS = range(36, 47, 2)
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
 
 SERVED = LOBES | MODELS
-"""Specular units by reflection models; those of a roughness take the one of the exponent."""
+"""Specular units by reflection model; a model with a roughness takes that of the exponent."""
 
 EXPONENT = 50
-"""Of the default sweep."""
+"""Exponent of the default sweep."""
 
 _TRIANGLES = 10_000
 
@@ -78,13 +78,13 @@ _SIZE = (320, 240)
 
 
 def tasks(quick: bool) -> list[Task]:
-    """What to measure.
+    """Measurements of the section, at exponent `EXPONENT`.
 
     Parameters
     ----------
     quick : bool
-        Four methods on a teapot of 992 triangles at 160x120; else the default `Sweep` on one of 10,712 at
-        320x240. Exponent `EXPONENT`.
+        Four methods on a teapot of 992 triangles at 160x120; else the default `Sweep` on one of 10,712
+        triangles at 320x240.
     """
     if quick:
         sweep = Sweep(
@@ -102,7 +102,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """Error against cost of the designs of a sweep."""
+    """The section: error against cost of the designs of a sweep."""
     designs = explored(tasks, results)
     view = next(task.settings["view"] for task in tasks if task.function is errors_of)
     fronts = {
@@ -185,7 +185,7 @@ _CHOICES = ("method", "model", "lights", "operand", "degree", "fraction bits", "
 
 
 def _choices(candidate: Candidate) -> tuple[str | int | None, ...]:
-    """What tells a design from others, as tables have it."""
+    """Choices of a design, as cells of a table."""
     operand = candidate.design.interpolator.operand
     values = asdict(candidate) | {"operand": operand}
     return tuple(values.values())
@@ -233,7 +233,7 @@ def _drawing(designs: Sequence[Explored], fronts: Mapping[tuple[str, str], np.nd
 
 
 class _Some(click.ParamType):
-    """Names or whole numbers with commas between them."""
+    """Type of an option: names or whole numbers with commas between them."""
 
     def __init__(self, values: Sequence[str | int]):
         self.values = tuple(values)
@@ -243,7 +243,7 @@ class _Some(click.ParamType):
         return self.name
 
     def convert(self, value, param, ctx):
-        """Each once, or one line that refuses them."""
+        """The values, each once; `InputError` if one is unknown."""
         if isinstance(value, tuple):
             return value
         known = {str(one): one for one in self.values}
@@ -255,7 +255,7 @@ class _Some(click.ParamType):
 
 
 class _Error(click.ParamType):
-    """A largest error."""
+    """Type of an option: a limit of the largest error, in LSB."""
 
     name = "LSB"
 
@@ -331,12 +331,12 @@ _USUAL = Sweep()
 def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, figures, **choices):
     """Draw a scene with every design of a sweep, and list the cheapest under an error.
 
-    Choices are lists with commas, and are tried each with each; a method without a choice is taken once.
+    Choices are lists with commas, and are combined in all ways; a method that lacks a choice is taken once.
     Errors are in LSB of an 8-bit channel. Cells, multipliers, register and memory bits are counted in the
-    netlist, before technology mapping. Cycles are the most that a pixel takes, by what the units state for
-    the scene's spans; bisection states none for those that it divides. Designs with a * are on the Pareto
-    front of the sweep: none is better in error and cost. Several lights stand evenly round the scene. What
-    was measured before comes from the cache.
+    netlist, before technology mapping. Cycles are an upper bound for a pixel, from the units' figures for the
+    scene's spans; bisection states none for spans that it divides. Designs with a * are on the Pareto front
+    of the sweep: no design is better in both error and cost. Several lights stand evenly round the scene.
+    Earlier results come from the cache.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""Families of FPGAs: what Yosys and nextpnr need to know of each, and what a netlist takes of it."""
+"""Families of FPGAs: options of Yosys and nextpnr for each, and the parts that a netlist takes."""
 
 import re
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Parts:
-    """What a netlist takes of the FPGA.
+    """Parts of the FPGA that a netlist takes.
 
     Parameters
     ----------
@@ -45,36 +45,36 @@ class Parts:
 
 @dataclass(frozen=True)
 class Family:
-    """A family of FPGAs: one of its devices, the tools' options for it, and what they call its cells.
+    """A family of FPGAs: one of its devices, the tools' options for it, and the names of its cells.
 
     Parameters
     ----------
     device : str
-        What the figures are of.
+        Device, package and speed grade of the figures.
     capacity : Parts
-        What the device has.
+        Parts of the device.
     package : str
-        That brings its nextpnr.
+        Python package of its nextpnr.
     options : tuple of str
-        Of nextpnr.
+        Options of nextpnr.
     large : tuple of str
-        More of them, for designs of `_MANY` look-up tables and more.
+        Further options, for designs of `_MANY` look-up tables or more.
     synthesis : str
         Yosys's commands from a flat netlist to mapped cells, a line each.
     look_up_tables : str
-        What nextpnr's report counts them as.
+        Their name in nextpnr's report.
     flip_flop, multiplier, block_ram, distributed_ram : str
         Patterns of the kinds of cells that are counted.
     logic : str
-        Pattern of the other kinds.
+        Pattern of the other kinds of cells.
     untimed : str
-        Pattern of the cells that nextpnr does not time paths through: ``KIND``, or ``KIND.PARAMETER=VALUE``.
+        Pattern of the cells through which nextpnr times no paths: ``KIND``, or ``KIND.PARAMETER=VALUE``.
     registers : str
         A sentence on registers inside multipliers.
     limit : float or None
-        Largest clock rate, MHz, that is quoted of a design in which `absorb_registers` gave a multiplier
-        registers on both sides, between which nextpnr does not time. ``None``: registers stay as Yosys leaves
-        them.
+        Largest clock rate, MHz, that is quoted for a design with a multiplier that got registers on both
+        sides by `absorb_registers`, since nextpnr does not time the path between them. ``None``: registers
+        stay as Yosys leaves them.
     """
 
     device: str
@@ -134,7 +134,7 @@ ECP5_85F = replace(
     capacity=Parts(83640, 83640, 156, 208, 10455),
     options=("--85k", *ECP5.options[1:]),
 )
-"""The largest of the same family, for several pipelines."""
+"""Largest device of the family, for several pipelines."""
 
 NEXUS = Family(
     device="LIFCL-40, CABGA400, speed grade 7",
@@ -162,10 +162,10 @@ synth_lattice -family lifcl -top top -noiopad -run map_cells:""",
 FAMILIES = {"ecp5": ECP5, "nexus": NEXUS}
 
 DEVICES = FAMILIES | {"ecp5-85f": ECP5_85F}
-"""Families, each by the device that figures are of, and larger devices."""
+"""Devices by name: that of each family's figures, and larger ones."""
 
 DEVICE = ECP5.device
-"""What figures are of when no family is chosen."""
+"""Device of the figures if no family is chosen."""
 
 
 @dataclass(frozen=True)
@@ -175,17 +175,17 @@ class Place:
     Parameters
     ----------
     seed : int
-        Of the placement.
+        Seed of the placement.
     fmax : float
-        Largest clock rate, MHz; at most `Family.limit` where a multiplier is closed.
+        Largest clock rate, MHz; at most `Family.limit` if a multiplier is closed.
     start, end : str
         Registers, or memories, at the ends of the slowest path.
     logic, routing : float
         Nanoseconds of that path in cells and between them.
     kinds : dict of str to int
-        How many cells of each kind it goes through.
+        Number of cells of each kind on it.
     closed : int
-        Multipliers with registers inside on both sides, between which nextpnr does not time.
+        Multipliers with registers inside on both sides; nextpnr does not time the path between these.
     """
 
     seed: int
@@ -199,7 +199,7 @@ class Place:
 
 
 def signal_name(cell: str, family: Family) -> str:
-    """The register or memory that a cell is named by."""
+    """Name of the register or memory from which a cell has its name."""
     # nextpnr names the pieces of a cell by a `$` or `/` and a word.
     name = re.split(rf"_(?:{family.cells})_|(?<!^)[$/][A-Za-z]", cell)[0]
     # The pieces of a memory, and what Amaranth tells equal names apart by.
@@ -208,7 +208,7 @@ def signal_name(cell: str, family: Family) -> str:
 
 
 def kind_of_cell(cell: str, family: Family) -> str:
-    """What a cell on a path is."""
+    """Kind of a cell on a path."""
     if "$ccu2_comb" in cell.lower():
         return "carry"
     (*_, kind) = re.findall(f"_({family.cells})(?=_)", cell) or ("",)

@@ -1,4 +1,4 @@
-"""Formulas of a unit's registers: what a drawing calls them."""
+"""Formulas of a unit's registers, for the labels of a drawing."""
 
 import re
 from collections import defaultdict
@@ -13,10 +13,10 @@ __all__ = ["Formulas"]
 
 
 class Formulas:
-    r"""Formulas by the names of registers: those of a unit's data flows, and what its class states.
+    r"""Formulas by the names of registers, from a unit's data flows and from its class.
 
-    A functional unit's registers have the formulas of all its uses: those that take its operands each their
-    operand's, the others the result's, or the name of its word.
+    The registers of a functional unit have the formulas of all operations on it: an operand's register those
+    of its operands, another one those of the results, or the names of their words.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Formulas:
             found[name].append(formula.text)
 
     def of(self, name: str) -> tuple[str, ...]:
-        """Formulas of a register; none where it has none of its own."""
+        """Formulas of a register; empty if it has none."""
         for pattern, text in self._stated.items():
             if match := re.fullmatch(pattern, name):
                 return (match.expand(text),)

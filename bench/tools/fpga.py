@@ -1,19 +1,21 @@
-"""Place and route: what a unit or the pipeline takes of an FPGA, and how fast its clock may be.
+"""Place and route: parts of an FPGA that a unit or the pipeline takes, and its clock rate.
 
 ``blysk fpga`` prints it, from tools that pip installs: Yosys (package ``pyosys``) maps the netlist to the
 cells of a family of FPGAs, nextpnr (a package a family) places and routes them on a device of the family in
 its slowest speed grade, out of context: ports are no pins. Placement starts from a seed, and the clock rate
-differs by a few per cent from one to the next. A `Family` holds what differs: Lattice's ECP5, and Nexus.
+differs by a few per cent between seeds. There is a `Family` for Lattice's ECP5 and one for Nexus.
 
-Every port has a register before or behind it, so that every path of the design lies between registers and
-counts; the parts counted leave those registers out. Reset comes as it is: its delay is not counted.
+Every port has a register before or behind it, so that every path of the design is between registers and
+counts; these registers are not among the counted parts. The delay of reset is not counted.
 
-On ECP5 `absorb_registers` moves registers next to a multiplier into it, which Yosys does not. nextpnr times a
-multiplier with registers on one side in full; between registers on both sides it does not time. A clock rate
-of a design with such a multiplier is quoted up to `Family.limit`, and the design is named below the table. On
-Nexus it times each stage of a
-multiplier, its registers' clock-to-output and setup times too, and Yosys moves registers next to a multiplier
-into it; only a multiplier with an adder of its own has no delay, and is refused.
+On ECP5 `absorb_registers` moves registers beside a multiplier into it, as Yosys does not. nextpnr times a
+multiplier with registers on one side in full, but not the path between registers on both sides. The clock
+rate of a design with such a multiplier is quoted up to `Family.limit`, and the design is named below the
+table.
+
+On Nexus nextpnr times each stage of a multiplier, with its registers' clock-to-output and setup times, and
+Yosys moves registers beside a multiplier into it; only a multiplier with an adder inside has no delay, and is
+refused.
 """
 
 import os
@@ -50,7 +52,7 @@ _HEAD = ("design", "LUT", "FF", "mult", "BRAM", "LUTRAM", "min", "median", "max"
 
 
 def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
-    """The figures as aligned text, below what the device has; the path is that of the slowest seed."""
+    """The figures as aligned text, below the parts of the device; the path is that of the slowest seed."""
     lines = [_HEAD, (family.device, *map(str, asdict(family.capacity).values()), "", "", "", "")]
     for layout in layouts:
         slowest = min(layout.places, key=lambda place: place.fmax)
@@ -74,7 +76,7 @@ def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
 
 
 def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
-    """A line for each design in which nextpnr leaves the interior of a multiplier untimed."""
+    """A line for each design in which nextpnr does not time the inside of a multiplier."""
     for layout in layouts:
         if layout.closed:
             closed = f"{layout.closed} of {layout.parts.multipliers} multipliers"
@@ -85,7 +87,7 @@ def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
 
 
 def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """Entries of the table of the units, by unit, which is every variant, or by unit and variant."""
+    """Entries of the table of the units, by a unit's name (all its variants) or by unit and variant."""
     for name in names:
         found = [entry for entry in ENTRIES if name in (entry.title, entry.record.name)]
         if not found:
@@ -96,7 +98,7 @@ def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Comp
 def _pipelines(
     given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1, top: str = "shader"
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """The pipeline or another core, of one method or every one, by the options that are given."""
+    """The pipeline or another core by the given options, with one method or with every method."""
     for method in METHODS if every else (given.get("method", DESIGN["method"].default),):
         chosen = {**given, "method": method}
         made = design(lights=lights, **chosen)
@@ -153,10 +155,11 @@ def command(
 
     LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops, without
     those inside multipliers; mult: multipliers of 18x18 bits; BRAM: block RAMs of 18 Kibit; LUTRAM: memories
-    of 16x4 bits in look-up tables. The first line is what the FPGA has of them. Clock rates are in MHz, over
-    the seeds. The slowest path is that of the slowest seed: in cells and between them, and the registers at
-    its ends. What was placed before comes from the cache. On ECP5 registers beside a multiplier move into it;
-    between those on both sides of one the tool does not time, and says so below the table.
+    of 16x4 bits in look-up tables. The first line has the parts of the FPGA. Clock rates are in MHz, over the
+    seeds. The slowest path is that of the slowest seed: its delay in cells and between them, and the
+    registers at its ends. Earlier placements come from the cache. On ECP5 registers beside a multiplier move
+    into it; the tool does not time the path between registers on both sides, and a line below the table says
+    so.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""Structure of a unit as boxes and arrows: the graph, its layers, and which graphs are alike."""
+"""Structure of a unit as boxes and arrows: the graph, its layers, and a text to compare graphs."""
 
 import hashlib
 from collections import Counter, defaultdict
@@ -26,13 +26,13 @@ class Node:
     detail : str
         Width, format or size.
     operations : Counter
-        Symbols of the operations in the box, and how many of each; ``×c`` is by a constant.
+        Symbols of the operations in the box, and the number of each; ``×c`` is a product by a constant.
     copies : int
         Equal boxes that this one stands for.
     stages : int
         Registers of a plain delay that the box stands for.
     formulas : tuple of str
-        What the register holds, each in its turn.
+        Formulas of the words that the register holds in turn.
     """
 
     kind: str
@@ -53,7 +53,7 @@ class Graph:
     nodes : dict of int to Node
         Boxes.
     edges : dict of (int, int) to bool
-        Arrows from a box to another; false for one that only chooses or enables.
+        Arrows between boxes; true if the arrow carries data, false if it only chooses or enables.
     """
 
     nodes: dict[int, Node] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Graph:
         return number
 
     def connect(self, source: int, target: int, is_data: bool) -> None:
-        """Add an arrow; one that carries data is stronger than one that chooses."""
+        """Add an arrow; if there are two between the same boxes, the one that carries data counts."""
         self.edges[source, target] = self.edges.get((source, target), False) or is_data
 
     def neighbours(self, data_only: bool = False) -> tuple[dict[int, set[int]], dict[int, set[int]]]:
@@ -85,7 +85,7 @@ class Graph:
         self.edges = {edge: data for edge, data in self.edges.items() if numbers.issuperset(edge)}
 
     def bypass(self, number: int, loops: bool = False) -> None:
-        """Drop a box and join its sources to its targets, to themselves only if told."""
+        """Drop a box and join its sources to its targets; a box to itself only if ``loops``."""
         into = [(a, data) for (a, b), data in self.edges.items() if b == number and a != number]
         out = [(b, data) for (a, b), data in self.edges.items() if a == number and b != number]
         del self.nodes[number]
@@ -96,7 +96,7 @@ class Graph:
                     self.connect(a, b, first and second)
 
     def merge(self, group: Iterable[int]) -> int:
-        """Make one box of several: the first of the group stands for all."""
+        """Merge several boxes into the first of the group."""
         first, *others = group
         moved = dict.fromkeys(others, first)
         edges, self.edges = self.edges, {}
@@ -160,11 +160,11 @@ def layers(graph: Graph) -> tuple[dict[int, int], set[tuple[int, int]]]:
 
 
 _LIKENESS_DEPTH = 8
-"""Arrows from a box to those that tell it from another."""
+"""Length, in arrows, of the surroundings by which two boxes are compared."""
 
 
 def likeness(graph: Graph) -> str:
-    """A text that graphs share if they are alike but for widths, registers' names and constants."""
+    """A text that is equal for graphs that differ only in widths, registers' names and constants."""
     labels = {
         number: repr(
             (

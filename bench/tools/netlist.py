@@ -76,7 +76,7 @@ def _fields(name: str, shape) -> list[tuple[str, str, int, int]]:
 
 
 def _ports(component: wiring.Component) -> list[tuple[str, bool, str, object]]:
-    """Net, whether it is an input, name and shape of every member, without valid and ready."""
+    """Net, direction (true: input), name and shape of every member, without valid and ready."""
     ports = []
     for name, member in component.signature.members.items():
         is_input = member.flow == wiring.In
@@ -196,7 +196,7 @@ class Netlist:
                     graph.connect(source, number, data)
 
     def _find_held(self) -> set[tuple[str, int]]:
-        """Operands by which a choice leaves a register as it is: cell, and number of the operand."""
+        """Operands of multiplexers that only keep a register's word: cell, and number of the operand."""
         choices = {}
         for name, cell in self.cells.items():
             if cell["type"] in ("$mux", "$pmux"):
@@ -235,7 +235,7 @@ class Netlist:
         return True
 
     def _has_constant(self, cell) -> bool:
-        """Whether an operand is a constant."""
+        """Whether a cell has a constant operand."""
         operands = (cell["connections"].get(port, [0]) for port in "AB")
         return any(not any(isinstance(bit, int) for bit in operand) for operand in operands)
 
@@ -248,7 +248,7 @@ class Netlist:
         )
 
     def _operands(self, name: str, place: int | None = None) -> Iterable[tuple[int, bool]]:
-        """Input bits of a cell (or those of one of its output bits), and whether they carry data."""
+        """Input bits of a cell, or of its output bit ``place``, each with whether it carries data."""
         cell = self.cells[name]
         kind = cell["type"]
         if kind in ("$mux", "$pmux"):
@@ -273,7 +273,7 @@ class Netlist:
                     yield bit, is_data
 
     def _sources(self, bit: int) -> dict[int, bool]:
-        """Boxes that a net depends on through cells that have none, and whether by data."""
+        """Boxes from which a net comes through cells without a box, each with whether it carries data."""
         bit = self.replaced.get(bit, bit)
         found = self.cache.get(bit)
         if found is None:
@@ -290,7 +290,7 @@ class Netlist:
 
 
 def _parts(word: tuple[int, ...], names: dict[tuple, list[str]]) -> list[tuple[str, int, int]]:
-    """Name, offset and width of a register's fields; of the whole where it has none."""
+    """Name, offset and width of a register's fields, or of the whole register if it has none."""
     whole = _short(names[word])
     stems = {f"{name}." for name in names[word]}
     found = {}
@@ -306,7 +306,7 @@ def _parts(word: tuple[int, ...], names: dict[tuple, list[str]]) -> list[tuple[s
 
 
 def _operand_words(cell) -> list[list]:
-    """Words among which a choice chooses."""
+    """Words among which a multiplexer chooses."""
     operands = cell["connections"]
     width = len(operands["Y"])
     several = operands["B"]
@@ -314,7 +314,7 @@ def _operand_words(cell) -> list[list]:
 
 
 def _without_duplicates(cells: dict) -> tuple[dict, dict[int, int]]:
-    """Cells without those that work out the same word once more, and nets for those of the dropped ones."""
+    """Cells without those that compute the same word again, and the nets that replace the dropped ones."""
     replaced: dict[int, int] = {}
     count = -1
     while count != len(cells):
@@ -343,7 +343,7 @@ def _without_duplicates(cells: dict) -> tuple[dict, dict[int, int]]:
 
 
 def _short(names: list[str]) -> str:
-    """The plainest of a net's names, without path and serial number."""
+    """The simplest of a net's names, without path and serial number."""
     if not names:
         return ""
     name = min(names, key=lambda name: (name.count("."), "__" in name, len(name), name)).split(".")[-1]

@@ -1,8 +1,8 @@
-"""A page a unit: what it computes, its ports, its variants, and drawings of what it is and does.
+"""Pages of units: function, ports and variants of each, and drawings of structure, timing and errors.
 
-``blysk pages`` writes them, of the records of `blysk.sim.units`. Text comes from the docstrings of the unit
+``blysk pages`` writes them, from the records of `blysk.sim.units`. Text comes from the docstrings of the unit
 and its bit-accurate model, figures from the table of the units, drawings from the netlist, from a simulation
-and from the measured errors, the list of what is tested from the stimuli of the record.
+and from the measured errors, and the list of tests from the stimuli of the record.
 """
 
 import inspect
@@ -36,10 +36,10 @@ from blysk.sim.value_types import Choice
 __all__ = ["PROJECT", "SAMPLES", "command", "entries_shown", "index_page", "page", "pictures", "write_pages"]
 
 PROJECT = Path(__file__).parents[2]
-"""Folder of the project, where its tests and documents are beside it."""
+"""Folder of the project, with its tests and documents if it is a checkout."""
 
 SAMPLES = 100_000
-"""Random operands of each variant: enough for the drawings."""
+"""Random operands of each variant, enough for the drawings."""
 
 _TITLES = {
     "geometry": "Triangles to spans",
@@ -51,11 +51,11 @@ _TITLES = {
     "bus": "In somebody else's design",
     "": "All of it",
 }
-"""What a room holds."""
+"""Titles of the folders of units."""
 
 
 def entries_shown(unit: str) -> tuple[Entry, ...]:
-    """Variants of a unit that its page has: the measured ones, or the default one where none is."""
+    """Variants on a unit's page: the measured ones, or the default one if none is measured."""
     record = RECORDS[unit]
     return entries_of(record) or (Entry(record, record.default),)
 
@@ -70,7 +70,7 @@ def _title(unit: str) -> str:
 
 @cache
 def _component(unit: str) -> wiring.Component:
-    """A unit in its first variant, to be looked at only."""
+    """A unit in its first variant, to read its ports."""
     component = entries_shown(unit)[0].variant.unit()
     # A unit that nothing elaborates gives a warning.
     Fragment.get(component, None)
@@ -165,13 +165,13 @@ def variants_table(rows: Sequence[Row]) -> list[str]:
 
 @cache
 def _graph(unit: str, number: int) -> Graph:
-    """Structure of a variant that a page has."""
+    """Structure of variant ``number`` of a unit's page."""
     return graph_of(entries_shown(unit)[number].variant.unit())
 
 
 @cache
 def _structures(unit: str) -> list[tuple[str, list[int]]]:
-    """Variants of one structure, and the suffix of the name of its drawing."""
+    """Groups of variants with equal structure, each with the suffix of its drawing's name."""
     entries = entries_shown(unit)
     if len(entries) == 1:
         return [("", [0])]
@@ -182,7 +182,7 @@ def _structures(unit: str) -> list[tuple[str, list[int]]]:
 
 
 def _timings(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
-    """Rows of one interval, and the suffix of the name of their drawing."""
+    """Groups of rows with equal interval, each with the suffix of its drawing's name."""
     groups: dict[int, list[Row]] = {}
     for row in rows:
         groups.setdefault(row.interval, []).append(row)
@@ -212,7 +212,7 @@ _TIMING_NOTE = (
 
 
 def _opening(unit: str) -> list[str]:
-    """What a page says before its measured part: names, docstring of the unit, ports."""
+    """First part of a page, before the measured part: names, docstring of the unit, ports."""
     component, record = _component(unit), RECORDS[unit]
     kind = type(component)
     sources = dict.fromkeys(record.source_of(name) for name in (entry.name for entry in entries_shown(unit)))
@@ -234,7 +234,7 @@ def _variants(unit: str, rows: Sequence[Row]) -> list[str]:
 
 
 def _drawings(unit: str, rows: Sequence[Row]) -> list[str]:
-    """Drawings of structure and timing, and what they are of."""
+    """Drawings of structure and timing, with their explanations."""
     title = _title(unit).lower()
     lines = ["## Structure", "", _STRUCTURE_NOTE, ""]
     structures = _structures(unit)
@@ -254,7 +254,7 @@ def _drawings(unit: str, rows: Sequence[Row]) -> list[str]:
 
 
 def _errors(unit: str, rows: Sequence[Row]) -> list[str]:
-    """The drawing of the errors, and its axes."""
+    """The drawing of the errors, with an explanation of its axes."""
     if rows[0].entry.variant.measure is None:
         return []
     if not any(row.errors[2] for row in rows):
@@ -271,7 +271,7 @@ def _errors(unit: str, rows: Sequence[Row]) -> list[str]:
 
 
 def _tests(record: Record) -> list[str]:
-    """Stimuli with their corner cases, waivers and idle registers, as the record has them."""
+    """Stimuli with their corner cases, waivers and idle registers, from the record."""
     rows = [
         (
             name,
@@ -306,7 +306,7 @@ def page(unit: str, rows: Sequence[Row]) -> str:
     unit : str
         A key of `RECORDS`.
     rows : sequence of Row
-        Of `entries_shown`.
+        Rows of `entries_shown`.
     """
     lines = [*_opening(unit), *_variants(unit, rows), *_drawings(unit, rows), *_errors(unit, rows)]
     lines += _tests(RECORDS[unit])
@@ -333,13 +333,13 @@ def pictures(unit: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -
 
 
 def _room(record: Record) -> str:
-    """Room of a unit, by the folder of its file."""
+    """Name of the folder of a unit's file."""
     parts = record.kind.__module__.split(".")
     return parts[2] if len(parts) > 3 else ""
 
 
 def index_page() -> str:
-    """Text of the first page of the folder: the units in the order of the pipeline."""
+    """Text of the index page: the units in the order of the pipeline."""
     lines = [
         "# The units",
         "",
@@ -374,7 +374,7 @@ def write_pages(
 ) -> None:
     """Write the pages of units, their pictures and the index.
 
-    The files of a page are written when all of them are made; pictures that it no longer has are removed.
+    The files of a page are written after all of them are made; pictures that it no longer has are removed.
 
     Parameters
     ----------
@@ -415,10 +415,10 @@ def write_pages(
     "--unit", "units", type=Choice("unit", RECORDS), multiple=True, help="This page alone; repeat for more."
 )
 def command(folder, units):
-    """Write a page a unit, with drawings of structure, timing and errors, into FOLDER.
+    """Write a page for each unit, with drawings of structure, timing and errors, into FOLDER.
 
-    FOLDER is docs/blocks if left out. It has to be there. Pictures that a page no longer has are removed,
-    other files are left alone.
+    FOLDER is docs/blocks by default, and must exist. Pictures that a page no longer has are removed, other
+    files stay.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""Place and route of a component: mapping by Yosys, placement by nextpnr, and what its report says."""
+"""Place and route of a component: mapping by Yosys, placement by nextpnr, and figures of its report."""
 
 import contextlib
 import hashlib
@@ -53,7 +53,7 @@ __all__ = [
 SEEDS = 5
 
 _SECONDS = 5
-"""Between two looks at what a tool says."""
+"""Seconds between two readings of a tool's output."""
 
 _REMEDY = "pip install 'blysk[fpga]'"
 
@@ -75,14 +75,14 @@ write_json netlist.json"""
 YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
 
 MOUNT = "/job"
-"""What the tool in its sandbox calls the folder it runs in, the only one it sees."""
+"""Path, in the tool's sandbox, of the folder in which it runs, the only one that it sees."""
 
 _MANY = 1000
-"""Look-up tables from which on a design is large."""
+"""Least number of look-up tables of a large design."""
 
 
 class ToolError(SimulationError):
-    """Yosys or nextpnr failed, or made what cannot be timed."""
+    """Yosys or nextpnr failed, or its result cannot be timed."""
 
 
 class TooLarge(ToolError):
@@ -90,7 +90,7 @@ class TooLarge(ToolError):
 
 
 class GivenUp(ToolError):
-    """A tool was ended that would not have come to an end."""
+    """A tool was stopped because it would not have finished."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +102,9 @@ class Layout:
     name : str
         The design.
     parts : Parts
-        The same from every seed.
+        Its parts, the same for every seed.
     places : tuple of Place
-        By seed.
+        A place for each seed.
     """
 
     name: str
@@ -119,7 +119,7 @@ class Layout:
 
     @property
     def closed(self) -> int:
-        """Multipliers with registers inside on both sides, between which nextpnr does not time."""
+        """Multipliers with registers inside on both sides; nextpnr does not time the path between these."""
         return max(place.closed for place in self.places)
 
     def as_dict(self) -> dict[str, Any]:
@@ -137,9 +137,9 @@ class Layout:
 
 
 class Registered(wiring.Component):
-    """A component with a register at every port; clock and reset are its own.
+    """A component with a register at every port except clock and reset.
 
-    Handshakes do not survive it: it is there to be timed, not to be run.
+    The registers break its handshakes: it is only for timing, not for simulation.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class Registered(wiring.Component):
         super().__init__({name: flow(Shape(len(value))) for name, (flow, value) in self._ports.items()})
 
     def elaborate(self, platform) -> Module:
-        """Put the registers between."""
+        """Add the registers between the ports and the component."""
         m = Module()
         m.submodules.unit = self._component
         for name, (flow, value) in self._ports.items():
@@ -180,12 +180,12 @@ class Registered(wiring.Component):
 
 
 def tool_versions(family: Family = ECP5) -> dict[str, str | None]:
-    """Version of each tool by its package, ``None`` for one that is not installed; nothing is imported."""
+    """Version of each tool by its package, ``None`` if it is not installed; without importing any."""
     return {package: version_of(package) for package in ("pyosys", family.package)}
 
 
 def versions_of(family: Family) -> dict[str, str]:
-    """Versions of the tools, all of which must be there."""
+    """Versions of the tools; `InputError` if one is not installed."""
     versions = tool_versions(family)
     missing = [package for package, version in versions.items() if version is None]
     if missing:
@@ -195,7 +195,7 @@ def versions_of(family: Family) -> dict[str, str]:
 
 
 class ToolRunner:
-    """Runs the tools, several at once, and ends them all when told."""
+    """Runs tools, several at a time, and can stop all of them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -213,8 +213,8 @@ class ToolRunner:
     ) -> None:
         """Run Python code in a folder, with a text as its standard input.
 
-        `given_up` is called every few seconds with what the tool has said so far; a reason that it returns
-        ends the tool, with `GivenUp`. `ToolError` is raised if it fails, or was stopped.
+        `given_up` is called every few seconds with the tool's output so far; if it returns a reason, the tool
+        is stopped and `GivenUp` raised. `ToolError` is raised if the tool fails, or was stopped by `stop`.
         """
         # Python's own warnings are none of the tool's.
         command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
@@ -254,7 +254,7 @@ class ToolRunner:
                 raise ToolError(f"{name} ends with status {process.returncode}: {errors[0].strip()}")
 
     def stop(self) -> None:
-        """End what runs, and start no more."""
+        """Stop all running tools, and start no more."""
         with self._lock:
             self._stopped = True
             for process in self._running:
@@ -262,16 +262,16 @@ class ToolRunner:
 
 
 def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Family = ECP5) -> Parts:
-    """Parts of a mapped netlist; its look-up tables are those that nextpnr reports.
+    """Parts of a mapped netlist; the number of look-up tables comes from nextpnr's report.
 
     Parameters
     ----------
     netlist : dict
         Yosys's JSON of a `Registered` component.
     report : dict
-        nextpnr's, JSON.
+        nextpnr's report, JSON.
     family : Family
-        That it is mapped to.
+        Family to which it is mapped.
     """
     top = netlist["modules"]["top"]
     cells = top["cells"].values()
@@ -297,7 +297,7 @@ def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Fami
 
 
 def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
-    """Refuse a netlist with a cell that nextpnr does not time paths through."""
+    """Refuse a netlist with a cell through which nextpnr times no paths."""
     for cell in netlist["modules"]["top"]["cells"].values():
         kind = cell["type"]
         for name in (kind, *(f"{kind}.{key}={value}" for key, value in cell["parameters"].items())):
@@ -306,7 +306,7 @@ def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
 
 
 def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
-    """Refuse a netlist, of so many cells by kind, that does not fit: the placer would try for ever."""
+    """Refuse a netlist that does not fit, by its cells of each kind: the placer would try for ever."""
     for name, pattern, most in (
         ("flip-flops", family.flip_flop, family.capacity.flip_flops),
         ("multipliers", family.multiplier, family.capacity.multipliers),
@@ -319,29 +319,29 @@ def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
 
 
 def _write_without_ports(path: Path, netlist: Mapping[str, Any]) -> None:
-    """Write a netlist for placement: it has more ports than the FPGA has pins."""
+    """Write a netlist without its ports for placement, as it may have more ports than the FPGA has pins."""
     top = {**netlist["modules"]["top"], "ports": {}}
     path.write_text(json.dumps({**netlist, "modules": {**netlist["modules"], "top": top}}), encoding="utf-8")
 
 
 def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5, closed: int = 0) -> Place:
-    """What nextpnr's report says of the one clock.
+    """Place of a design, from nextpnr's report on its one clock.
 
     Parameters
     ----------
     report : dict
         The report, JSON.
     seed : int
-        That it was made from.
+        Seed of the placement.
     family : Family
-        That it is of.
+        Family of the device.
     closed : int
         Multipliers of the design with registers inside on both sides.
 
     Raises
     ------
     ToolError
-        If the report has not one clock, or no path between its edges.
+        If the report has no clock or several, or no path between its edges.
     """
     try:
         ((clock, rate),) = report["fmax"].items()
@@ -401,25 +401,25 @@ def lay_out(
 ) -> Layout:
     """Synthesise a component, then place and route it from seeds 1, 2, ....
 
-    Results come from the cache, by the netlist, the tools and their options; a seed's is there as soon as it
-    is done, so that an interrupted run goes on where it was.
+    Results are kept in the cache, by netlist, tools and options. The result of each seed is kept as soon as
+    it is done, so that an interrupted run can continue.
 
     Parameters
     ----------
     name : str
-        Of the design.
+        Name of the design.
     component : wiring.Component
-        In the clock domain ``sync``.
+        Component in the clock domain ``sync``.
     seeds : int
-        How many.
+        Number of seeds.
     jobs : int
-        Processes at once.
+        Processes at a time.
     progress : callable
         Called after each seed.
     family : Family
-        What of.
+        Family of the device.
     absorb : bool
-        Whether `absorb_registers` moves registers into multipliers, where the family has a `Family.limit`.
+        Whether `absorb_registers` moves registers into multipliers, if the family has a `Family.limit`.
 
     Raises
     ------
@@ -457,7 +457,7 @@ def lay_out(
 def _run(
     netlist: str, seeds: Sequence[int], jobs: int, family: Family, absorb: bool
 ) -> Iterator[tuple[int, tuple[Parts, Place]]]:
-    """Run the tools; each seed as soon as it is done."""
+    """Run the tools; yields the result of each seed as soon as it is done."""
     runner = ToolRunner()
     module = family.package.replace("-", "_")
     nextpnr = f"import sys, {module} as n; sys.exit(n.{module.replace('yowasp', 'run')}(sys.argv[1:]))"

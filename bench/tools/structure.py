@@ -2,8 +2,8 @@
 
 The netlist is Amaranth's own, read by Yosys. A box is a register with the operations in front of it, an
 operation that several registers share, a memory, a submodule or a port. Wires, slices, constants, inversions,
-single-bit logic and the control by valid and ready are left out, and so is a choice between a word and
-itself or a constant (enables, resets, saturation). Copies of one structure, as of the three components of a
+single-bit logic and the control by valid and ready are left out, and so are multiplexers between a word and
+itself or a constant (enables, resets, saturation). Copies of one structure, such as the three components of a
 vector, are one box.
 """
 
@@ -27,7 +27,7 @@ _COMPARISONS = {"<", "≤", ">", "≥", "=", "≠"}
 _CONTROL = re.compile(r"(^|_)(ready|valid|ages)$|^(held|moves)$")
 
 MOST_BOXES = 48
-"""Boxes of a drawing above which it leaves out more."""
+"""Largest number of boxes of a drawing before more of them are left out."""
 
 
 def _reached(starts: Iterable[int], following: dict[int, set[int]]) -> set[int]:
@@ -41,7 +41,7 @@ def _reached(starts: Iterable[int], following: dict[int, set[int]]) -> set[int]:
 
 
 def _drop_control(graph: Graph) -> None:
-    """Keep what data pass through, and what chooses among them by the operands."""
+    """Keep boxes through which data pass, and boxes that choose among data by operands."""
     inputs = [number for number, node in graph.nodes.items() if node.kind == "input"]
     outputs = [number for number, node in graph.nodes.items() if node.kind == "output"]
     data_sources, data_targets = graph.neighbours(data_only=True)
@@ -62,7 +62,7 @@ def _drop_control(graph: Graph) -> None:
 
 
 def _drop_idle_choices(graph: Graph) -> None:
-    """Bypass choices among fewer than two words, join a choice among choices into one."""
+    """Bypass multiplexers of fewer than two words."""
     changed = True
     while changed:
         changed = False
@@ -81,7 +81,7 @@ def _drop_idle_choices(graph: Graph) -> None:
 
 
 def _fuse(graph: Graph) -> None:
-    """Put operations into the box that alone takes their result."""
+    """Put an operation into the box that takes its result, if it is the only one."""
     changed = True
     while changed:
         changed = False
@@ -109,7 +109,7 @@ def _fuse(graph: Graph) -> None:
 
 
 def _join_delays(graph: Graph) -> None:
-    """Make one box of a register and those that only hold its word later on."""
+    """Merge a register with the registers that only delay its word."""
     changed = True
     while changed:
         changed = False
@@ -129,7 +129,7 @@ def _join_delays(graph: Graph) -> None:
 
 
 def _drop_indirect(graph: Graph) -> None:
-    """Drop choices, but of ports that do nothing else, and arrows beside a longer way."""
+    """Drop arrows that choose, except from ports that do nothing else, and arrows beside a longer path."""
     passing = {a for (a, _), is_data in graph.edges.items() if is_data}
     graph.edges = {
         edge: data
@@ -149,7 +149,7 @@ _INDEX = re.compile(r"(_?\d+|_[xyzrgb]|\[\d+\])(?=_|\[|$)")
 
 
 def _join_copies(graph: Graph) -> None:
-    """Make one box of boxes that are alike and stand between the same others."""
+    """Merge boxes that are alike and have the same neighbours."""
     classes = {
         number: (
             node.kind,
@@ -192,15 +192,15 @@ def _join_copies(graph: Graph) -> None:
 
 
 def graph_of(component: wiring.Component, most: int = MOST_BOXES) -> Graph:
-    """Read a unit's structure.
+    """Structure of a unit, read from its netlist.
 
     Parameters
     ----------
     component : Component
         Unit.
     most : int
-        Boxes above which comparisons and roundings, then choices, then all but memories, multipliers, adders,
-        submodules and ports are left out.
+        Largest number of boxes. With more, comparisons and roundings are left out, then choices, then all
+        boxes but memories, multipliers, adders, submodules and ports.
 
     Returns
     -------

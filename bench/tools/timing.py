@@ -19,10 +19,10 @@ from blysk.sim.units.record import Case, UnitRun
 __all__ = ["Waves", "draw_timing", "waves_of"]
 
 _BEATS, _MOST_RESULTS, _MOST_COLUMNS = 3, 6, 44
-"""Input beats, where none are given; results that a diagram has, and its cycles, at most."""
+"""Number of input beats if none are given; most results, and most columns of a diagram."""
 
 PIXELS = 3
-"""Pixels of a span in a diagram, where a unit makes pixels of spans."""
+"""Pixels of a span in a diagram, if the unit makes pixels of spans."""
 
 _HANDSHAKES = ("i.valid", "i.ready", "o.valid", "o.ready")
 
@@ -33,19 +33,19 @@ _CLOCK, _ROW = 22.0, 22.0
 _MARGIN = 58.0
 _INK, _FILLS = "#222222", ("#cfe0f3", "#f9dcc0", "#d5ecd5", "#eadcf2")
 QUIET = 7
-"""Cycles without a change above which a diagram leaves them out."""
+"""Most cycles without a change that a diagram shows in full."""
 
 
 @dataclass(frozen=True)
 class Waves:
-    """The handshakes of a simulation, cycle by cycle, as they stand before the rising edge.
+    """The handshakes of a simulation, cycle by cycle, with the levels before the rising edge.
 
     Parameters
     ----------
     levels : dict of str to bool array
         ``i.valid``, ``i.ready``, ``o.valid`` and ``o.ready``.
     inputs, outputs : list of (str or None)
-        Name of the beat that each stream offers in a cycle.
+        Name of the beat that each stream offers in a cycle; ``None``: no beat.
     """
 
     levels: dict[str, np.ndarray]
@@ -61,24 +61,23 @@ class Waves:
 def waves_of(unit: Component, beat: dict | None = None, example: UnitRun | None = None) -> Waves:
     """Simulate a unit with a pause of the source and a stall of the sink.
 
-    The source pauses for two cycles before its last beat; the sink is not ready for two cycles when the first
-    result is there, or the second where a beat has several. Where nothing is offered every bit of the payload
-    is 1.
+    The source pauses for two cycles before its last beat; the sink is not ready for two cycles at the first
+    result, or at the second if a beat has several. While no beat is offered, every bit of the payload is 1.
 
     Parameters
     ----------
     unit : Component
         Unit.
     beat : dict, optional
-        Fields of three input beats; others and the constants are 0. ``length`` is made `PIXELS`: a beat is
-        then a span, with as many results.
+        Fields of three input beats; other fields and the constants are 0. A field ``length`` is replaced by
+        `PIXELS`: a beat is then a span with that number of results.
     example : UnitRun, optional
-        In place of that: beats, constants, and the writes before them. It ends with the first few results.
+        Beats, constants and writes before them, in place of ``beat``. It ends with the first few results.
 
     Raises
     ------
     RuntimeError
-        If the results do not come.
+        If results are missing.
     """
     case, results = _case_of(unit, beat or {}) if example is None else (example.case, example.count)
     sent = stimulus_of(unit, case.beats, count=None, constants=case.constants, write=case.write)
@@ -144,7 +143,7 @@ def _case_of(unit: Component, beat: dict) -> tuple[Case, int]:
 
 
 def _codes(words: np.ndarray) -> list[int]:
-    """Beats as the simulator takes them."""
+    """Beats as whole numbers, for the simulator."""
     return [int.from_bytes(row.astype("<u4").tobytes(), "little") for row in words]
 
 
@@ -153,7 +152,7 @@ def _letter(k: int) -> str:
 
 
 def _offered(valid: np.ndarray, ready: np.ndarray, names: list[str]) -> list[str | None]:
-    """Name of the beat on each cycle: as many have moved before as it stands in the row."""
+    """Name of the offered beat in each cycle: the next after the beats that have moved."""
     moved = np.cumsum(valid & ready) - (valid & ready)
     return [names[k] if is_valid else None for k, is_valid in zip(moved, valid, strict=True)]
 
@@ -241,7 +240,7 @@ def draw_timing(waves: Waves) -> Figure:
 
 
 def _draw_beats(axes, shown, beats, span, letters) -> None:
-    """Boxes with the names of the beats that a stream offers."""
+    """Draw boxes with the names of the beats that a stream offers."""
     low, high = span
     names = [None if clock is None else beats[clock] for clock in shown]
     # A stretch that is left out has what is on both its sides.

@@ -1,7 +1,7 @@
 """``blysk web``: a static site in which a browser simulates the pipeline, cycle by cycle, as WebAssembly.
 
-Everything that the page knows of formats, addresses, models and words comes from the Python objects, as
-JSON. Data and modules are scripts, loaded when they are wanted: a page from disk may load nothing else.
+The page gets all formats, addresses, models and words from the Python objects, as JSON. Data and modules are
+scripts that are loaded when needed: a page from disk can load nothing else.
 """
 
 import importlib.util
@@ -59,7 +59,7 @@ __all__ = [
 
 
 TABLES = {name: LOBES[name] for name in ("blinn", "ggx")}
-"""Models by a table that the page's script knows."""
+"""Models with a table that the page's script can make."""
 
 _MARK = "site.json"
 
@@ -72,7 +72,7 @@ _EXTRAS = ("ziglang", "jinja2", "markdown_it", "flip_evaluator", "skimage")
 
 
 def _missing() -> None:
-    """Refuse to begin without what the extra brings."""
+    """Refuse to begin without the packages of the extra ``web``."""
     for name in _EXTRAS:
         if importlib.util.find_spec(name) is None:
             raise InputError("web", f"{name} is not installed", "pip install 'blysk[web]'")
@@ -84,12 +84,12 @@ def _read(name: str) -> str:
 
 
 def _script(name: str, value: Any) -> str:
-    """A script that hands a value to the page."""
+    """Script that gives a value to the page."""
     return f"blysk.given({embedded(name)},{embedded(value)});\n"
 
 
 def _earlier(folder: Path) -> dict[str, Any] | None:
-    """The mark of a folder, if it is a site of ours."""
+    """The mark of a folder, if this program wrote it as a site; else ``None``."""
     try:
         mark = json.loads((folder / _MARK).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -106,12 +106,12 @@ def check_folder(folder: Path) -> None:
     Parameters
     ----------
     folder : Path
-        It is new, empty, or holds an earlier site.
+        A folder that is new, is empty, or holds an earlier site.
 
     Raises
     ------
     InputError
-        If it is a file, holds anything else, or may not be written.
+        If it is a file, holds other files, or may not be written.
     """
     names = files_within(folder, _PAGE)
     mark = _earlier(folder)
@@ -123,7 +123,7 @@ def check_folder(folder: Path) -> None:
 
 
 def _report_files(folder: Path) -> list[Path]:
-    """Files of a report, or one line that says that it is none."""
+    """Files of a report; `InputError` if the folder is none."""
     try:
         report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
         names = report["files"] if report["program"] == "blysk" else []
@@ -142,12 +142,12 @@ def _answers(report: Path) -> list[dict[str, str]]:
 
 
 def tasks(designs: Sequence[tuple[str, str]], views: Mapping[str, int]) -> list[Task]:
-    """What has to be made for a site: modules, then spans.
+    """Tasks of a site: its modules, then its spans.
 
     Parameters
     ----------
     designs : sequence of (method, model)
-        Of the modules.
+        Designs of the modules.
     views : mapping
         Number of views by mesh.
     """
@@ -168,23 +168,23 @@ def write_site(
     report: Path | None = None,
     folders: Mapping[str, Path] | None = None,
 ) -> None:
-    """Write the site. Each file is whole or not there; files of an earlier site that this has not got go.
+    """Write the site. Each file is whole or not there; files that only an earlier site has are removed.
 
     Parameters
     ----------
     folder : Path
-        New, or see `check_folder`.
+        See `check_folder`.
     tasks, results : sequences
-        From `tasks`, and what they give.
+        Tasks of `tasks`, and their results.
     report : Path, optional
         Folder of a report, which becomes part of the site.
     folders : mapping of str to Path, optional
-        Folders of Markdown that become part of it: see `documents`.
+        Folders of Markdown that become part of the site: see `documents`.
 
     Raises
     ------
     InputError
-        If a file cannot be written, or the report is none.
+        If a file cannot be written, or ``report`` holds no report.
     """
     check_folder(folder)
     files = {
@@ -213,7 +213,7 @@ def write_site(
 
 
 def _scripts(tasks: Sequence[Task], results: Sequence[Any]) -> tuple[dict[str, str], dict, dict]:
-    """Scripts with the data, and what the page must know of designs and meshes."""
+    """Scripts with the data, and the page's descriptions of designs and meshes."""
     files: dict[str, str] = {}
     designs, meshes = {}, {}
     for task, result in zip(tasks, results, strict=True):
@@ -237,7 +237,7 @@ def _scripts(tasks: Sequence[Task], results: Sequence[Any]) -> tuple[dict[str, s
 
 
 def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -> dict[str, Any]:
-    """What the page reads as it starts."""
+    """Values that the page reads at its start."""
     first = next(iter(designs.values()))
     rivals = [design["model"] for design in designs.values() if design["method"] == RIVAL]
     start = START | {"mesh": next(iter(meshes)), "method": first["method"], "model": first["model"]}
@@ -266,7 +266,7 @@ def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -
 
 
 def _write(folder: Path, files: Mapping[str, str], copies: Mapping[str, Path]) -> None:
-    """Write texts and copies of files; the page comes last, and files of an earlier site go."""
+    """Write texts and copies of files, the page last, and remove the other files of an earlier site."""
     earlier = _earlier(folder) or {"files": []}
     everything = [*files, *copies]
     folder.mkdir(exist_ok=True)
@@ -287,12 +287,12 @@ def _write(folder: Path, files: Mapping[str, str], copies: Mapping[str, Path]) -
 
 
 def folders_of(pages: Path | None) -> dict[str, Path]:
-    """Folders of Markdown that there are: documents of the project, and pages of the units.
+    """Existing folders of Markdown: documents of the project, and pages of the units.
 
     Parameters
     ----------
     pages : Path, optional
-        Folder that ``blysk pages`` wrote; ``None``: that of the project, if there is one.
+        Folder that ``blysk pages`` wrote; ``None``: the project's folder, if there is one.
 
     Raises
     ------
@@ -310,7 +310,7 @@ def folders_of(pages: Path | None) -> dict[str, Path]:
 
 
 class _Design(click.ParamType):
-    """A method and a model with a stroke between them."""
+    """Type of an option: a method and a model with a stroke between them."""
 
     name = "METHOD/MODEL"
 
@@ -364,10 +364,10 @@ class _Design(click.ParamType):
 def command(folder, report, pages, designs, jobs):
     """Write a static site: the pipeline as WebAssembly, simulated live while the light is moved.
 
-    The page index.html opens from disk and from any web server, and asks for nothing but the site's own
-    files. With it come the report of error against run time, guide and theory, and the pages of the units. A
-    first time takes some minutes; modules, spans and measurements are kept in the cache, and made again when
-    the code has changed.
+    The page index.html opens from disk and from any web server, and loads only files of the site. The site
+    also has the report of error against run time, guide and theory, and the pages of the units. The first
+    time takes some minutes; modules, spans and measurements are kept in the cache, and made again after the
+    code has changed.
 
     \b
     Example:

@@ -73,19 +73,19 @@ __all__ = [
 
 
 WIDTH, HEIGHT = 320, 240
-"""Of the pictures."""
+"""Size of the pictures."""
 
 BANDS = (100, MAX_EXPONENT)
-"""Spans are cut for these exponents; a frame has those of the smallest that is not under its own."""
+"""Exponents for which spans are cut; a frame uses the smallest that is at least its own exponent."""
 
 SERVED = tuple(name for name, method in METHODS.items() if not method.TAKES_VALUES)
-"""Methods of modules. Where spans carry values of the light, it cannot be moved without them."""
+"""Methods of modules. Methods whose spans carry values of the light are left out: the light moves."""
 
 DESIGNS = (*(pair for pair in accuracy.DESIGNS if pair[0] in SERVED), ("chord", "ggx"))
 """Method and model of each module."""
 
 ROUGHNESSES = tuple(round(step / 100, 2) for step in range(10, 101))
-"""Those that a model with a roughness may have."""
+"""Roughnesses that a model with a roughness may have."""
 
 BACKGROUND = "#1a1c20"
 
@@ -105,10 +105,10 @@ START = {
     "color": "#ff8f44",
     "light": "#ffffff",
 }
-"""What the page shows first."""
+"""Settings of the page at its start."""
 
 RIVAL = "linear"
-"""Method that a frame may be compared with, in hardware too."""
+"""Method with which a frame may be compared, in hardware too."""
 
 REFERENCES = {
     "method": {
@@ -132,7 +132,7 @@ REFERENCES = {
         "model": "blinn",
     },
 }
-"""What the frame is held against; ``None``: the design's own."""
+"""References with which the frame may be compared; ``None``: the design's own curve or model."""
 
 
 # What is drawn.
@@ -145,11 +145,11 @@ class Body:
     Parameters
     ----------
     title : str
-        What it is called.
+        Title on the page.
     make : callable
-        Makes it.
+        Function that makes the mesh.
     views : int
-        Cameras of the turntable.
+        Number of cameras of the turntable.
     margin : float
         See `Camera.framing`.
     """
@@ -161,7 +161,7 @@ class Body:
 
 
 def _square() -> Mesh:
-    """Two triangles with normals that bend outwards: spans from side to side."""
+    """Two triangles with normals that bend outwards, and spans across all of the square."""
     corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
     return Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normalise(corners * 0.3 + (0, 0, 1)))
 
@@ -175,7 +175,7 @@ MESHES = {
 
 
 def design_of(method: str, model: str) -> Design:
-    """The pipeline of a module: one light, and a highlight gate, where the method can have one."""
+    """The pipeline of a module: one light, and a highlight gate if the method can have one."""
     return preset(method, model, gate=METHODS[method].serves_gate)
 
 
@@ -198,7 +198,7 @@ def scene_of(settings: Mapping[str, Any]) -> Scene:
     Parameters
     ----------
     settings : mapping
-        As `START`.
+        Settings in the form of `START`.
     """
     color = np.array(_channels(settings["color"]))
     return Scene(
@@ -231,25 +231,25 @@ COLUMNS = (
     ),
     {"name": "ratio", "bytes": 3, "bias": 1 << 23},
 )
-"""Codes of the spans in a file, a column a field: as they are, or the change from the span before
-(``running``) or from another column (``from``); plus ``bias``, so that none is negative; in so many
-``bytes``. The middle normal is the left one where the method takes none. The ratio is that of the lengths
-that the interpolated normals have at the ends, ``round(2^19 log2(m_r / m_l))``; of a method that takes these
-themselves it is 0."""
+"""Columns of the spans in a file, one for each field: its codes, or their change from the previous span
+(``running``) or from another column (``from``), plus ``bias``, so that none is negative, in a number of
+``bytes``. The middle normal is the left one if the method takes none. The ratio is of the lengths of the
+interpolated normals at the ends, ``round(2^19 log2(m_r / m_l))``; it is 0 for a method that takes these
+normals themselves."""
 
 
 def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -> bytes:
-    """Spans of a view, and which of their fragments show, as bytes.
+    """Spans of a view, and the visibility of their fragments, as bytes compressed by zlib.
 
-    Two counts in 32 bits, of spans and fragments; `COLUMNS`, the lowest byte of all codes first; a bit a
-    fragment, the first lowest. Compressed by zlib.
+    First the numbers of spans and fragments, 32 bits each; then `COLUMNS`, in each the lowest byte of all
+    codes first; then a bit for each fragment, from the lowest bit of a byte on.
 
     Parameters
     ----------
     spans : Spans
-        With normals.
+        Spans with normals.
     visible : bool array
-        Of the fragments in their order.
+        Whether each fragment is visible, in their order.
     ratio : array, shape (spans,), optional
         Length of the interpolated normal at the right end, over that at the left end.
     """
@@ -274,8 +274,8 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
 def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raster, Spans]:
     """Spans of a view, before and after the rounding of their normals, for a light that moves.
 
-    They are cut for the light of `START`; and of a method with a span limit, as the highlight may be
-    anywhere, to the widest angle of a lit span.
+    They are cut for the light of `START`. For a method with a span limit they are cut to the widest angle of
+    a lit span, as the highlight may be anywhere.
 
     Parameters
     ----------
@@ -300,17 +300,17 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     Parameters
     ----------
     mesh : str
-        Of `MESHES`.
+        One of `MESHES`.
     view : int
-        Of its turntable.
+        Number of the camera on its turntable.
     methods : sequence of str
-        Of `METHODS`.
+        Some of `METHODS`.
 
     Returns
     -------
     dict
-        ``axes``: of the camera, to the right, up, and to the viewer; ``streams``: for each method a number
-        for each of the bands; ``data``: `encode`, in base 64, by those numbers.
+        ``axes``: axes of the camera, to the right, up, and to the viewer; ``streams``: for each method the
+        index into ``data`` for each of the bands; ``data``: results of `encode`, in base 64.
     """
     camera = _cameras(mesh)[view]
     found: list[str] = []
@@ -333,12 +333,12 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
 
 
 def module_of(method: str, model: str) -> dict[str, Any]:
-    """The WebAssembly module of a pipeline, and what must be known to use it.
+    """The WebAssembly module of a pipeline, and the values needed to use it.
 
     Parameters
     ----------
     method, model : str
-        Of `METHODS` and `MODELS`.
+        Some of `METHODS` and `MODELS`.
 
     Returns
     -------
@@ -372,13 +372,14 @@ def module_of(method: str, model: str) -> dict[str, Any]:
 
 
 def lobe_of(design: Design) -> dict[str, Any] | None:
-    """What frame constants with a table need, which the page makes itself; ``None`` without tables.
+    """Values for frame constants with a table, which the page makes itself; ``None`` without tables.
 
     Returns
     -------
     dict
-        ``model``: see `model_table`; ``knots``: arguments of the entries; ``parameter``: its name, and
-        ``parameters`` that it may have; for each ``exponents`` and ``thresholds``, of `FrameConstants`.
+        ``model``: see `model_table`; ``knots``: arguments of the entries; ``parameter``: name of the model's
+        parameter, and ``parameters``, its possible values; ``exponents`` and ``thresholds`` of
+        `FrameConstants` for each of them.
     """
     if not design.loads_tables:
         return None
@@ -402,7 +403,7 @@ def lobe_of(design: Design) -> dict[str, Any] | None:
 
 @cache
 def model_table(model: str) -> dict[str, Any]:
-    """What float64 needs of a reflection model: its ``kind``; slopes or scales for exponents 1 to 1000."""
+    """Values of a reflection model in float64: its ``kind``, and slopes or scales for exponents 1 to 1000."""
     exponents = range(1, MAX_EXPONENT + 1)
     unit = (MODELS | LOBES)[model]
     reflection = unit.model
@@ -436,7 +437,7 @@ def tables() -> dict[str, Any]:
 
 
 def method(name: str) -> dict[str, Any]:
-    """What the page needs of a method."""
+    """Values of a method for the page: curve, whether it uses the chord, and a text."""
     interpolator = METHODS[name]
     text = inspect.getdoc(type(interpolator)).split("\n\n")[0]
     curve = "three" if interpolator.TAKES_MIDDLE else interpolator.CURVE
