@@ -90,10 +90,10 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         gate = false                        # the highlight gate
         specialise = false                  # only what the scene needs
         short_words = false                 # with specialise: words as short as the error bound allows
-        geometry = "software"               # "hardware": simulate triangles to spans and the depth test, too
-        setups = 1                          # with hardware: lanes of triangle setup, 1 or 2
-        coarse = false                      # with hardware: drop hidden spans before shading
-        pipes = 1                           # pipelines for different scanlines, 1, 2, 4 or 8
+        # geometry = "software"             # "hardware": simulate triangles to spans and the depth test, too
+        # setups = 1                        # with hardware: lanes of triangle setup, 1 or 2
+        # coarse = false                    # with hardware: drop hidden spans before shading
+        # pipes = 1                         # pipelines for different scanlines, 1, 2, 4 or 8
 
     The values' ranges are those of the command line. Neither the mesh file nor conflicts between values are
     checked.
