@@ -110,7 +110,7 @@ def results_of(
     Parameters
     ----------
     tasks : sequence of Task
-        What to measure.
+        The measurements.
     executor : Executor, optional
         Workers of the measurements that are not timed. Timed ones run in this process, one after the other;
         ``None``: all do.

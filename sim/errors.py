@@ -28,11 +28,11 @@ class InputError(Exception):
     Parameters
     ----------
     thing : str
-        What is wrong: the file's name, the option and its value.
+        The bad input: a file's name, or an option and its value.
     reason : str
         Why it cannot be used.
     remedy : str
-        What to do about it.
+        An action that mends it.
     """
 
     def __init__(self, thing: str, reason: str, remedy: str):

@@ -1,1 +1,1 @@
-"""What keeps the quality: mutants, soak, baselines, sweep."""
+"""Checks of quality: mutants, soak, baselines, sweep."""

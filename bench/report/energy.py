@@ -35,7 +35,7 @@ BLOCKS: dict[str, tuple[str, ...]] = {
     "intensity": ("intensity",),
     "assembler": ("shaded", "pixel_assembler"),
 }
-"""Submodules of the pipeline by block, in the stream's order; of those inside each other the inner counts."""
+"""Submodules of the pipeline by block, in the stream's order; an inner one counts for its own block."""
 
 _FULL, _QUICK = (320, 240, 10_000), (48, 36, 64)
 _COLORS = (

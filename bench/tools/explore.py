@@ -64,7 +64,7 @@ _WORDS = range(36, 47, 2)
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
 
 SERVED = LOBES | MODELS
-"""Specular units by reflection model; a model with a roughness takes that of the exponent."""
+"""Specular units by reflection model; a model with a roughness takes the roughness of the exponent."""
 
 EXPONENT = 50
 """Exponent of the default sweep."""

@@ -112,7 +112,7 @@ def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
 
 @dataclass(frozen=True)
 class Animation:
-    """What all frames of an animation have in common.
+    """Common settings of all frames of an animation.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class AnimationFrame:
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     figures : dict
-        Of `frame_figures`.
+        Figures of `frame_figures`.
     """
 
     image: np.ndarray
@@ -236,7 +236,7 @@ def process_executor(animation: Animation, jobs: int) -> Iterator[FrameExecutor]
     Parameters
     ----------
     animation : Animation
-        What all frames have in common.
+        Common settings of all frames.
     jobs : int
         Number of processes.
     """
@@ -252,7 +252,7 @@ def dask_executor(animation: Animation, address: str) -> Iterator[FrameExecutor]
     Parameters
     ----------
     animation : Animation
-        What all frames have in common; it is sent to each worker once.
+        Common settings of all frames; sent to each worker once.
     address : str
         Address of the scheduler, ``tcp://host:8786``.
     """

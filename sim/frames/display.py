@@ -105,7 +105,7 @@ class OneClock(wiring.Component):
 
 @dataclass(frozen=True)
 class Shown:
-    """What a display shows.
+    """Frames that a display shows, and counters.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Figures of frames as plain values: counts, cycles, errors, and what a specialisation saves."""
+"""Figures of frames as plain values: counts, cycles, errors, and the savings of a specialisation."""
 
 import dataclasses
 import math
@@ -41,7 +41,7 @@ def frame_figures(
     Parameters
     ----------
     scene, design
-        What was drawn, and by what.
+        The scene, and the design that drew it.
     frame : SimulatedFrame
         The frame.
     comparison : Comparison
@@ -80,7 +80,7 @@ def triangle_figures(
     Parameters
     ----------
     scene, design
-        What was drawn, and by what.
+        The scene, and the design that drew it.
     frame : SimulatedTriangleFrame
         The frame.
     comparison : Comparison
@@ -190,7 +190,7 @@ def worst_errors(figures: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, fl
 
 
 def saving_figures(specialisation: Specialisation) -> dict[str, Any]:
-    """Resources of a full pipeline and of its specialisation, and what each reduction saves.
+    """Resources of a full pipeline and of its specialisation, and the saving of each reduction.
 
     Parameters
     ----------

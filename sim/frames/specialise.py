@@ -26,7 +26,7 @@ class Reduction(NamedTuple):
     Parameters
     ----------
     reason : str
-        What is left out, and why: one line.
+        One line that names the part and why it is not needed.
     changes : dict
         New values of fields of `Design`; for a field that is itself a record, a dict of its changed fields.
     """

@@ -30,7 +30,7 @@ class SimulatedTriangleFrame:
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     sent : SceneTriangles
-        What was sent.
+        The triangles that were sent, with the frame's constants.
     counts : dict of str to int
         `RenderUnit`'s counters.
     written : int

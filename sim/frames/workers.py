@@ -47,7 +47,7 @@ def local_executor(
     Parameters
     ----------
     jobs : int
-        How many processes.
+        Number of processes.
     begin : callable, optional
         Called first in each process, with ``arguments``, which are sent once and not with every task.
     arguments : tuple

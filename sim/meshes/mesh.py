@@ -60,8 +60,8 @@ class LoadedMesh:
         Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
         differ in more than the name.
     ignored : tuple of str
-        What the file holds, or refers to, that the mesh and the materials do not show: textures, vertex
-        colours, a material file that is not there.
+        Contents or references of the file that mesh and materials do not show: textures, vertex colours, a
+        material file that is not there.
     """
 
     mesh: Mesh
@@ -117,7 +117,7 @@ def load_mesh(
     Returns
     -------
     LoadedMesh
-        The mesh, its materials, and the counts of what was mended.
+        The mesh, its materials, and the counts of repairs.
 
     Raises
     ------
