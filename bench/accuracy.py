@@ -1,4 +1,4 @@
-"""Frames on which errors are measured: scene, designs, exponents."""
+"""The frames that errors are measured on: scene, designs, exponents."""
 
 from collections.abc import Iterator, Sequence
 

@@ -115,7 +115,7 @@ def results_of(
         Workers of the measurements that are not timed. Timed ones run in this process, one after the other;
         ``None``: all do.
     progress : callable
-        Called after each measurement.
+        Called after each.
 
     Raises
     ------

@@ -49,7 +49,7 @@ class Value(click.ParamType):
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Checked value of a text; `InputError` with the option and the text if it is not accepted."""
+        """Checked value of a text; `InputError` with the option and the text."""
         try:
             return self.check(self.parse(value) if isinstance(value, str) else value)
         except ValueError as error:

@@ -5,7 +5,7 @@ way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints
 is 1 if a figure changed by more than that, or an entry is missing or not measured any more. ``--update``
 writes the file.
 
-Cycles do not depend on the engine; they are counted in Amaranth's own simulator, which compiles nothing.
+Cycles do not depend on the engine; here they are Amaranth's own simulator's, which compiles nothing.
 """
 
 import json
@@ -56,7 +56,7 @@ Figures = Mapping[str, Mapping[str, int]]
 """Figures of entries: by the entry's name, values by the figure's name."""
 
 TOLERANCE = 0.02
-"""Share of its baseline by which a figure may change."""
+"""Share of its baseline by which a figure may move."""
 
 FILE = Path(str(files(__package__))) / "baselines.json"
 """File of the baselines."""
@@ -69,7 +69,7 @@ _EXPONENT = 50
 
 @cache
 def _scenes() -> dict[str, Scene]:
-    """A teapot, whose spans are short, and a square with bent normals, whose spans are as wide as it."""
+    """A teapot, whose spans are short, and a square with bent normals, whose spans cross it."""
     corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
     normals = normalise(corners * 0.1 + (0, 0, 1))
     square = Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normals)

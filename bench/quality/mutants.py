@@ -1,6 +1,6 @@
 """Mutation score of every unit: the share of small faults in its hardware that the record's vectors find.
 
-``python -m blysk.bench.quality.mutants [UNIT ...]`` takes random faults of a unit (a bit of a cell that is
+``python -m blysk.bench.quality.mutants [UNIT ...]`` takes faults of a unit at random (a bit of a cell that is
 stuck, inverted, or inverted by a neighbour: Yosys' pass ``mutate``), and gives each the runs of the unit's
 record, which `tests/test_units.py` compares with the bit-accurate model. A mutant is killed if an output
 beat, or its cycle, differs from the unit's; in a run without stalls the cycles of the inputs count, too. A
@@ -50,8 +50,8 @@ LEAST = 0.95
 def waived(unit: str, mutant: str) -> bool:
     """Whether the record waives faults at the first register or output that a mutant's fault reaches.
 
-    A waiver is a pattern for the signal's path or its last parts; it also matches copies of the signal for
-    later stages, which have its name and a number.
+    A waiver is a pattern for the signal's path or its last parts; a copy of a signal for a later stage has
+    the name of the signal and a number.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class Score:
 
     @property
     def score(self) -> float:
-        """Share of the mutants that are not equivalent that is killed; 1 if there are none."""
+        """Share of killed mutants among those that are not equivalent; 1 if there are none."""
         return self.killed / max(1, self.mutants - len(self.equivalent)) if self.survived else 1.0
 
     @property

@@ -99,7 +99,7 @@ class _Observed(Wrapped):
     unit : Component
         The unit.
     width : int
-        Bits of the input ``mutant``.
+        Bits of that input, ``mutant``.
     """
 
     def __init__(self, unit: Component, width: int):

@@ -66,7 +66,7 @@ class Point:
     exponent : int
         Exponent of the highlight.
     spans : int
-        Number of spans after cutting.
+        Spans after the cutting.
     pixels : int
         Pixels that show the surface.
     max_lsb : float
@@ -157,7 +157,7 @@ class Frame:
         return 255 * saturate(shaded)
 
     def spans_of(self, design: Design, exponent: int) -> tuple[Raster, Spans]:
-        """Spans that `prepare` cuts and quantises for a pipeline."""
+        """Spans as `prepare` cuts and quantises them for a pipeline."""
         scene = self.scene_of(exponent)
         cut, _ = cut_spans(scene, self.raster, design)
         return cut, spans_for(scene, cut, design)

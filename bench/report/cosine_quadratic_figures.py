@@ -44,8 +44,8 @@ EXPONENTS = range(2, 1001)
 """Range of exponents in [C]."""
 
 ZONE = 0.59363
-"""Least brightness of Blinn's model in the "epicentre zone", which [C] does not define. This value gives the
-7.924 % that [C] states for f2."""
+"""Least brightness of Blinn's model in the "epicentre zone", which [C] does not define: it gives the 7.924 %
+that [C] states for f2."""
 
 _X = np.linspace(0, 30, 6001)
 """``n (1 - cos gamma)``, on which the models depend almost alone; above 30 Blinn is below 1e-13."""
@@ -55,7 +55,7 @@ CURVES = ("cosquad", "cosquad_q", "cosquad_lin")
 SHOWN = (5, 20, 100)
 
 SEEN = 0.1
-"""Least brightness of Blinn's model at which relative errors are drawn."""
+"""Least brightness of Blinn's model for a relative error to be drawn."""
 
 RELATED = ("cosquad7", "coscos2", "coscos4")
 
@@ -79,7 +79,7 @@ class Published:
     key : tuple of str
         Key of our figure: name of a measurement, and of a figure in it.
     percent : bool
-        Whether it is published in per cent; our figure is not.
+        Whether it is published in per cent; ours is not.
     """
 
     what: str
@@ -201,7 +201,7 @@ def curves(exponent: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``degrees``, and the brightness by model.
+        ``degrees``, and by model the brightness.
     """
     degrees = np.linspace(0, math.degrees(math.acos(max(1 - 6 / exponent, 0))), 121)
     cosine = np.cos(np.radians(degrees))

@@ -341,7 +341,7 @@ def evidence(own: bool) -> dict[str, list[float]]:
     Returns
     -------
     dict
-        Two figures by name: see `Erratum` and `Unmatched`.
+        By name, two figures: see `Erratum` and `Unmatched`.
     """
     if own:
         return {name: list(figure.values()) for name, figure in OWN.items()}

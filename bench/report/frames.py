@@ -340,7 +340,7 @@ def speeds(
 def software_speeds(
     shading: str, view: Mapping[str, Any], exponents: Sequence[int]
 ) -> list[dict[str, float | None]]:
-    """Run times of `software_frames`, in the form of `speeds`."""
+    """Run times of `software_frames`, as from `speeds`."""
     results = []
     for scene in scenes_of(view, exponents):
         raster = rasterise(scene)

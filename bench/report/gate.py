@@ -106,7 +106,7 @@ class Activity(NamedTuple):
 
 @dataclass(frozen=True)
 class GateRow:
-    """A frame without and with the gate; pairs are in this order.
+    """A frame without and with the gate: pairs are in this order.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def same_pixels(run: Run, expected: Pixels) -> bool:
 
 
 class GateUnits:
-    """The four pipelines of a reflection model, which serve every mesh and exponent.
+    """The four pipelines of a model, which serve every mesh and exponent.
 
     Parameters
     ----------

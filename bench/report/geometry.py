@@ -42,7 +42,7 @@ class Candidate:
     setup_interval : int or None
         Setup interval of shading.
     setups : int
-        Lanes of triangle setup.
+        Lanes of the triangle setup.
     """
 
     method: str

@@ -57,7 +57,7 @@ MESHES = ("teapot", "sphere", "torus", "waves")
 """Surfaces of the frames."""
 
 FRONT = ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")
-"""Models of the pipelines to compare: the exact table, and its baselines."""
+"""Models of the pipelines that are compared: the table, and its baselines."""
 
 EXPONENTS = (1, 10, 100, 1000)
 
@@ -66,7 +66,7 @@ ROUGHNESSES = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
 
 @dataclass(frozen=True)
 class Case:
-    """A reflection model, and the exponents or alphas of its tables."""
+    """A model, and the exponents or alphas of its table."""
 
     model: ReflectionModel
     label: str

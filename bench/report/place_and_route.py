@@ -45,7 +45,7 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
     seeds : int
         Number of placements.
     tools : dict of str to str or None
-        Versions of the tools, as the result depends on them.
+        Versions of the tools, which the result depends on.
     """
     design = ShadingPipelineUnit(preset(method, model))
     if None in tools.values():

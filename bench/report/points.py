@@ -307,7 +307,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
       - ``errors``, ``times``: value or ``None`` for each key of ``errors`` or ``times`` below;
       - ``verdicts``: whether both frames look identical, for each kind of error: ``total``, ``method``,
         ``arithmetic``, ``model``;
-      - ``colors``: colours of its method, on light and on dark paper;
+      - ``colors``: of its method, on light and on dark paper;
       - ``hardware``: ``multipliers``, ``cells``, ``register_bits``, ``memory_bits``; after place and route
         ``luts``, ``fmax_mhz`` (the median), ``seeds_mhz``, and ``placed`` (the date); or ``None``;
       - ``counts``: ``pixels``, ``shown``, ``spans``, ``out_of_range_spans``, ``cycles``;

@@ -310,7 +310,7 @@ def measured(
 
 
 class _Name(click.ParamType):
-    """Type of an option: a name of a section."""
+    """A name of a section."""
 
     name = "section"
 

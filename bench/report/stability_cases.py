@@ -46,7 +46,7 @@ GROUPS = {
 """Groups of cases by number: the quantity that is extreme."""
 
 STREAM_GROUP = 8
-"""Number of the group that is simulated."""
+"""The group that is simulated."""
 
 EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
 

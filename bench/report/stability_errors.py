@@ -62,7 +62,7 @@ SWEEP = tuple(np.geomspace(1, 180, 40).round(2).tolist())
 """Angles of the spans of `measure_ranges`, in degrees."""
 
 FACTORS = (1.0, 1.2, 2.0)
-"""Multiples of the widest span at which a method is measured."""
+"""Multiples of the widest span at which a method is tried."""
 
 GOOD = 1.0
 """Largest error in LSB that is good."""

@@ -71,7 +71,7 @@ def _words(shape, beats) -> list[int]:
 
 
 def stream_patterns(unit: ShadingPipelineUnit) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Runs of `STREAM_GROUP`: a name, and the stalls as options of `simulate`.
+    """Names and stalls of the runs of `STREAM_GROUP`: options of `simulate`.
 
     One run has no stalls, three have random ones, and one for each side and cycle of the stream of
     `measure_stream` has a single stall.

@@ -161,7 +161,7 @@ def clock_rate(name: str, seeds: int, tools: dict[str, str | None]) -> dict[str,
     seeds : int
         Number of placements.
     tools : dict of str to str or None
-        Versions of the tools, as the result depends on them.
+        Versions of the tools, which the result depends on.
 
     Returns
     -------

@@ -50,7 +50,7 @@ def _scaled(vector: np.ndarray) -> np.ndarray:
 
 
 def _polynomial(coefficients: Sequence[float], x: np.ndarray) -> np.ndarray:
-    """Value of a polynomial by Horner's rule; coefficients in ascending order."""
+    """Horner's rule; coefficients in ascending order."""
     *rest, total = coefficients
     for coefficient in reversed(rest):
         total = total * x + coefficient
@@ -270,7 +270,7 @@ CLAIMS = (
 class Counted(np.ndarray):
     """An array that counts in `counts` the operations on it and on their results.
 
-    An operation on arrays counts once for each element. It is made by `Counted.of`.
+    An operation on arrays counts once an element. Made by `Counted.of`.
     """
 
     counts: Counter[str]
@@ -308,7 +308,7 @@ class Counted(np.ndarray):
         return self.of(result, self.counts) if isinstance(result, np.ndarray) else result
 
     def __array_ufunc__(self, ufunc, method, *inputs, **options):
-        """Count the operation, and do it on plain arrays."""
+        """Count, and work on plain arrays."""
         plain = [x.view(np.ndarray) if isinstance(x, Counted) else x for x in inputs]
         counts = next(x.counts for x in inputs if isinstance(x, Counted))
         result = getattr(ufunc, method)(*plain, **options)

@@ -33,7 +33,7 @@ class Core:
     verified : str
         Its verification, as the source states it.
     source : str
-        Address of the source.
+        Address.
     """
 
     name: str

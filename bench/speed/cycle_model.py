@@ -1,4 +1,4 @@
-"""Cycles of a frame, computed from the lengths of its spans, for pictures that take long to simulate.
+"""Cycles of a frame from the lengths of its spans: for pictures that take long to simulate.
 
 ``python -m blysk.bench.speed.cycle_model`` prints, for every method, the cycles of simulated frames beside
 those of the model.
@@ -28,7 +28,7 @@ from blysk.sim.meshes.teapot import teapot
 __all__ = ["WAITING", "compare", "frame_cycles", "intervals_of", "span_cycles", "unit_of"]
 
 _NEVER = -(1 << 40)
-"""Minus infinity in sums of cycles."""
+"""Minus infinity of sums of cycles."""
 
 WAITING = 2
 """Cycles from the first pixel of span k - 2 until the buffer has a free place for the prepared span k."""
@@ -128,7 +128,7 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     spans : Spans
         Spans of the frame, none of them empty.
     writes : int
-        Number of writes of constants before the frame.
+        Writes of constants before it.
     """
     length = np.asarray(spans.length, dtype=np.int64) * unit.cycles_per_pixel
     waiting = WAITING if unit._interpolator.shortest_interval is None else 0

@@ -237,7 +237,7 @@ def teapot_spans(design: Design, width: int, height: int, least: int = 1) -> tup
 
 
 def picture_seconds(triangles: int = 50_000, size: str = "640x480", repeats: int = 3) -> tuple[float, float]:
-    """Seconds of ``blysk render`` for a teapot by the chord method, with its model in the cache.
+    """Seconds that ``blysk render`` takes for a teapot by the chord method, its model in the cache.
 
     Parameters
     ----------
@@ -284,7 +284,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     Returns
     -------
     int
-        0, or 1 if the compiled engine missed a target.
+        0, or 1 when the compiled engine missed a target.
     """
     design = preset(method="chord", model="cosquad", lights=1)
     spans, constants = teapot_spans(design, width, height, LEAST_LENGTH)

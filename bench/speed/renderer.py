@@ -36,7 +36,7 @@ LARGEST_MEMORY = 2 * 2**30
 
 @dataclass(frozen=True)
 class Timing:
-    """Time of the fastest of several runs.
+    """The fastest of several runs.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Timing:
 
 
 def timed(action: Callable[[], Any], repeats: int) -> tuple[Timing, Any]:
-    """Timing of the fastest of several runs, by `Timing.one_core`, and the last result.
+    """Fastest of several runs, by `Timing.one_core`, and the last result.
 
     Parameters
     ----------

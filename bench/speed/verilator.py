@@ -25,7 +25,7 @@ from blysk.sim.engines.engine import Ports, SimulationError, Stimulus
 __all__ = ["OPTIONS", "Verilated", "free_stimulus", "verilator_folder"]
 
 OPTIONS = ("-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-assert", "-Wno-fatal", "-Wno-lint")
-"""Verilator's options for speed, from its manual."""
+"""Verilator's options for speed, by its manual."""
 
 _DRIVER = """\
 #include "Vcore.h"
@@ -198,7 +198,7 @@ class Verilated:
     Attributes
     ----------
     compiler : str
-        Name of the C++ compiler: the first of `find_compilers` that links by itself.
+        Name of the C++ compiler: the first that `find_compilers` finds and that links by itself.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
     Parameters
     ----------
     site : Path
-        Folder of a site by ``blysk web``.
+        A site by ``blysk web``.
     designs : sequence of str
         Names of its modules; all by default.
     frames : int

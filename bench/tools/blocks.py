@@ -155,7 +155,7 @@ class Row:
 
 
 def _times(entry: Entry, unit: Component) -> tuple[int, int]:
-    """Latency, and cycles from a result to the next: stated by the unit, or measured by simulation."""
+    """Latency, and cycles from a result to the next: stated by the unit, else found by simulation."""
     variant, latency = entry.variant, getattr(unit, "latency", None)
     interval = getattr(unit, "initiation_interval", getattr(unit, "cycles_per_pixel", None))
     if isinstance(latency, int) and isinstance(interval, int):

@@ -86,7 +86,7 @@ def command(
     lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or if the
     frames are too heavy for 60 Hz.
 
-    On a 25F the default model is cosquad: so far no placement of the design with blinn has been routed.
+    On a 25F the default model is cosquad: with blinn no placement of its design has been routed so far.
 
     The buttons of the board stop the motion, turn it round, and change the material and the light.
 

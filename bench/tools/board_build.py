@@ -1,4 +1,4 @@
-"""Bitstreams: a board's top by Yosys, nextpnr and ecppack, with its pins and the reached clock rates."""
+"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, and the clocks reached."""
 
 import contextlib
 import importlib
@@ -238,7 +238,7 @@ class Clock:
 
     @property
     def met(self) -> bool:
-        """Whether it reaches the needed rate."""
+        """Whether it is fast enough."""
         return self.reached >= self.needed
 
 

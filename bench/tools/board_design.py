@@ -69,7 +69,7 @@ def gpu_of(
     board : Board
         Board with the memory for the mesh.
     mesh : str
-        Mesh file, scene file, or ``teapot``.
+        File, scene file, or ``teapot``.
     given : dict
         Options of `OPTIONS`.
     colours : str, optional

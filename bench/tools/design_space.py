@@ -276,7 +276,7 @@ class Explored:
 
 
 def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
-    """Measured designs, from the results of `tasks_of`."""
+    """Designs, from the results of `tasks_of`."""
     measured = {
         (task.function, Candidate(**task.settings["candidate"])): result
         for task, result in zip(tasks, results, strict=True)
@@ -304,7 +304,7 @@ def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
 def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values: bool = True) -> np.ndarray:
     """Whether each design is on the Pareto front of largest error and cost: bool array.
 
-    A design that flags spans as too wide is not on the front.
+    A design that flags spans as too wide is not on it.
 
     Parameters
     ----------

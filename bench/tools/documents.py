@@ -40,7 +40,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
     Returns
     -------
     pages : dict of str to str
-        HTML by file of the site; ``README.md`` becomes ``index.html``.
+        By file of the site; ``README.md`` is ``index.html``.
     pictures : dict of str to Path
         SVG and PNG files to copy, by file of the site.
     """

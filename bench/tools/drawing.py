@@ -28,7 +28,7 @@ _BETWEEN = 30.0
 _FORMULAS, _LONGEST, _SHORT = 4, 40, 20
 """Most formulas in a box, and most characters of one in a box and in a tag; a name replaces a longer one."""
 _TAGS = 70.0
-"""Width of the tags on a side of a band, about."""
+"""Width that tags take on a side of a band, about."""
 _BAND = 6
 """Number of cut arrows that weigh as much as a further band."""
 _FACES = {
@@ -197,7 +197,7 @@ class _Layout:
         return count
 
     def _order(self) -> None:
-        """Order each column by its neighbours' mean places; the order with the fewest crossings is kept."""
+        """Order each column by its neighbours' mean places; the order with fewest crossings counts."""
         best, fewest = [list(c) for c in self.columns], self._crossings()
         last = len(self.columns) - 1
         for sweep in range(40):
@@ -236,7 +236,7 @@ class _Layout:
                     self.places[k].y = float(y)
 
     def _close_gaps(self) -> None:
-        """Remove empty stripes, such as between parts without an arrow between them."""
+        """Take out empty stripes, as between parts that no arrow joins."""
         shift, bottom = 0.0, -np.inf
         for place in sorted(self.places, key=lambda p: p.y - p.height / 2):
             top = place.y - place.height / 2
@@ -247,7 +247,7 @@ class _Layout:
 
     @property
     def width(self) -> float:
-        """Width between the outermost sides."""
+        """Distance of the outermost sides."""
         return max(p.x + p.width / 2 for p in self.places) - min(p.x - p.width / 2 for p in self.places)
 
     def _set_columns(self) -> None:

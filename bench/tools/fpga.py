@@ -76,7 +76,7 @@ def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
 
 
 def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
-    """A line for each design in which nextpnr does not time the inside of a multiplier."""
+    """A line for each design in which nextpnr leaves the interior of a multiplier untimed."""
     for layout in layouts:
         if layout.closed:
             closed = f"{layout.closed} of {layout.parts.multipliers} multipliers"

@@ -235,7 +235,7 @@ class Netlist:
         return True
 
     def _has_constant(self, cell) -> bool:
-        """Whether a cell has a constant operand."""
+        """Whether an operand is a constant."""
         operands = (cell["connections"].get(port, [0]) for port in "AB")
         return any(not any(isinstance(bit, int) for bit in operand) for operand in operands)
 
@@ -343,7 +343,7 @@ def _without_duplicates(cells: dict) -> tuple[dict, dict[int, int]]:
 
 
 def _short(names: list[str]) -> str:
-    """The simplest of a net's names, without path and serial number."""
+    """The plainest of a net's names, without path and serial number."""
     if not names:
         return ""
     name = min(names, key=lambda name: (name.count("."), "__" in name, len(name), name)).split(".")[-1]

@@ -333,13 +333,13 @@ def pictures(unit: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -
 
 
 def _room(record: Record) -> str:
-    """Name of the folder of a unit's file."""
+    """Room of a unit, by the folder of its file."""
     parts = record.kind.__module__.split(".")
     return parts[2] if len(parts) > 3 else ""
 
 
 def index_page() -> str:
-    """Text of the index page: the units in the order of the pipeline."""
+    """Text of the first page of the folder: the units in the order of the pipeline."""
     lines = [
         "# The units",
         "",

@@ -297,7 +297,7 @@ def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Fami
 
 
 def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
-    """Refuse a netlist with a cell through which nextpnr times no paths."""
+    """Refuse a netlist with a cell that nextpnr does not time paths through."""
     for cell in netlist["modules"]["top"]["cells"].values():
         kind = cell["type"]
         for name in (kind, *(f"{kind}.{key}={value}" for key, value in cell["parameters"].items())):
@@ -413,7 +413,7 @@ def lay_out(
     seeds : int
         Number of seeds.
     jobs : int
-        Processes at a time.
+        Processes at once.
     progress : callable
         Called after each seed.
     family : Family

@@ -192,7 +192,7 @@ def _join_copies(graph: Graph) -> None:
 
 
 def graph_of(component: wiring.Component, most: int = MOST_BOXES) -> Graph:
-    """Structure of a unit, read from its netlist.
+    """Read a unit's structure.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ def _read(name: str) -> str:
 
 
 def _script(name: str, value: Any) -> str:
-    """Script that gives a value to the page."""
+    """A script that hands a value to the page."""
     return f"blysk.given({embedded(name)},{embedded(value)});\n"
 
 

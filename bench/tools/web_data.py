@@ -108,7 +108,7 @@ START = {
 """Settings of the page at its start."""
 
 RIVAL = "linear"
-"""Method with which a frame may be compared, in hardware too."""
+"""Method that a frame may be compared with, in hardware too."""
 
 REFERENCES = {
     "method": {
@@ -149,7 +149,7 @@ class Body:
     make : callable
         Function that makes the mesh.
     views : int
-        Number of cameras of the turntable.
+        Cameras of the turntable.
     margin : float
         See `Camera.framing`.
     """
@@ -247,7 +247,7 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
     Parameters
     ----------
     spans : Spans
-        Spans with normals.
+        With normals.
     visible : bool array
         Whether each fragment is visible, in their order.
     ratio : array, shape (spans,), optional

@@ -1,4 +1,4 @@
-"""Descriptions of methods and reflection models, a line each, for the help of the command line."""
+"""Methods and reflection models in a line each, for the help of the command line."""
 
 __all__ = ["METHOD_LINES", "MODEL_LINES", "described"]
 

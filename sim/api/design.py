@@ -53,7 +53,7 @@ ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 def design(
     *, lights: int = 1, materials: int = 1, factors: int = 0, **options: Unpack[DesignOptions]
 ) -> Design:
-    """A pipeline of the given options, with the defaults of the command line.
+    """A pipeline with the defaults of the command line.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     Parameters
     ----------
     settings : Settings
-        Values of all options of `DESIGN`.
+        With values of `DESIGN`.
     lights, materials : int
         Numbers of lights and materials.
 

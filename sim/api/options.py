@@ -59,7 +59,7 @@ ColorLike = str | float | Triple
 """A colour: ``"#rrggbb"``, one number, or three."""
 
 Source = str | os.PathLike[str] | Mesh
-"""Source of a scene: ``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
+"""``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
 
 
 GEOMETRIES = ("software", "hardware")
@@ -108,7 +108,7 @@ class Model(Choice):
         return f"[{'|'.join(self.names)}|FILE.csv]"
 
     def check(self, value):
-        """The name, or the `TabulatedModel` of a file."""
+        """The name; or the curve of a file."""
         if isinstance(value, TabulatedModel):
             return value
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
@@ -202,7 +202,7 @@ class Direction(Vector):
         self.remedy = f"give X,Y,Z, a vector other than 0, or one of {', '.join(words)}"
 
     def parse(self, text):
-        """A word unchanged, or numbers with commas between them."""
+        """A word as it is, or numbers with commas between them."""
         return text if text in self.words else super().parse(text)
 
     def check(self, value):
@@ -217,7 +217,7 @@ _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)
 
 
 def shown_key(name: str) -> str:
-    """Text of a file's key for a message."""
+    """A key of a file in a message."""
     return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
 
 
@@ -344,7 +344,7 @@ DESIGN: dict[str, Option] = {
         Choice("style", STYLES), "throughput", "One pixel a cycle, or few multipliers.", "pipeline.style"
     ),
 }
-"""Options of a design without its counts."""
+"""Options of a design, but for its counts."""
 
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),

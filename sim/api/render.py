@@ -117,7 +117,7 @@ class RenderedFrame:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """The golden frame, and the errors against three references; of a frame by triangles, against two."""
+        """The golden frame, and the errors against three references; by triangles against two."""
         if isinstance(self.simulated, SimulatedTriangleFrame):
             return compare_image(self.scene, self.design, self.simulated.image)
         return compare(self.scene, self.design, self.simulated)
@@ -295,7 +295,7 @@ def prepare_rendering(
     remote: bool = False,
     stage: Callable[[str], object] = lambda text: None,
 ) -> Rendering:
-    """Load the mesh, choose the engine, and build the pipeline: a rendering that is ready to draw.
+    """Load the mesh, choose the engine, and build the pipeline.
 
     Parameters
     ----------

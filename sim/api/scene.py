@@ -1,4 +1,4 @@
-"""Scenes from options, with a default for each."""
+"""Scenes with a default for everything."""
 
 import math
 import os

@@ -101,7 +101,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
     Parameters
     ----------
     path : path
-        The file, in UTF-8, with at most 100,000 bytes, and at most 256 dots in a line.
+        The file, in UTF-8, at most 100,000 bytes, and 256 dots in a line.
 
     Raises
     ------

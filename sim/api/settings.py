@@ -44,7 +44,7 @@ class Settings:
         return self.values[name]
 
     def refuse(self, name: str, reason: str, remedy: str, value: object = None) -> OptionError:
-        """The error of an option; without ``value``, it shows the option's own value."""
+        """The error of a value; without a ``value``, the option's own is shown."""
         return OptionError(name, self.values[name] if value is None else value, reason, remedy)
 
     @property
@@ -56,7 +56,7 @@ class Settings:
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """Within the block, the error of a value from a scene file names the file and the key."""
+        """Within the block, the error of a value that a scene file gives names file and key."""
         try:
             yield
         except OptionError as error:

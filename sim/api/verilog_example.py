@@ -1,4 +1,4 @@
-"""Worked example for the header of a Verilog file: every write of a frame, and the values of a table."""
+"""Worked example in the header of a Verilog file: every write of a frame, and the values of a table."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ _PER_LINE = 8
 
 
 def example_of(design: Design) -> list[str]:
-    """Lines of the example: all writes for a grey surface and white light along the viewer, in decimal.
+    """Lines: all writes for a grey surface and white light along the viewer, in decimal.
 
     Parameters
     ----------

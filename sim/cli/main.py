@@ -23,7 +23,7 @@ from blysk.sim.errors import InputError, OptionError, one_line
 __all__ = ["cli", "main"]
 
 _COMMANDS = ("render", "verilog")
-"""Commands of this folder, each in a file of its name, which is imported when the command is called."""
+"""Commands of this folder, each in a file of its name, which is imported when it is asked for."""
 
 
 class _Group(click.Group):

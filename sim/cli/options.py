@@ -1,4 +1,4 @@
-"""Options of commands, made of the tables of the Python interface."""
+"""Options of commands, from the tables of the Python interface."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -97,7 +97,7 @@ def given_options(context: click.Context, names: Sequence[str]) -> dict[str, Any
 
 
 def lights_of(options: Mapping[str, Any]) -> list[Light]:
-    """Lights of ``--light``, ``--point-light`` and ``--spot-light``, in this order; perhaps an empty list.
+    """Lights of ``--light``, ``--point-light`` and ``--spot-light``, in this order; empty without any.
 
     Raises
     ------
@@ -121,6 +121,6 @@ def lights_of(options: Mapping[str, Any]) -> list[Light]:
 
 
 def option_error(error: OptionError) -> InputError:
-    """The error of an option, named as on the command line."""
+    """The error of an option in the words of the command line."""
     flag = "light" if error.option == "lights" else error.option.replace("_", "-")
     return error.at(f"--{flag} {error.value}".strip())

@@ -53,7 +53,7 @@ def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
     Parameters
     ----------
     vector, axis : three floats
-        The axis is not 0.
+        The axis not 0.
     count : int
         Steps, at least 1.
 
@@ -217,7 +217,7 @@ class FrameExecutor:
     submit : callable
         Takes a camera, returns the `concurrent.futures.Future` of its `AnimationFrame`.
     workers : int
-        Number of frames rendered at a time.
+        Frames at a time.
     name : str
         Text for the report: ``"4 processes"``.
     """

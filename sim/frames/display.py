@@ -67,7 +67,7 @@ class OneClock(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The enables of two clocks, the top under them, and a register that collects bits."""
+        """The enables, the top under them, and a register that collects bits."""
         m = Module()
         inner, top = Module(), self.top
         cells = OutputCells(LANES)

@@ -1,4 +1,4 @@
-"""Frames drawn in bands by simulated hardware: pixels band by band, cycles and counters."""
+"""Frames in bands by simulated hardware: a drawing's pixels band by band, its cycles and counters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ class DrawnBands:
     cycles : int64 array, shape (B,)
         Cycles of each band from its request to its ``done``, with the clearing after the previous band.
     counts : dict of str to int
-        The counters of `STATUS` at the end.
+        `STATUS` at the end.
     """
 
     band: np.ndarray

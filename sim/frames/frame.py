@@ -155,7 +155,7 @@ class FrameSimulator:
         scene : Scene
             What to draw; at most as many lights as the design has.
         progress : callable, optional
-            Called at times with the number of pixels so far, and of all pixels.
+            Called now and then with the number of pixels so far and in all.
         vcd : str, optional
             File for the waveforms; engine ``"pysim"`` only.
 

@@ -36,7 +36,7 @@ def _picture_format(path: str | os.PathLike) -> str:
 
 
 def write_image(path: str | os.PathLike, image: np.ndarray) -> None:
-    """Write a frame as a picture in the format of the suffix. The file is whole or not there at all.
+    """Write a frame as a picture; the suffix chooses the format. The file is whole or not there at all.
 
     PNG, BMP, PPM and TIFF keep every pixel to the bit.
 

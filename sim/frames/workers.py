@@ -29,7 +29,7 @@ _START = "start one with `dask scheduler`, and give its address, as tcp://host:8
 
 
 def processors() -> int:
-    """Number of processors that this process may use."""
+    """Processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:
@@ -51,7 +51,7 @@ def local_executor(
     begin : callable, optional
         Called first in each process, with ``arguments``, which are sent once and not with every task.
     arguments : tuple
-        Arguments of ``begin``.
+        Of ``begin``.
 
     Raises
     ------

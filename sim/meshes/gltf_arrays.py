@@ -118,7 +118,7 @@ def _glb_chunk(data: bytes) -> bytes:
 
 
 class _Arrays:
-    """The accessors of a document, and a new buffer with arrays that are added to them."""
+    """The accessors of a document, and a buffer of arrays put to them."""
 
     def __init__(self, document: dict, buffers: list[bytes]):
         self.document, self.buffers = document, buffers

@@ -32,7 +32,7 @@ __all__ = ["DEFAULT_CREASE", "DEFAULT_TRIANGLES", "SUFFIXES", "LoadedMesh", "loa
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
 
 DEFAULT_TRIANGLES = 10_000
-"""Triangles of the teapot that are asked for by default."""
+"""Triangles of the teapot, about."""
 
 DEFAULT_CREASE = 40.0
 """Angle between faces, in degrees, over which an edge is sharp; for meshes without normals."""
@@ -55,7 +55,7 @@ class LoadedMesh:
         Stored vertex normals that were zero, not finite, or more than 1/256 off unit length, or that the
         file refers to but does not hold.
     dropped_faces : int
-        Triangles without area, which are left out.
+        Triangles without area, left out.
     materials : tuple of FileMaterial
         Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
         differ in more than the name.

@@ -1,4 +1,4 @@
-"""OBJ files and their material files, rewritten in the form that trimesh reads."""
+"""OBJ files and their material files, in the form that trimesh reads."""
 
 import math
 import os

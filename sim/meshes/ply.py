@@ -1,4 +1,4 @@
-"""PLY files: text and binary, with polygons of any number of corners."""
+"""PLY files: text and binary, with polygons of any count of corners."""
 
 import re
 import struct

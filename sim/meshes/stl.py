@@ -1,4 +1,4 @@
-"""STL files: refusal of those that are cut short, which trimesh would load in part."""
+"""STL files that are cut short, which trimesh would load in part."""
 
 import struct
 

@@ -54,7 +54,7 @@ class Source:
                     getattr(self.dut, port).value = code
 
     def observe(self):
-        """After the outputs have settled: whether the row is taken at the edge."""
+        """When the outputs have settled: whether the row is taken at the edge."""
         taken = self.offered and self.ready.value == 1
         if taken:
             self.rows.pop()
