@@ -81,7 +81,7 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
 
 
 _ALIKE_LSB, _ALIKE_TIMES = 0.15, 1.05
-"""Errors, and times as a factor, that are not told apart."""
+"""Difference of errors, in LSB, and ratio of times, up to which two designs count as equal."""
 
 
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
@@ -130,10 +130,11 @@ def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any
 
 
 def _front(found: Sequence[Mapping[str, Any]], kind: str, time: str = "cycles") -> list[Mapping[str, Any]]:
-    """Designs that no other beats, fastest first; without those whose dot products come from outside.
+    """Designs that no other beats, fastest first; designs that get their dot products as input are left out.
 
-    One beats another when it is no worse in error (by `_ALIKE_LSB`) and time (by `_ALIKE_TIMES`), and is
-    better than that in one of them, or has fewer multipliers. `time` is a key of `summaries`, cycles or ns.
+    A design beats another if it is no worse in error (by `_ALIKE_LSB`) and time (by `_ALIKE_TIMES`), and
+    better by more than that in one of both, or has fewer multipliers. `time` is a key of `summaries`,
+    ``cycles`` or ``ns``.
     """
     found = [of for of in found if not of["is_prepared"]]
     if not found:

@@ -171,7 +171,7 @@ def _compare(
 
 
 def _mean_squares(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:
-    """Normalised mean squared errors against pixels of the model that is approximated, which are overwritten."""
+    """Normalised mean squared errors against pixels of the approximated model, which are overwritten."""
     exact *= 255
     published, share = mnse_published(image, exact)
     return {

@@ -78,12 +78,12 @@ class LightUnit(wiring.Component):
 
     With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
     equal, and they accept and give the same beats on the same cycles, so that one handshake serves both. With
-    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take two cycles
-    each.
+    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take two
+    cycles each.
 
     The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
-    are not dark; with a longer interval there is a cycle of latency more. Of a light that fades a
-    `FactorUnit` follows, two cycles and a multiplier more; the factor passes beside the units before it.
+    are not dark; with a longer interval the latency is a cycle longer. For a light that fades a
+    `FactorUnit` follows, with two cycles and a multiplier more; the factor passes beside the units before it.
 
     Parameters
     ----------
