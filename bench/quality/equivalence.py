@@ -11,7 +11,8 @@ from collections.abc import Iterator, Set
 from importlib.util import find_spec
 from pathlib import Path
 
-from blysk.bench.tools.place_and_route import YOSYS, ToolError
+from blysk.bench.tools.place_and_route import YOSYS
+from blysk.bench.tools.tool_runner import ToolError
 
 __all__ = ["Miter", "yosys"]
 

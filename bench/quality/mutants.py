@@ -29,7 +29,7 @@ from blysk.bench.command import run
 from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
 from blysk.bench.store import Task, results_of
-from blysk.bench.tools.place_and_route import ToolError
+from blysk.bench.tools.tool_runner import ToolError
 from blysk.sim.engines.cache import version_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.errors import InputError

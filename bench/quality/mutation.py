@@ -16,7 +16,7 @@ from amaranth.hdl import Module, Mux, Value, unsigned
 from amaranth.lib.wiring import Component, In, Member, Out
 
 from blysk.bench.quality.equivalence import yosys
-from blysk.bench.tools.place_and_route import ToolError
+from blysk.bench.tools.tool_runner import ToolError
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace

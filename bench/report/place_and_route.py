@@ -8,7 +8,8 @@ from blysk.bench.report.placed import read_store
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.families import ECP5, FAMILIES
-from blysk.bench.tools.place_and_route import SEEDS, TooLarge, lay_out, tool_versions
+from blysk.bench.tools.place_and_route import SEEDS, lay_out, tool_versions
+from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 

@@ -11,7 +11,8 @@ from blysk.bench.report.thesis_ways import SPANS, WAYS, Counted, finish, random_
 from blysk.bench.speed.renderer import timed
 from blysk.bench.speed.throughput import measure, spans_of
 from blysk.bench.tools.blocks import Entry, entry_of, row_of
-from blysk.bench.tools.place_and_route import TooLarge, lay_out
+from blysk.bench.tools.place_and_route import lay_out
+from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import preset

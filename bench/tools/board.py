@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from blysk.bench.tools.board_build import Board, Built, board_named, build, packages_missing
 from blysk.bench.tools.board_design import COLOURS, OPTIONS, BoardTop, gpu_of, least_cycles
-from blysk.bench.tools.place_and_route import ToolError
+from blysk.bench.tools.tool_runner import ToolError
 from blysk.golden.frames.compare import compare_image
 from blysk.golden.gpu import Gpu
 from blysk.golden.reference.scene import Scene

@@ -15,16 +15,8 @@ from amaranth.hdl import Elaboratable
 
 from blysk.bench.tools.absorb_registers import absorb_registers
 from blysk.bench.tools.families import ECP5, signal_name
-from blysk.bench.tools.place_and_route import (
-    MAP_AFTER,
-    MAP_BEFORE,
-    MOUNT,
-    YOSYS,
-    GivenUp,
-    TooLarge,
-    ToolError,
-    ToolRunner,
-)
+from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS
+from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner
 from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 

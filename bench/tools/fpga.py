@@ -30,7 +30,8 @@ from tqdm import tqdm
 
 from blysk.bench.tools.blocks import ENTRIES
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F, Family
-from blysk.bench.tools.place_and_route import SEEDS, Layout, TooLarge, lay_out, versions_of
+from blysk.bench.tools.place_and_route import SEEDS, Layout, lay_out, versions_of
+from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.tops import TOPS

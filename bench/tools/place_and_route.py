@@ -3,12 +3,8 @@
 import contextlib
 import hashlib
 import json
-import os
 import re
-import subprocess
-import sys
 import tempfile
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -25,23 +21,18 @@ from amaranth.lib.wiring import Out
 from blysk.bench.tools import absorb_registers as absorbing
 from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
+from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner
 from blysk.sim.engines.cache import cache_folder, version_of
-from blysk.sim.engines.engine import SimulationError
 from blysk.sim.errors import InputError
 from blysk.sim.output import write_json
 
 __all__ = [
     "MAP_AFTER",
     "MAP_BEFORE",
-    "MOUNT",
     "SEEDS",
     "YOSYS",
-    "GivenUp",
     "Layout",
     "Registered",
-    "TooLarge",
-    "ToolError",
-    "ToolRunner",
     "lay_out",
     "parts_of",
     "read_report",
@@ -51,9 +42,6 @@ __all__ = [
 
 
 SEEDS = 5
-
-_SECONDS = 5
-"""Seconds between two readings of a tool's output."""
 
 _REMEDY = "pip install 'blysk[fpga]'"
 
@@ -74,23 +62,13 @@ write_json netlist.json"""
 
 YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
 
-MOUNT = "/job"
-"""Path, in the tool's sandbox, of the folder in which it runs, the only one that it sees."""
+_RIPUP = "--tmg-ripup"
+_SLACK = re.compile(r"ripped up due to negative slack WNS=(-?[\d.]+)ns")
+_ROUNDS = 10
+"""Rounds of the router for paths that are too slow, in which the slowest must become faster."""
 
 _MANY = 1000
 """Least number of look-up tables of a large design."""
-
-
-class ToolError(SimulationError):
-    """Yosys or nextpnr failed, or its result cannot be timed."""
-
-
-class TooLarge(ToolError):
-    """A design takes more than the FPGA has."""
-
-
-class GivenUp(ToolError):
-    """A tool was stopped because it would not have finished."""
 
 
 @dataclass(frozen=True)
@@ -192,73 +170,6 @@ def versions_of(family: Family) -> dict[str, str]:
         verb = "is" if len(missing) == 1 else "are"
         raise InputError("fpga", f"{' and '.join(missing)} {verb} not installed", _REMEDY)
     return versions
-
-
-class ToolRunner:
-    """Runs tools, several at a time, and can stop all of them."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._running: set[subprocess.Popen] = set()
-        self._stopped = False
-
-    def run(
-        self,
-        name: str,
-        code: str,
-        arguments: Sequence[str],
-        folder: Path,
-        text: str = "",
-        given_up: Callable[[str], str] | None = None,
-    ) -> None:
-        """Run Python code in a folder, with a text as its standard input.
-
-        `given_up` is called every few seconds with the tool's output so far; if it returns a reason, the tool
-        is stopped and `GivenUp` raised. `ToolError` is raised if the tool fails, or was stopped by `stop`.
-        """
-        # Python's own warnings are none of the tool's.
-        command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
-        with tempfile.TemporaryFile(dir=folder) as given, tempfile.TemporaryFile(dir=folder) as log:
-            given.write(text.encode())
-            given.seek(0)
-            with self._lock:
-                if self._stopped:
-                    raise ToolError(f"{name} was stopped")
-                process = subprocess.Popen(
-                    command,
-                    cwd=folder,
-                    env={**os.environ, "YOWASP_MOUNT": f"{MOUNT}=."},
-                    stdin=given,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                )
-                self._running.add(process)
-            try:
-                while process.returncode is None:
-                    try:
-                        process.wait(_SECONDS if given_up else None)
-                    except subprocess.TimeoutExpired:
-                        # The tool writes from where the file's one position is.
-                        size = os.fstat(log.fileno()).st_size
-                        if reason := given_up(os.pread(log.fileno(), size, 0).decode(errors="replace")):
-                            raise GivenUp(reason) from None
-            finally:
-                process.kill()
-                process.wait()
-                with self._lock:
-                    self._running.discard(process)
-            if process.returncode:
-                log.seek(0)
-                lines = log.read().decode(errors="replace").strip().splitlines()
-                errors = [line for line in lines if line.startswith("ERROR")] or lines[-1:] or ["no message"]
-                raise ToolError(f"{name} ends with status {process.returncode}: {errors[0].strip()}")
-
-    def stop(self) -> None:
-        """Stop all running tools, and start no more."""
-        with self._lock:
-            self._stopped = True
-            for process in self._running:
-                process.kill()
 
 
 def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Family = ECP5) -> Parts:
@@ -390,6 +301,17 @@ def _store(path: Path, parts: Parts, place: Place) -> None:
         write_json(path, {"parts": asdict(parts), "place": asdict(place)})
 
 
+def _stuck(said: str) -> str:
+    """Why the router will not end, from its log; "" if it may.
+
+    nextpnr routes wires of slow paths again for as long as there are such paths. Where the target cannot be
+    met at all it goes on for ever: of the bisection the slowest path was the same to 10 ps in 27 rounds.
+    """
+    slack = [float(worst) for worst in _SLACK.findall(said)]
+    stuck = len(slack) > _ROUNDS and max(slack[-_ROUNDS:]) <= max(slack[:-_ROUNDS])
+    return f"no faster in {_ROUNDS} rounds" if stuck else ""
+
+
 def lay_out(
     name: str,
     component: wiring.Component,
@@ -478,8 +400,13 @@ def _run(
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
                 path = folder / f"{seed}.json"
                 files = ["--json", f"{MOUNT}/top.json", "--report", f"{MOUNT}/{path.name}"]
+                arguments = [*options, *files, "--seed", str(seed)]
                 try:
-                    runner.run("nextpnr", nextpnr, [*options, *files, "--seed", str(seed)], folder)
+                    try:
+                        runner.run("nextpnr", nextpnr, arguments, folder, given_up=_stuck)
+                    except GivenUp:
+                        arguments.remove(_RIPUP)
+                        runner.run("nextpnr", nextpnr, arguments, folder)
                 except ToolError as error:
                     if "legal placement" in str(error):
                         raise TooLarge(f"does not fit: from seed {seed} {error}") from None

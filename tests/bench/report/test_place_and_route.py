@@ -6,7 +6,8 @@ from blysk.bench.report import place_and_route
 from blysk.bench.report.place_and_route import OTHERS, OTHERS_SEEDS, measure, section, tasks
 from blysk.bench.report.placed import read_store
 from blysk.bench.tools.families import FAMILIES, Parts, Place
-from blysk.bench.tools.place_and_route import Layout, TooLarge, ToolError
+from blysk.bench.tools.place_and_route import Layout
+from blysk.bench.tools.tool_runner import TooLarge, ToolError
 from blysk.golden.presets import METHODS
 
 

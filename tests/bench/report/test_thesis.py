@@ -27,7 +27,7 @@ from blysk.bench.report.thesis_figures import (
 )
 from blysk.bench.report.thesis_ways import CLAIMS, SPANS, WAYS, Counted
 from blysk.bench.speed.renderer import Timing
-from blysk.bench.tools.place_and_route import TooLarge
+from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.renderer import render
 from blysk.sim.meshes.teapot import teapot

@@ -16,7 +16,7 @@ def calls(monkeypatch):
     """Stands for the tools: writes what they would, notes what was called."""
     calls = []
 
-    def run(self, name, code, arguments, folder, text=""):
+    def run(self, name, code, arguments, folder, text="", given_up=None):
         calls.append((name, *arguments[-1:]))
         if name == "Yosys":
             (folder / "netlist.json").write_text(json.dumps(netlist(("TRELLIS_FF", {}, 3, 4))))

@@ -12,7 +12,8 @@ import pytest
 from blysk.bench.tools.board import built_lines, missed
 from blysk.bench.tools.board_build import BOARDS, Built, Clock, _stuck, build, refuse_too_large
 from blysk.bench.tools.board_design import BoardTop, gpu_of
-from blysk.bench.tools.place_and_route import TooLarge, ToolError, tool_versions
+from blysk.bench.tools.place_and_route import tool_versions
+from blysk.bench.tools.tool_runner import TooLarge, ToolError
 from blysk.golden.reference.light import Light
 from blysk.golden.video.band_buffer import BandBuffer
 from blysk.golden.video.clock_plan import clock_plan

@@ -14,11 +14,8 @@ import pytest
 from blysk.bench.tools import fpga, place_and_route
 from blysk.bench.tools.families import ECP5, ECP5_85F, FAMILIES, NEXUS, Parts, Place
 from blysk.bench.tools.fpga import table, untimed
-from blysk.bench.tools.place_and_route import (
-    Layout,
-    TooLarge,
-    lay_out,
-)
+from blysk.bench.tools.place_and_route import Layout, lay_out
+from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import RenderUnit

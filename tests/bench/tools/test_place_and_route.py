@@ -9,19 +9,10 @@ from amaranth.hdl import Module, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In
 
-from blysk.bench.tools import place_and_route
+from blysk.bench.tools import place_and_route, tool_runner
 from blysk.bench.tools.families import ECP5, FAMILIES, NEXUS, Parts, Place
-from blysk.bench.tools.place_and_route import (
-    GivenUp,
-    Layout,
-    Registered,
-    TooLarge,
-    ToolError,
-    ToolRunner,
-    lay_out,
-    parts_of,
-    read_report,
-)
+from blysk.bench.tools.place_and_route import Layout, Registered, lay_out, parts_of, read_report
+from blysk.bench.tools.tool_runner import GivenUp, TooLarge, ToolError, ToolRunner
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 
@@ -108,7 +99,7 @@ def test_cells_of_nexus():
     ],
 )
 def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, monkeypatch):
-    def run(self, tool, code, arguments, folder, text=""):
+    def run(self, tool, code, arguments, folder, text="", given_up=None):
         assert tool == "Yosys"
         (folder / "netlist.json").write_text(json.dumps(netlist(("LUT4", {}, 3, 4), cell)))
 
@@ -132,7 +123,7 @@ def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkey
     """nextpnr's static placer would never end."""
     count = most
 
-    def run(self, tool, code, arguments, folder, text=""):
+    def run(self, tool, code, arguments, folder, text="", given_up=None):
         if tool == "Yosys":
             (folder / "netlist.json").write_text(json.dumps(netlist(*[(cell, {}, 3, 4)] * count)))
         else:
@@ -150,12 +141,12 @@ def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkey
 def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
     run = place_and_route.ToolRunner.run
 
-    def fails(self, name, *arguments):
+    def fails(self, name, *arguments, **options):
         if name == "nextpnr":
             raise ToolError(
                 "nextpnr ends with status 125: ERROR: Unable to find legal placement for all cells"
             )
-        run(self, name, *arguments)
+        run(self, name, *arguments, **options)
 
     monkeypatch.setattr(place_and_route.ToolRunner, "run", fails)
     with pytest.raises(
@@ -220,7 +211,7 @@ def test_placer_by_size(luts, placer, cache, monkeypatch):
     """Hardly any logic would never end in the static placer."""
     given = []
 
-    def run(self, name, code, arguments, folder, text=""):
+    def run(self, name, code, arguments, folder, text="", given_up=None):
         if name == "Yosys":
             (folder / "netlist.json").write_text(json.dumps(netlist(*[("LUT4", {}, 3, 4)] * luts)))
         else:
@@ -233,6 +224,39 @@ def test_placer_by_size(luts, placer, cache, monkeypatch):
     place = given.index("--placer") if placer else 0
     assert ("--placer" in given) == bool(placer)
     assert tuple(given[place : place + len(placer)]) == placer
+
+
+def rounds(*slack):
+    return "".join(
+        f"Info: 9 arcs ripped up due to negative slack WNS={worst}ns TNS=-9.0ns.\n" for worst in slack
+    )
+
+
+@pytest.mark.parametrize(
+    ("slack", "is_stuck"),
+    [
+        ([], False),
+        ([-4.2] * 10, False),
+        ([-4.2] * 11, True),
+        ([-4.2 + 0.01 * k for k in range(40)], False),
+        ([-4.2, -1.0, *[-4.2] * 10], True),
+        ([*[-4.2] * 10, -4.1], False),
+    ],
+)
+def test_a_router_that_does_not_end_is_asked_for_less(slack, is_stuck, calls, cache, monkeypatch):
+    """Where a target cannot be met at all, its slow paths are not routed again and again."""
+    run, given = place_and_route.ToolRunner.run, []
+
+    def talks(self, name, code, arguments, folder, text="", given_up=None):
+        given.append("--tmg-ripup" in arguments)
+        if given_up and (reason := given_up(rounds(*slack))):
+            raise GivenUp(reason)
+        run(self, name, code, arguments, folder, text)
+
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", talks)
+    monkeypatch.setattr(place_and_route, "_MANY", 0)
+    assert lay_out("counter", Counter(), 1).fmax == (101, 101, 101)
+    assert given == [False, True, False][: 2 + is_stuck]
 
 
 def test_another_design_family_or_tool_is_another_entry(calls, cache, monkeypatch):
@@ -248,7 +272,7 @@ def test_another_design_family_or_tool_is_another_entry(calls, cache, monkeypatc
 def test_seeds_that_are_done_stay_when_one_fails(calls, cache, monkeypatch):
     run = place_and_route.ToolRunner.run
 
-    def fails(self, name, code, arguments, folder, text=""):
+    def fails(self, name, code, arguments, folder, text="", given_up=None):
         if arguments[-1:] == ["2"]:
             raise ToolError("nextpnr ends with status 1: no place")
         run(self, name, code, arguments, folder, text)
@@ -394,7 +418,7 @@ def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
 
 def test_a_tool_is_ended_by_what_it_says(tmp_path, monkeypatch):
     """It writes on meanwhile: a look at what it has said does not move where it writes."""
-    monkeypatch.setattr(place_and_route, "_SECONDS", 0.05)
+    monkeypatch.setattr(tool_runner, "_SECONDS", 0.05)
     seen = []
 
     def given_up(said):
@@ -414,7 +438,7 @@ def test_a_tool_is_ended_by_what_it_says(tmp_path, monkeypatch):
 
 def test_text_reaches_a_tool_that_takes_its_time(tmp_path, monkeypatch):
     """Longer than the time between two looks."""
-    monkeypatch.setattr(place_and_route, "_SECONDS", 0.05)
+    monkeypatch.setattr(tool_runner, "_SECONDS", 0.05)
     code = "import time, sys, pathlib; time.sleep(1); pathlib.Path('x').write_text(sys.stdin.read())"
     text = "word " * 100_000
     ToolRunner().run("slow", code, [], tmp_path, text)

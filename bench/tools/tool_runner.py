@@ -1,0 +1,98 @@
+"""Runs the tools that map, place and route: in a folder, with a limit to what they try."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from blysk.sim.engines.engine import SimulationError
+
+__all__ = ["MOUNT", "GivenUp", "TooLarge", "ToolError", "ToolRunner"]
+
+_SECONDS = 5
+"""Seconds between two readings of a tool's output."""
+
+MOUNT = "/job"
+"""Path, in the tool's sandbox, of the folder in which it runs, the only one that it sees."""
+
+
+class ToolError(SimulationError):
+    """Yosys or nextpnr failed, or its result cannot be timed."""
+
+
+class TooLarge(ToolError):
+    """A design takes more than the FPGA has."""
+
+
+class GivenUp(ToolError):
+    """A tool was stopped because it would not have finished."""
+
+
+class ToolRunner:
+    """Runs tools, several at a time, and can stop all of them."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._running: set[subprocess.Popen] = set()
+        self._stopped = False
+
+    def run(
+        self,
+        name: str,
+        code: str,
+        arguments: Sequence[str],
+        folder: Path,
+        text: str = "",
+        given_up: Callable[[str], str] | None = None,
+    ) -> None:
+        """Run Python code in a folder, with a text as its standard input.
+
+        `given_up` is called every few seconds with the tool's output so far; if it returns a reason, the tool
+        is stopped and `GivenUp` raised. `ToolError` is raised if the tool fails, or was stopped by `stop`.
+        """
+        # Python's own warnings are none of the tool's.
+        command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
+        with tempfile.TemporaryFile(dir=folder) as given, tempfile.TemporaryFile(dir=folder) as log:
+            given.write(text.encode())
+            given.seek(0)
+            with self._lock:
+                if self._stopped:
+                    raise ToolError(f"{name} was stopped")
+                process = subprocess.Popen(
+                    command,
+                    cwd=folder,
+                    env={**os.environ, "YOWASP_MOUNT": f"{MOUNT}=."},
+                    stdin=given,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                )
+                self._running.add(process)
+            try:
+                while process.returncode is None:
+                    try:
+                        process.wait(_SECONDS if given_up else None)
+                    except subprocess.TimeoutExpired:
+                        # The tool writes from where the file's one position is.
+                        size = os.fstat(log.fileno()).st_size
+                        if reason := given_up(os.pread(log.fileno(), size, 0).decode(errors="replace")):
+                            raise GivenUp(reason) from None
+            finally:
+                process.kill()
+                process.wait()
+                with self._lock:
+                    self._running.discard(process)
+            if process.returncode:
+                log.seek(0)
+                lines = log.read().decode(errors="replace").strip().splitlines()
+                errors = [line for line in lines if line.startswith("ERROR")] or lines[-1:] or ["no message"]
+                raise ToolError(f"{name} ends with status {process.returncode}: {errors[0].strip()}")
+
+    def stop(self) -> None:
+        """Stop all running tools, and start no more."""
+        with self._lock:
+            self._stopped = True
+            for process in self._running:
+                process.kill()
