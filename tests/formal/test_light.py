@@ -46,7 +46,7 @@ def of_light(unit):
         return diffuse & (Value.cast(leaves.specular) == Mux(lit, highlight[:2], 0))
 
     stays(h, unit.o)
-    inside = follows(h, unit.i, unit.o, 5, image)
+    inside = follows(h, unit.i, unit.o, 6, image)
     late = unit.latency + 2 if unit.skips_dark else unit.latency - 1
     answers(h, inside.any(), taken(unit.o), late, unit.o.ready)
     return h
@@ -78,7 +78,7 @@ BUGS = {
         "specular.o.ready.eq(1)",
     ),
     "what waits beside it is lost": ("terms.ready.eq(gives)", "terms.ready.eq(1)"),
-    "a beat that comes is lost": ("m.Elif(taken)", "m.If(taken)"),
+    "a beat that comes is lost": ("m.Elif(taken)", "m.Elif(takes)"),
     "the term of a dark beat is kept": ("Mux(skip, 0, ", "Mux(0, 0, "),
 }
 
