@@ -101,8 +101,8 @@ def test_pixels(prove, choices, channels):
 PIXEL_BUGS = {
     "a pixel is accepted while it is stalled": (
         "_issue",
-        "advance & (~busy | ends_pixel)",
-        "~busy | ends_pixel",
+        "m.Elif(advance & busy)",
+        "m.Elif(busy)",
     ),
     "it moves while it is stalled": ("elaborate", "m.If(advance)", "m.If(1)"),
     "a pixel ends with a channel": (
@@ -112,8 +112,8 @@ PIXEL_BUGS = {
     ),
     "a term is left out": (
         "_issue",
-        "left.eq(Mux(ends_channel, used, rest))",
-        "left.eq(Mux(ends_channel, used, 0))",
+        "remain = Mux(ends_channel, used, rest)",
+        "remain = Mux(ends_channel, used, 0)",
     ),
     "a sum goes on": ("elaborate", "Mux(multiplied.first, ", "Mux(multiplied.first & ~valid, "),
 }

@@ -188,7 +188,7 @@ PIPELINES = {
     "lit": (LIT, "throughput", 6, 14),
     "gated": (GATED, "throughput", 10, 20),
     "compact": (TWO_LIGHTS, "compact", 8, 16),
-    "compact-gated": (GATED, "compact", 12, 24),
+    "compact-gated": (GATED, "compact", 13, 24),
 }
 
 
