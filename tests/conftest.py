@@ -1,34 +1,65 @@
-"""What all tests share: what one worker runs, interrupts, the cache of compiled models, pairs of normals."""
+"""What all tests share: the order of their groups, interrupts, compiled models, pairs of normals."""
 
 import re
 import signal
 import threading
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
+BY_UNIT = ("tests/test_units.py", "tests/bench/tools/test_pages.py")
+"""Files whose tests of a unit are a group."""
+
+
+def group_of(nodeid):
+    """Tests that one worker runs, as they share what they make: those of a file, or of a unit."""
+    group, _, test = nodeid.partition("::")
+    return group + re.sub(r"^\w+(\[\w+)?.*", r"\1", test) if group in BY_UNIT else group
+
 
 class Groups(LoadScopeScheduling):
-    """What one worker runs: the tests of a file, or of the tests of every unit those of a unit.
-
-    A worker compiles a unit once.
-    """
+    """Whole groups to each worker."""
 
     def _split_scope(self, nodeid):
-        group, _, test = nodeid.partition("::")
-        return group + re.sub(r"^\w+(\[\w+)?.*", r"\1", test) if group == "tests/test_units.py" else group
+        return group_of(nodeid)
+
+
+class Durations:
+    """Seconds that each test took when it ran last, kept in pytest's cache."""
+
+    KEY, UNKNOWN = "blysk/durations", 1.0
+
+    def __init__(self, cache):
+        self.cache, self.last, self.found = cache, cache.get(self.KEY, {}), {}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection_modifyitems(self, items):
+        """The longest groups first: at the end no worker waits for another. Without figures, the largest."""
+        seconds = Counter()
+        for item in items:
+            seconds[group_of(item.nodeid)] += self.last.get(item.nodeid, self.UNKNOWN)
+        order = {group: place for place, (group, _) in enumerate(seconds.most_common())}
+        items.sort(key=lambda item: order[group_of(item.nodeid)])
+
+    def pytest_runtest_logreport(self, report):
+        self.found[report.nodeid] = round(self.found.get(report.nodeid, 0) + report.duration, 2)
+
+    def pytest_sessionfinish(self, session):
+        if not hasattr(session.config, "workerinput"):
+            self.cache.set(self.KEY, self.last | self.found)
+
+
+def pytest_configure(config):
+    if hasattr(config, "cache"):
+        config.pluginmanager.register(Durations(config.cache))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     return Groups(config, log)
-
-
-def pytest_collection_modifyitems(items):
-    """The tests of every unit first: the longest tests do not come last."""
-    items.sort(key=lambda item: not item.nodeid.startswith("tests/test_units.py"))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -46,9 +77,8 @@ def model_cache(tmp_path_factory, worker_id, pytestconfig):
         shared = shared.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BLYSK_CACHE", str(Path(shared) / "models"))
-        if "not long" in pytestconfig.option.markexpr:
-            # Of few cycles the compiler takes most of the time.
-            patch.setenv("CXXFLAGS", "-O0")
+        # Of few cycles the compiler takes most of the time; with -O1 a model runs as fast as with -O2.
+        patch.setenv("CXXFLAGS", "-O0" if "not long" in pytestconfig.option.markexpr else "-O1")
         yield
 
 

@@ -17,6 +17,8 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
+from ...lists import KINDS
+
 STRESS = str(Path(__file__).parents[2] / "data" / "teapot992.obj")
 ONE = {"methods": ["chord"], "models": ["cosquad"], "width": 48, "height": 36}
 
@@ -113,6 +115,8 @@ def test_what_the_documents_print_runs_as_hardware_too(method):
 
 @pytest.mark.long
 @pytest.mark.parametrize("method", METHODS)
-def test_every_pixel_of_every_pair_is_that_of_the_model(method, capsys):
-    assert main(["teapot", STRESS, "--methods", method]) == 0
+def test_every_pixel_is_that_of_the_model(method, capsys):
+    """Of every method with a model of each kind and without, of the chord with every model."""
+    models = MODELS if method == "chord" else KINDS
+    assert main(["teapot", STRESS, "--methods", method, "--models", *models, "none"]) == 0
     capsys.readouterr()

@@ -155,8 +155,11 @@ def test_json_equals_the_table(tmp_path):
 
 
 @pytest.mark.long
-def test_json_equals_the_table_of_all(tmp_path):
-    check_stated(check_json_equals_the_table(ENTRIES, tmp_path), STATED | WHOLE)
+def test_json_equals_the_table_of_all_that_is_stated(tmp_path):
+    """And of the longest names. Parts of every entry are a baseline, errors are measured below."""
+    entries = [entry for entry in ENTRIES if (entry.record.name, entry.name) in STATED | WHOLE]
+    entries += sorted((e for e in ENTRIES if e not in entries), key=lambda entry: len(entry.title))[-3:]
+    check_stated(check_json_equals_the_table(entries, tmp_path), STATED | WHOLE)
 
 
 @pytest.mark.long

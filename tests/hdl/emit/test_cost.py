@@ -1,12 +1,10 @@
-"""Costs: counted right on a component made for it, and as stated for units."""
+"""Costs: counted right on a component made for it; those of units are baselines."""
 
-import pytest
 from amaranth.hdl import Cat, Module, Signal, signed, unsigned
 from amaranth.lib import memory, stream
 from amaranth.lib.wiring import Component, In, Out
 
 from blysk.hdl.emit.cost import Cost, cost_of
-from blysk.sim.units.registry import RECORDS
 
 
 class Sample(Component):
@@ -48,13 +46,3 @@ def test_counts():
     # Three multipliers, two memories, the register, the sum of bits, and the enable of the write port.
     assert cost == Cost(8, {(16, 7): 2}, 1, 16, rom_bits=32, ram_bits=8)
     assert cost.multiplier_count == 2
-
-
-@pytest.mark.parametrize(
-    "name", ["dot_product", *(pytest.param(name, marks=pytest.mark.long) for name in RECORDS)]
-)
-def test_operands_of_multipliers(name):
-    """Of 18 bits at most; how many there are is a baseline."""
-    record = RECORDS[name]
-    cost = cost_of(record.variants[record.default].unit())
-    assert all(width <= 18 for width, _ in cost.multipliers)
