@@ -35,7 +35,7 @@ class Durations:
     def __init__(self, cache):
         self.cache, self.last, self.found = cache, cache.get(self.KEY, {}), {}
 
-    @pytest.hookimpl(tryfirst=True)
+    @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items):
         """The longest groups first: at the end no worker waits for another. Without figures, the largest."""
         seconds = Counter()
