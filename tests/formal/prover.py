@@ -39,7 +39,7 @@ aigmap
 write_aiger -zinit -symbols top.aig
 """
 
-_SECONDS = 150
+_SECONDS = 600
 """After which a proof is given up."""
 
 

@@ -75,11 +75,13 @@ def stubs(monkeypatch):
 
     def pipeline(parameters, style="throughput"):
         interval = 2 if style == "compact" else 1
+        # Longer than that of a dark beat, so that the lights are not in step.
+        longer = 3 if style == "compact" else 1
         units = (
             (blysk.hdl.pipeline, DiffuseUnit, diffuse, 1, 1),
             # A light unit builds it for the latency of its specular unit.
             (blysk.hdl.lighting.light, DiffuseUnit, diffuse, 2, 1),
-            (blysk.hdl.lighting.light, SpecularUnit, specular, 2, interval),
+            (blysk.hdl.lighting.light, SpecularUnit, specular, 2, longer),
             (blysk.hdl.pipeline, IntensityUnit, colors, interval, interval),
             (blysk.hdl.pipeline, HighlightGateUnit, decisions, 2, 2),
         )
@@ -160,6 +162,8 @@ def of_waiting_spans(unit, late):
     h.claim(~(unit.write.valid & taken(unit.i)))
     if parameters.lights:
         h.claim(taken(unit._interpolator.i) == (taken(unit.i) & (span.length != 0)))
+    for light in unit._lights[1:]:
+        h.claim(taken(light.i) == taken(unit._lights[0].i))
     return h
 
 
