@@ -18,9 +18,10 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed-test lint
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder
 
-# What `make test` leaves out: other structures of the units, costs, sweeps, proofs, browsers.
+# What `make test` leaves out: other structures of the units, costs, sweeps, proofs, browsers. With MINUTES
+# those that start within them, others every day.
 test-long: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m "long or prove"
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m "long or prove" $(MINUTES:%=--minutes %)
 
 test-all:
 	$(MAKE) test

@@ -1,9 +1,13 @@
-"""What all tests share: the order of their groups, interrupts, compiled models, pairs of normals."""
+"""What all tests share: the order of their groups, a limit of time, interrupts, compiled models, normals."""
 
+import os
 import re
 import signal
 import threading
+import time
 from collections import Counter
+from datetime import date
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -52,8 +56,39 @@ class Durations:
             self.cache.set(self.KEY, self.last | self.found)
 
 
+class Limit:
+    """Skips tests that would start late; the order of groups is another every day, so that all get a turn."""
+
+    DAY = "BLYSK_TEST_DAY"
+
+    def __init__(self, minutes):
+        self.minutes, self.end = minutes, time.monotonic() + 60 * minutes
+        # Workers have that of the process that starts them.
+        self.day = os.environ.setdefault(self.DAY, date.today().isoformat())
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items):
+        items.sort(key=lambda item: sha256(f"{self.day} {group_of(item.nodeid)}".encode()).digest())
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self, item):
+        if time.monotonic() > self.end:
+            pytest.skip(f"not started within {self.minutes:g} minutes")
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--minutes",
+        type=float,
+        metavar="NUMBER",
+        help="start no test after so many minutes; those left out are skipped, and are others every day",
+    )
+
+
 def pytest_configure(config):
-    if hasattr(config, "cache"):
+    if config.option.minutes is not None:
+        config.pluginmanager.register(Limit(config.option.minutes))
+    elif hasattr(config, "cache"):
         config.pluginmanager.register(Durations(config.cache))
 
 

@@ -186,6 +186,8 @@ class Place:
         Number of cells of each kind on it.
     closed : int
         Multipliers with registers inside on both sides; nextpnr does not time the path between these.
+    rerouted : bool
+        Whether the target was out of reach, so that slow paths were not routed again and again.
     """
 
     seed: int
@@ -196,6 +198,7 @@ class Place:
     routing: float
     kinds: dict[str, int]
     closed: int = 0
+    rerouted: bool = False
 
 
 def signal_name(cell: str, family: Family) -> str:

@@ -44,6 +44,7 @@ from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = [
     "command",
+    "rerouted",
     "table",
     "untimed",
 ]
@@ -84,6 +85,16 @@ def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
             yield (
                 f"{layout.name}: {closed} have registers inside on both sides, between which the tool does "
                 f"not time; no clock rate above {family.limit:g} MHz is quoted"
+            )
+
+
+def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
+    """A line for each design that is so far from the target that nextpnr did not route slow paths again."""
+    for layout in layouts:
+        if seeds := [str(place.seed) for place in layout.places if place.rerouted]:
+            yield (
+                f"{layout.name}: from seed {', '.join(seeds)} the target was out of reach, "
+                "and slow paths were not routed again"
             )
 
 
@@ -207,7 +218,7 @@ def command(
             },
         )
     click.echo(table(layouts, family))
-    for line in untimed(layouts, family):
+    for line in (*untimed(layouts, family), *rerouted(layouts)):
         click.echo(line)
     for name, reason in too_large.items():
         click.echo(f"{name}: {reason}")

@@ -8,7 +8,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -402,9 +402,11 @@ def _run(
                 files = ["--json", f"{MOUNT}/top.json", "--report", f"{MOUNT}/{path.name}"]
                 arguments = [*options, *files, "--seed", str(seed)]
                 try:
+                    rerouted = False
                     try:
                         runner.run("nextpnr", nextpnr, arguments, folder, given_up=_stuck)
                     except GivenUp:
+                        rerouted = True
                         arguments.remove(_RIPUP)
                         runner.run("nextpnr", nextpnr, arguments, folder)
                 except ToolError as error:
@@ -412,10 +414,8 @@ def _run(
                         raise TooLarge(f"does not fit: from seed {seed} {error}") from None
                     raise
                 report = json.loads(path.read_text(encoding="utf-8"))
-                return seed, (
-                    parts_of(mapped, report, family),
-                    read_report(report, seed, family, absorbed.closed),
-                )
+                place = read_report(report, seed, family, absorbed.closed)
+                return seed, (parts_of(mapped, report, family), replace(place, rerouted=rerouted))
 
             waiting = [pool.submit(route, seed) for seed in seeds]
             for done in as_completed(waiting):

@@ -255,7 +255,10 @@ def test_a_router_that_does_not_end_is_asked_for_less(slack, is_stuck, calls, ca
 
     monkeypatch.setattr(place_and_route.ToolRunner, "run", talks)
     monkeypatch.setattr(place_and_route, "_MANY", 0)
-    assert lay_out("counter", Counter(), 1).fmax == (101, 101, 101)
+    layout = lay_out("counter", Counter(), 1)
+    assert layout.fmax == (101, 101, 101)
+    assert layout.places[0].rerouted == is_stuck
+    assert lay_out("counter", Counter(), 1) == layout
     assert given == [False, True, False][: 2 + is_stuck]
 
 
