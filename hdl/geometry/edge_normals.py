@@ -47,7 +47,7 @@ class EdgeNormalsUnit(wiring.Component):
     o : :py:`Out(stream.Signature(true_spans_shape()))`
         The same with unit normals.
     status : :py:`Out(counters_shape("repaired"))`
-        Normals that took the place of lost ones, since the reset.
+        Normals that took the place of lost ones, since the reset; each is counted on the cycle after it.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
@@ -82,7 +82,9 @@ class EdgeNormalsUnit(wiring.Component):
         self._send(m, normaliser, rest)
         collect = self._collect_in_place if self.compact else self._collect
         repaired = collect(m, normaliser, data.View(rest_shape, rest.r_data), rest)
-        count_events(m, self.status, repaired=repaired)
+        counted = Signal(name="counted")
+        m.d.sync += counted.eq(repaired)
+        count_events(m, self.status, repaired=counted)
         return m
 
     def _send(self, m: Module, normaliser, rest) -> None:

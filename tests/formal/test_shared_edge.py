@@ -67,6 +67,9 @@ def of_neighbours(covers):
     for name in OF_AN_EDGE:
         harness.assume(left[name][LONG] == right[name][UPPER])
     rows = left.upper + left.lower
+    # As the edge setup tells it: the upper edge has no scanlines.
+    for triangle in (left, right):
+        harness.assume(triangle.flat == (triangle.upper == 0))
     harness.assume((left.first == right.first) & (rows == right.upper) & (rows != 0) & (rows <= ROWS))
     harness.assume((right.lower <= 1) & left.right & right.right)
     sample = harness.free(unit.left.begin.shape(), "sample")

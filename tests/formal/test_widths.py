@@ -153,6 +153,8 @@ def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
 CUTS = {
     "blysk.hdl.core.reciprocal.reciprocal_words": "the leading one of m - 1; m is 1 or more",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._prepare_segment": "2^levels - 1",
+    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._bisect": "an address, 2^depth at most",
+    "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._end_segment": "the same",
     "blysk.hdl.normals.renormaliser.RenormaliserUnit._scaled": "copies of the sign, above the leading one",
     "blysk.hdl.normals.renormaliser.RenormaliserUnit.datapath": "the leading one of the octave",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._reciprocal": "as of m - 1 above",
