@@ -83,6 +83,9 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
 _ALIKE_LSB, _ALIKE_TIMES = 0.15, 1.05
 """Difference of errors, in LSB, and ratio of times, up to which two designs count as equal."""
 
+_LEAST_LSB = 1e-2
+"""Smallest error that is drawn."""
+
 
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
     """Sentences on the front of the largest total error over all scenes against cycles a pixel."""
@@ -186,7 +189,7 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
             panel.errorbar(
                 *(x[1], high),
                 xerr=[[x[1] - x[0]], [x[2] - x[1]]],
-                yerr=[[high - max(low, 1e-2)], [0]],
+                yerr=[[high - max(low, _LEAST_LSB)], [0]],
                 color=style.color,
                 marker=style.marker,
                 markersize=5.5,
@@ -200,6 +203,8 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
             xs = [corners[0][0], *(x for x, _ in corners), max(of[key][1] for of in drawn)]
             ys = [max(of[kind][1] for of in drawn), *(y for _, y in corners), corners[-1][1]]
             panel.step(xs, ys, where="post", color="#1c2126", linewidth=1.2, zorder=0)
+        # Room for labels below the most exact ones.
+        panel.set_ylim(bottom=min(of[kind][1] for of in drawn) / 4)
         _ticks(panel, in_ns)
     axes[0].set_ylabel("largest error over all scenes, LSB of 8 bits")
     for panel, (kind, _) in zip(axes, kinds, strict=True):
@@ -215,7 +220,7 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
             )
             for of in _named(drawn, on, kind)
         ]
-        place_labels(panel, labels, [(of[key][1], of[kind][1]) for of in drawn])
+        place_labels(panel, labels, [point for of in drawn for point in _on_bars(of[key], of[kind])])
     scenes = max(of["samples"] for of in drawn)
     note = (
         f"A point is a design: its largest error and its median run time over up to {scenes} scenes "
@@ -241,6 +246,14 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
     return Drawing(
         "front", f"Error against {'nanoseconds' if in_ns else 'cycles'} a pixel", svg(figure), note
     )
+
+
+def _on_bars(x: Sequence[float], error: Sequence[float]) -> list[tuple[float, float]]:
+    """Points on the bars of a design, which a label must not cover."""
+    low, high = max(error[0], _LEAST_LSB), error[1]
+    return [(at, high) for at in np.geomspace(x[0], x[2], 12)] + [
+        (x[1], at) for at in np.geomspace(low, high, 24)
+    ]
 
 
 def _ticks(panel: Any, in_ns: bool) -> None:
