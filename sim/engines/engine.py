@@ -150,8 +150,8 @@ class Trace:
 
     Parameters
     ----------
-    end : End
-        Why it stopped.
+    end : StopReason
+        Why the engine stopped.
     clock : int
         Clock at which it stopped.
     total_cycles : int

@@ -58,7 +58,13 @@ class Model:
         self.vcd = vcd
 
     def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None = None) -> Trace:
-        """Drive a stimulus from power-up; see `engine.Model`."""
+        """Drive a stimulus from power-up; see `engine.Model`.
+
+        Raises
+        ------
+        ValueError
+            If the component has nothing in the clock domain ``sync``.
+        """
         result: list[Trace] = []
 
         async def bench(ctx):

@@ -37,7 +37,7 @@ def build(component: Component) -> bytes:
     Parameters
     ----------
     component : Component
-        As for `simulate`; has a status, and no constants but those that are written.
+        As for `simulate`; with a stream ``write`` and a status, and without ``constants``.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def build(component: Component) -> bytes:
     SimulationError
         If Yosys cannot translate the component, or the compiler refuses the result.
     ValueError
-        As `Model` raises it; or if the component has constants or lacks a status.
+        As `Model` raises it; or if the component has constants, or lacks the stream ``write`` or a status.
     """
     ports = Ports(component)
     if ports.constants is not None or ports.status is None or ports.write is None:
