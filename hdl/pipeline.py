@@ -107,11 +107,11 @@ class ShadingPipelineUnit(wiring.Component):
     FIFO carries the coordinates of the spans past both. `Design` is the bit-accurate model.
 
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
-    each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles; up to two prepared
-    spans wait before the accumulator, so that short spans after a long one may take fewer, but at least
-    ``cycles_per_pixel length``. (With ``chord`` the bound holds for the sum over a run of spans, plus one
-    ``setup_interval``; ``bisection`` takes longer for spans of several segments.) A span of length 0 is
-    accepted like any other and gives no pixel.
+    each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles, and in the
+    throughput style at least ``cycles_per_pixel length``: the fewest if it is short and follows a long one,
+    as up to two prepared spans wait before the accumulator. (With ``chord`` the upper bound is that of a run
+    of spans, and one ``setup_interval`` more; ``bisection`` takes longer where it has several segments.) A
+    span of length 0 is accepted like any other and gives no pixel.
 
     With a gate a highlight gate processes each span in parallel with the interpolator, and decides for each
     light whether the span has no highlight: then the specular unit of the light keeps its state, or in the
