@@ -19,7 +19,7 @@ test: $(VENV)/.installed-test lint
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder
 
 # What `make test` leaves out: other structures of the units, costs, sweeps, proofs, browsers. With MINUTES
-# those that start within them, others every day.
+# those tests, or proofs, that start within them, others every day.
 test-long: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m "long or prove" $(MINUTES:%=--minutes %)
 
@@ -28,7 +28,7 @@ test-all:
 	$(MAKE) test-long
 
 prove: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) -m prove tests/formal
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m prove tests/formal $(MINUTES:%=--minutes %)
 
 mutants: $(VENV)/.installed-test
 	$(BIN)/python -m blysk.bench.quality.mutants

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
-BY_UNIT = ("tests/test_units.py", "tests/bench/tools/test_pages.py")
+BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/tools/test_pages.py")
 """Files whose tests of a unit are a group."""
 
 
