@@ -262,17 +262,30 @@ class _Pace:
         with m.If(self.steps):
             m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(self.accepts)]
 
+    def late(self, m: Module, value: ValueLike, name: str) -> Value:
+        """A value of the step before; not *serial*: the value."""
+        if not self.serial:
+            return Value.cast(value)
+        register = Signal(len(Value.cast(value)), name=name)
+        with m.If(self.steps):
+            m.d.sync += register.eq(value)
+        return register
+
 
 class _Kept:
-    """A word of an attribute; *serial* of all of them, in a ring that turns with every step."""
+    """A word of an attribute; *serial* of all of them, in a ring that turns with every step.
 
-    def __init__(self, m: Module, name: str, pace: _Pace):
+    Of a *late* word what it becomes is chosen a step later, from `_Pace.late`, on its way round the ring.
+    """
+
+    def __init__(self, m: Module, name: str, pace: _Pace, late: bool = False):
         self.value = self._next = Signal(_BITS, name=name)
         self._domain = "sync"
         if pace.serial:
             self._next, self._domain = Signal(_BITS, name=f"{name}_next"), "comb"
-            m.d.comb += self._next.eq(self.value)
-            ring = [self.value, *(Signal(_BITS, name=f"{name}_{k}") for k in range(1, ATTRIBUTES))]
+            stays = pace.late(m, self.value, f"{name}_stays") if late else self.value
+            m.d.comb += self._next.eq(stays)
+            ring = [self.value, *(Signal(_BITS, name=f"{name}_{k}") for k in range(1, ATTRIBUTES - late))]
             with m.If(pace.steps):
                 m.d.sync += [
                     word.eq(other) for word, other in zip(ring, [*ring[1:], self._next], strict=True)
@@ -372,22 +385,31 @@ class _Along:
 
     def values(self, m: Module, name: str, loads, base, inward, kept) -> tuple[Value, Value]:
         """Values of an attribute at the piece's ends; ``inward`` is its step, once loaded ``kept``."""
-        nears, totals, steps = (_Kept(m, f"{name}_{word}", self.pace) for word in ("near", "total", "step"))
+        # Behind a register, as the sums are as long as a cycle.
+        nears, totals = (_Kept(m, f"{name}_{word}", self.pace, late=True) for word in ("near", "total"))
+        steps = _Kept(m, f"{name}_step", self.pace)
         near, total, step = nears.value, totals.value, steps.value
         far = (total + sum(Mux(bit, step << k, 0) for k, bit in enumerate(self.digit)))[:_BITS]
         whole = Mux(self.single, step, Mux(self.double, step << 2, step << 1))
         following = (near + whole)[:_BITS]
         with m.If(loads):
-            for word, value in ((nears, base), (totals, base), (steps, inward)):
-                word.becomes(m, value)
+            steps.becomes(m, inward)
         with m.Elif(self.moves):
-            with m.If(~self.ends):
-                totals.becomes(m, far)
-                steps.becomes(m, step << len(self.digit))
+            steps.becomes(m, Mux(self.ends, kept, step << len(self.digit)))
+        given = (loads, self.moves, self.ends, self.skipping, base, far, following)
+        names = ("loads", "moves", "ends", "skipping", "base", "far", "following")
+        loaded, moved, ended, skipped, base, end, following = (
+            self.pace.late(m, value, f"{name}_late_{word}") for word, value in zip(names, given, strict=True)
+        )
+        with m.If(loaded):
+            for word in (nears, totals):
+                word.becomes(m, base)
+        with m.Elif(moved):
+            with m.If(~ended):
+                totals.becomes(m, end)
             with m.Else():
-                begin = Mux(self.skipping, far, following)
-                for word, value in ((nears, begin), (totals, begin), (steps, kept)):
-                    word.becomes(m, value)
+                for word in (nears, totals):
+                    word.becomes(m, Mux(skipped, end, following))
         return near, far
 
 

@@ -159,8 +159,11 @@ class VertexSortUnit(wiring.Component):
         for name, first, end in (("x", frame.left, frame.right), ("y", frame.top, frame.bottom)):
             low, high = (Signal(signed(X_BITS), name=f"{end}_{name}") for end in ("low", "high"))
             a, b, c = (first_centre(corner[name], self.grid) for corner in corners)
+            # Of the corners, not of the centres, so that the comparison does not wait for their sums.
+            first_code, second_code = (Value.cast(corner[name]).as_signed() for corner in corners[:2])
+            in_order = first_code < second_code
             with m.If(step == 1):
-                m.d.sync += [low.eq(Mux(a < b, a, b)), high.eq(Mux(a < b, b, a))]
+                m.d.sync += [low.eq(Mux(in_order, a, b)), high.eq(Mux(in_order, b, a))]
             # Exchanges begin on the second cycle.
             third = Signal.like(c, name=f"third_{name}")
             m.d.sync += third.eq(c)
