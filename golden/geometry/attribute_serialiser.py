@@ -13,11 +13,12 @@ __all__ = ["AttributeSerialiser"]
 class AttributeSerialiser:
     """The components of N/W and the depth of sorted triangles, one after the other, and `least`.
 
-    ``least`` bounds the length m of N/W in the triangle from below: ``m >= max(9/16 M, L)``. Of the corners'
-    components, each with the sign that it has at the first corner and cut to 11 fraction bits, M is the
-    least sum of a corner's, and L the largest over the components of the least of a component; 0 where that
-    is negative. A vector is at least as long as its largest component, and as ``1/sqrt(3)`` of their sum,
-    which is over 9/16; both hold for any mean of the corners as they do for the corners.
+    ``least`` is a lower bound of the length m of N/W in the triangle: ``m >= max(9/16 M, L, 0)``. Components
+    are cut to 11 fraction bits, and the bits of one that is negative at the first corner are inverted at all
+    three. M is the smallest of the corners' sums of components. For L the smallest value at the corners is
+    taken of each component, and L is the largest of these three. A vector is at least as long as its largest
+    component, and as ``1/sqrt(3) > 9/16`` of the sum of its components. Every N/W in the triangle is a
+    weighted mean of the corners' N/W, so that the bound holds there too.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -26,19 +27,35 @@ class AttributeSerialiser:
     BITS = 12
 
     def least(self, triangles: Triangles) -> np.ndarray:
-        """Bound on m of sorted triangles, in 2^-11, 0 to 3456; from the components' first 12 bits."""
+        """Lower bound of m in sorted triangles, from the components' first 12 bits.
+
+        Parameters
+        ----------
+        triangles : Triangles
+            With sorted corners.
+
+        Returns
+        -------
+        int64 array, shape (T,)
+            In 2^-11, 0 to 3454.
+        """
         cut = triangles.normal >> (ATTRIBUTE.fraction_bits - self.FRACTION_BITS)
         turned = np.where(triangles.normal[:, :1] < 0, ~cut, cut)
         total, single = turned.sum(axis=2).min(axis=1), turned.min(axis=1).max(axis=1)
         return np.maximum(np.maximum((9 * total) >> 4, single), 0)
 
     def compute(self, triangles: Triangles) -> dict[str, np.ndarray]:
-        """Bit-accurate beats, four of each triangle: ``first``, ``middle``, ``last`` and ``least``.
+        """Bit-accurate beats, four of each triangle: components x, y and z of N/W, then the depth.
 
         Parameters
         ----------
         triangles : Triangles
             With sorted corners.
+
+        Returns
+        -------
+        dict of str to int64 array, shape (4 T,)
+            ``first``, ``middle`` and ``last``: the attribute at each corner, SQ(1, 23); ``least``: the bound.
         """
         values = np.moveaxis(triangles.attributes, 1, 0).reshape(3, -1)
         beats = dict(zip(("first", "middle", "last"), values, strict=True))

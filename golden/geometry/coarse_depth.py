@@ -17,38 +17,38 @@ BLOCKS = (4, 8, 16)
 
 @dataclass(frozen=True)
 class CoarseDepth:
-    """A bound of the depths of each block of pixels of a scanline; a span behind it everywhere is hidden.
+    """Bounds of the depths in blocks of pixels; a span behind the bounds of all its blocks is hidden.
 
     A block has a bound b, a candidate c and a mask. No depth that `DepthTest` has stored in the block is
     deeper than b. A span's pixels in the block lie between ``lo`` and ``hi``, as depth is linear: they are
     hidden if ``lo > b``. If ``hi < b``, they are marked in the mask and c becomes the larger of c and ``hi``;
-    once all pixels of the block are marked, c is the new b and the mask is empty. Depths are cut to their
-    upper bits, by which a block may be kept that could be dropped, and never the reverse: of two depths
-    whose upper bits differ the larger is deeper. A block behind its bound changes nothing, so that a span
-    that is dropped leaves no trace.
+    once all pixels of the block are marked, c is the new b and the mask is empty. Depths are compared by
+    their upper bits. A span may therefore be kept that could be dropped, but never the reverse: of two
+    depths whose upper bits differ the larger is deeper. The part of a span that is behind the bound of its
+    block changes nothing in the block's word, so that a dropped span leaves no trace.
 
-    A word has a tag, too, the number of the picture in which it was written, modulo ``2^tag_bits``: of
-    another picture it counts as cleared. So that no tag comes round again, ``swept`` words are cleared with
-    each picture, in turn those that were swept longest ago.
+    A word also has a tag, the number of the picture in which it was written, modulo ``2^tag_bits``. A word
+    with the tag of another picture counts as cleared. With each picture `swept` words are cleared, those
+    first that were cleared longest ago, so that every word is cleared before its tag comes up again.
 
-    Spans go on to shading and to `DepthTest` in the order in which they came, so that what is bounded is
-    stored before a later span is compared. Pictures with and without this test are the same.
+    Spans go on to shading and to `DepthTest` in the order in which they came, so that the depths under a
+    bound are stored before those of a later span are tested. Pictures with and without this test are equal.
 
     Parameters
     ----------
     width, height : int
         Size of the largest picture, 1 to 4096.
     block : int
-        Pixels of a block, one of `BLOCKS`. What of the last block is outside the picture counts as marked.
+        Pixels of a block, one of `BLOCKS`. Pixels of the last block outside the picture count as marked.
     depth_bits : int
         Upper bits of a depth that are kept, 8 to 24.
     tag_bits : int
-        2 to 8.
+        Bits of a tag, 2 to 8.
 
     Raises
     ------
     ValueError
-        If one is out of range.
+        If a parameter is out of range.
 
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
@@ -76,7 +76,7 @@ class CoarseDepth:
 
     @property
     def blocks(self) -> int:
-        """Words of the memory."""
+        """Words of the memory: the blocks of the largest picture."""
         return self.blocks_per_line * self.height
 
     @property
@@ -86,7 +86,7 @@ class CoarseDepth:
 
     @property
     def swept(self) -> int:
-        """Words swept for a picture."""
+        """Words that are cleared with each picture: ``ceil(blocks / (2^tag_bits - 2))``."""
         return -(-self.blocks // ((1 << self.tag_bits) - 2))
 
     def compute(
@@ -98,18 +98,19 @@ class CoarseDepth:
         depth_step: np.ndarray,
         picture: np.ndarray | int = 0,
     ) -> np.ndarray:
-        """Which spans are hidden, bit-accurate.
+        """Bit-accurate decisions: whether each span is hidden for its whole length.
 
         Parameters
         ----------
         x, y, length : int64 arrays, shape (S,)
             First pixel and pixels of each span, inside the picture, 1 pixel or more.
         depth : int64 array, shape (S,)
-            At the first pixel, UQ(24, 9).
+            Depth at the first pixel, UQ(24, 9).
         depth_step : int64 array, shape (S,)
-            From a pixel to the next, SQ(25, 9).
-        picture : int array, shape (S,), optional
-            A picture begins cleared where this is another than that of the span before.
+            Step of the depth from a pixel to the next, SQ(25, 9).
+        picture : int or int array, shape (S,), optional
+            Number of each span's picture. Where it differs from that of the span before, a new picture
+            begins, with all bounds cleared.
 
         Returns
         -------
@@ -132,7 +133,7 @@ class CoarseDepth:
         return np.logical_and.reduceat(behind, first) if len(first) else np.zeros(0, dtype=bool)
 
     def _behind(self, place: np.ndarray, lo: np.ndarray, hi: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """Which parts of spans are behind the bounds of their blocks, in the order in which they come."""
+        """Whether each part of a span is behind the bound of its block; parts in the order of the spans."""
         order = np.argsort(place, kind="stable")
         _, block, count = np.unique(place[order], return_inverse=True, return_counts=True)
         rank = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
@@ -141,7 +142,7 @@ class CoarseDepth:
         full = (1 << self.block) - 1
         behind = np.zeros(len(order), dtype=bool)
         by_rank = np.argsort(rank, kind="stable")
-        # A turn for each span that lies over another in a block; the blocks of a turn are different ones.
+        # Turn r takes part number r of every block, so that the blocks within a turn differ.
         for part in np.split(by_rank, np.cumsum(np.bincount(rank))[:-1] if len(rank) else []):
             at, what = block[part], order[part]
             behind[what] = lo[what] > bound[at]

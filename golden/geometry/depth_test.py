@@ -13,13 +13,13 @@ __all__ = ["DepthTest"]
 
 @dataclass(frozen=True)
 class DepthTest:
-    """``floor(z + k step)`` at pixel k of a span; a pixel is drawn where that is less than what is there.
+    """``floor(z + k step)`` at pixel k of a span; a pixel is drawn if this depth is less than the stored one.
 
-    The sum is exact; it saturates to 0 and `FARTHEST`, one less than what a picture is cleared to, so that no
-    pixel is lost where nothing was drawn. Of equal depths the first stays.
+    The sum is exact. It saturates to 0 and to `FARTHEST`, one less than `CLEARED`, the depth that a picture
+    is cleared to, so that the first pixel at a place is always drawn. Of equal depths the first stays.
 
-    Along a span the rounding of the step, 2^-10 of a depth's step, adds up; with it a pixel's depth is off by
-    at most ``2^23`` times `GradientSetup.error` and 1 for the cut.
+    The step is rounded to nine fraction bits; this error, at most 2^-10, adds up along a span. Together with
+    it the depth of a pixel is off by at most ``2^23`` times `GradientSetup.error`, and 1 for the cut.
 
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
@@ -35,27 +35,36 @@ class DepthTest:
         length : int64 array, shape (S,)
             Pixels of each span, 1 or more.
         depth : int64 array, shape (S,)
-            At the first pixel, UQ(24, 9).
+            Depth at the first pixel, UQ(24, 9).
         step : int64 array, shape (S,)
-            From a pixel to the next, SQ(25, 9).
+            Step of the depth from a pixel to the next, SQ(25, 9).
+
+        Returns
+        -------
+        int64 array, shape (P,)
+            Depths of all pixels, those of a span one after the other.
         """
         span, k = pixels_of(length)
         code = (depth[span] + k * step[span]) >> SPAN_DEPTH.fraction_bits
         return np.clip(code, 0, self.FARTHEST)
 
     def drawn(self, pixel: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Which of the pixels, in the order in which they come, are less deep than all before them there.
+        """Whether each pixel is drawn: its depth is less than those of all earlier pixels at its place.
 
         Parameters
         ----------
         pixel : int64 array, shape (P,)
-            Places in the picture, below 2^38.
+            Index of each pixel's place in the picture, in the order of drawing; below 2^38.
         depth : int64 array, shape (P,)
             From `depths`.
+
+        Returns
+        -------
+        bool array, shape (P,)
         """
         order = np.argsort(pixel, kind="stable")
         place, code = pixel[order], depth[order]
-        # Places get lower and lower numbers, so that the least so far starts anew at each.
+        # Each place has lower values than the one before it, so that the running minimum starts anew there.
         group = np.cumsum(np.r_[False, place[1:] != place[:-1]]) if len(place) else place
         value = code - (group << (DEPTH.width + 1))
         least = np.minimum.accumulate(np.r_[np.int64(1) << 62, value])[:-1]

@@ -15,18 +15,16 @@ __all__ = ["EdgeNormals", "PlacedSpans", "TrueSpans"]
 
 @dataclass(frozen=True)
 class PlacedSpans:
-    """Where spans are on the screen, how deep, and of what: without normals.
+    """Spans with their places, depths, materials and triangles, without normals.
 
     Parameters
     ----------
     x, y, length : int64 arrays, shape (S,)
-        First pixel, and pixels from there on, 1 or more.
-    depth : int64 array, shape (S,)
-        At the first pixel, UQ(24, 9).
-    depth_last : int64 array, shape (S,)
-        At the last pixel.
+        Column and scanline of the first pixel, and number of pixels, 1 or more.
+    depth, depth_last : int64 arrays, shape (S,)
+        Depth at the first and at the last pixel, UQ(24, 9).
     depth_step : int64 array, shape (S,)
-        From a pixel to the next, SQ(25, 9); of a single pixel it means nothing.
+        Step of the depth from a pixel to the next, SQ(25, 9); without meaning in a span of one pixel.
     material : int64 array, shape (S,)
         Index of the material.
     triangle : int64 array, shape (S,)
@@ -47,12 +45,12 @@ class PlacedSpans:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         return {name: value for name, value in vars(self).items() if name != "triangle"}
 
     @classmethod
     def of(cls, pieces: Pieces, **normals: np.ndarray) -> Self:
-        """Spans of pieces, with what this class has besides."""
+        """Spans of this class: places and depths from ``pieces``, its other fields from ``normals``."""
         placed = {name: getattr(pieces, name) for name in ("x", "y", "length", "material", "triangle")}
         depths = {name: getattr(pieces, name).codes for name in ("depth", "depth_last", "depth_step")}
         return cls(**placed, **depths, **normals)
@@ -65,15 +63,15 @@ class TrueSpans(PlacedSpans):
     Parameters
     ----------
     x, y, length, depth, depth_last, depth_step, material, triangle
-        As `PlacedSpans` has them.
+        As in `PlacedSpans`.
     normal_left, normal_middle, normal_right : int64 arrays, shape (S, 3)
-        Unit normals, SQ(1, 17), at the first pixel's centre, half-way to the last, and at the last. Of 1
-        pixel all are the left one, of 2 the middle one is the right one.
+        Unit normals, SQ(1, 17), at the first pixel's centre, half-way to the last one's, and at the last
+        one's. In a span of 1 pixel all three are the left one; in a span of 2 the middle is the right one.
     line_left, line_right : int64 arrays, shape (S, 3)
-        N/W at the first and at the last pixel, `SPAN_NORMAL`: the normals' magnitudes, whose line on the
-        screen is exact in perspective. Where ``flip`` is set they point against the unit normals.
+        N/W at the first and at the last pixel, `SPAN_NORMAL`: the normals with their magnitudes. The straight
+        line between them is perspective-correct. Where ``flip`` is set they point against the unit normals.
     flip : bool array, shape (S,)
-        The unit normals are negated.
+        Whether the unit normals are negated.
     """
 
     normal_left: np.ndarray
@@ -86,15 +84,15 @@ class TrueSpans(PlacedSpans):
 
 @dataclass(frozen=True)
 class EdgeNormals:
-    """Unit normals of pieces by `VectorNormaliser`: left, right, and of 3 pixels and more the middle one.
+    """Unit normals of pieces by `VectorNormaliser`: left, right from 2 pixels on, middle from 3 pixels on.
 
     N/W is linear along a scanline, and normalising takes 1/W away: all three are the perspective-correct
     normals. The middle one is that of ``(left + right) / 2``, cut to 26 fraction bits, at half the way
     between the first and the last pixel's centre.
 
-    A normal that is lost, because opposite normals cancel there or a corner has none, is repaired: it takes
-    the place of the one before it, in the order of the pieces and of left, right, middle. The first of all
-    has (0, 0, 1) before it. Repaired normals are counted.
+    A normal is lost where opposite normals cancel, or where a corner has none. It is repaired: the normal
+    before it takes its place, in the order of the pieces and within a piece of left, right, middle. Before
+    the first of all stands (0, 0, `ONE`), `FIRST`. Repaired normals are counted.
 
     Parameters
     ----------
@@ -122,7 +120,7 @@ class EdgeNormals:
         normals, lost = self.normaliser.compute(Fixed(SPAN_NORMAL, vectors), flip)
         made = pieces.length[:, np.newaxis] > np.arange(3)
         repaired = int((lost & made).sum())
-        # What is not made, or lost, is the last good one before it.
+        # A normal that is lost, or that the piece is too short for, is replaced by the last good one.
         good = np.r_[True, (made & ~lost).ravel()]
         codes = np.vstack([self.FIRST, normals.codes.reshape(-1, 3)])
         codes = codes[np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))][1:].reshape(-1, 3, 3)

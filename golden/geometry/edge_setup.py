@@ -28,13 +28,13 @@ class Edges:
     x : int64 array, shape (T, 3)
         First column whose centre is not left of the edge, on the edge's first scanline.
     error : int64 array, shape (T, 3)
-        What the walk carries on, 0 to ``height - 1``.
+        Remainder that the walk starts with, 0 to ``height - 1``.
     step : int64 array, shape (T, 3)
-        Whole columns from one scanline to the next, modulo 2^13 as x is.
+        Whole columns from one scanline to the next, modulo 2^13 like ``x``.
     error_step : int64 array, shape (T, 3)
-        What is added to ``error`` with each, 0 to ``height - 1``.
+        Remainder of the step, added to ``error`` at each scanline, 0 to ``height - 1``.
     height : int64 array, shape (T, 3)
-        Steps of the grid from an edge's first corner to its last; 1 where it is 0.
+        Height of the edge in steps of the grid; 1 for a horizontal edge.
     first : int64 array, shape (T,)
         First scanline.
     upper, lower : int64 arrays, shape (T,)
@@ -42,9 +42,10 @@ class Edges:
     fraction : int64 array, shape (T,)
         Fraction of the long edge's step, ``floor(2^32 error_step / height)``.
     down : int64 array, shape (T,)
-        Steps of the grid from the first corner down to the first scanline's centre, modulo a pixel.
+        Distance from the first corner down to the centre of the first scanline, modulo a pixel, in 1/256
+        pixel on any grid: 0 to 255.
     along : int64 array, shape (T,)
-        ``256 (x - x0 + 1/2) - down step`` of the long edge at 8 fraction bits: see `GradientSetup`.
+        ``256 (x - x0 + 1/2) - down step`` of the long edge, x and x0 in pixels: see `GradientSetup`.
     """
 
     x: np.ndarray
@@ -64,12 +65,12 @@ class Edges:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         return vars(self) | {"flat": self.upper == 0}
 
 
 def wrap(codes: np.ndarray, bits: int) -> np.ndarray:
-    """Two's complement of so many bits with the same low bits."""
+    """Codes wrapped to a signed word of ``bits`` bits: two's complement, modulo ``2^bits``."""
     half = 1 << (bits - 1)
     return ((codes + half) & ((1 << bits) - 1)) - half
 
@@ -84,8 +85,8 @@ class EdgeSetup:
 
         x = ceil((X - h) / P) = ceil(((x0 - h) d + (x1 - x0) k) / (P d))
 
-    As k grows by P a scanline, the numerator grows by ``P (x1 - x0)``, and P may be left out of it and of the
-    divisor once the numerator over P is rounded up. So the walk is
+    From a scanline to the next k grows by P, and the numerator by ``P (x1 - x0)``. As ``x`` is also
+    ``ceil(ceil(numerator / P) / d)``, the factor P drops out, and the walk is
     ``x += step; error += error_step; if error >= d: x += 1; error -= d`` with
     ``step, error_step = divmod(x1 - x0, d)``, exactly.
 
@@ -98,7 +99,7 @@ class EdgeSetup:
     the span at a right one. So a sample on an edge that two triangles share belongs to the right one only,
     and no sample between them is missed.
 
-    Words of an edge without scanlines mean nothing, but are what the hardware gives: x wraps.
+    The words of an edge without scanlines have no meaning; they are those of the hardware, where x wraps.
 
     Parameters
     ----------

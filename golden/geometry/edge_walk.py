@@ -13,7 +13,7 @@ __all__ = ["EdgeWalk", "Rows"]
 
 @dataclass(frozen=True)
 class Rows:
-    """Scanlines of triangles, of each from its first down to its last or the picture's.
+    """Scanlines of triangles: from the first of each down to its last, or to the last of the picture.
 
     Parameters
     ----------
@@ -22,14 +22,15 @@ class Rows:
     y : int64 array, shape (R,)
         Scanline.
     begin, end : int64 arrays, shape (R,)
-        First column, and the first after the last; no column is covered where ``end <= begin``.
+        First covered column, and first column after the last; none is covered where ``end <= begin``.
     carry : bool array, shape (R,)
-        From here to the next scanline the long edge takes a column more than its whole step.
+        From this scanline to the next the long edge moves by one column more than its whole step.
     last : bool array, shape (R,)
         The triangle has no further scanline.
     right, flip : bool arrays, shape (R,)
+        Of the triangle, as in `SortedTriangles`.
     material : int64 array, shape (R,)
-        Of the triangle, as they came.
+        Index of the triangle's material.
     """
 
     triangle: np.ndarray
@@ -47,19 +48,19 @@ class Rows:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         return {name: value for name, value in vars(self).items() if name != "triangle"}
 
 
 @dataclass(frozen=True)
 class EdgeWalk:
-    """Walks the long edge of a triangle and, beside it, first the upper, then the lower one.
+    """Walks the long edge of a triangle, and beside it first the upper edge, then the lower one.
 
     On a scanline between its first and its last corner a triangle, a convex figure, reaches from the long
     edge to the short one that crosses the scanline. The third edge lies above or below it. So the larger of
-    the left bounds and the smaller of the right ones, of all edges, are those of these two. A scanline
-    belongs to an edge from y0 on and before y1, which is the top-left rule for the corners and for
-    horizontal edges.
+    the left bounds and the smaller of the right ones, of all edges, are those of these two. An edge from y0
+    to y1 has the scanlines whose centres are at y0 or below it, and above y1: this is the top-left rule for
+    corners and for horizontal edges.
 
     Columns follow ``x += step; error += error_step; if error >= height: x += 1; error -= height``, of which
     this model has the closed form.
@@ -75,14 +76,14 @@ class EdgeWalk:
         edges : Edges
             From `EdgeSetup`.
         triangles : SortedTriangles
-            Theirs.
+            The triangles of the edges.
         frame : Frame
             The picture: scanlines below it are not walked.
 
         Returns
         -------
         Rows
-            In the order of the triangles, then of y. A triangle has at least one.
+            In the order of the triangles, then of y. Every triangle has at least one scanline.
         """
         total = np.minimum(edges.upper + edges.lower, frame.bottom - edges.first)
         total = np.maximum(total, 1)
@@ -109,7 +110,7 @@ class EdgeWalk:
 def _walk(
     edges: Edges, triangle: np.ndarray, edge: int | np.ndarray, row: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Column of an edge after so many scanlines, and whether the next step carries."""
+    """Column of an edge ``row`` scanlines below its first one, and whether the next step carries."""
     x, error, step, error_step, height = (
         getattr(edges, name)[triangle, edge] for name in ("x", "error", "step", "error_step", "height")
     )

@@ -21,19 +21,20 @@ from blysk.golden.number.fixed import Fixed
 __all__ = ["COUNTERS", "Geometry"]
 
 COUNTERS = ("empty", "zero_area", "culled", "sliver", "cut", "repaired")
-"""What is counted: triangles without a span, without area, culled, slivers; spans cut; normals repaired."""
+"""Counters: triangles without a span, without area, culled, slivers; spans cut; normals repaired."""
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """The bit-accurate models of the units in a row: `VertexSort` to `EdgeNormals`.
+    """The bit-accurate models in a row, from `VertexSort` to `EdgeNormals` or `LineAdapter`.
 
     Parameters
     ----------
     grid : Grid
         Fraction bits of the coordinates.
     lines : bool
-        Spans keep the true line N/W in place of unit normals: none is cut, and none normalised.
+        Whether spans have their true line, N/W at both ends, in place of unit normals; then no span is cut
+        into pieces, and no normal is normalised.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -44,7 +45,7 @@ class Geometry:
     def rows(
         self, triangles: Triangles, frame: Frame
     ) -> tuple[SortedTriangles, ClippedRows, np.ndarray, dict[str, int]]:
-        """Coverage alone: sorted triangles, their scanlines, the triangle of each, and the counts so far."""
+        """Coverage alone: sorted triangles, their clipped scanlines, the triangle of each, counts so far."""
         drawn, counts = VertexSort(self.grid).compute(triangles, frame)
         edges = EdgeSetup(self.grid).compute(drawn)
         rows = EdgeWalk().compute(edges, drawn, frame)
@@ -52,7 +53,7 @@ class Geometry:
         return drawn, clipped, rows.triangle, counts
 
     def planes(self, drawn: SortedTriangles, frame: Frame) -> tuple[Planes, int]:
-        """Gradients of sorted triangles, and how many are slivers."""
+        """Planes of sorted triangles, and the number of slivers among them."""
         scales = PlaneSetup(self.grid).compute(drawn, EdgeSetup(self.grid).compute(drawn))
         corners = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
         gradients = GradientSetup().compute(*corners, scales)
@@ -62,22 +63,27 @@ class Geometry:
         return planes, int(scales.sliver.sum())
 
     def compute(self, triangles: Triangles, frame: Frame) -> tuple[TrueSpans | LineSpans, dict[str, int]]:
-        """Bit-accurate spans, and what was counted.
+        """Bit-accurate spans, and the counters.
 
         Parameters
         ----------
         triangles : Triangles
             In the order of drawing.
         frame : Frame
-            The picture, back faces, and the limit of a span's width.
+            The picture, the treatment of back faces, and the largest chord of a span.
 
         Returns
         -------
-        spans : TrueSpans, or of lines LineSpans
-            In the order of the triangles, of one from top to bottom, of a scanline from the long edge on;
-            their ``triangle`` is the index among those that came.
+        spans : TrueSpans, or with ``lines`` LineSpans
+            In the order of the triangles, within a triangle from top to bottom, within a scanline from the
+            long edge on. Their ``triangle`` is the index in ``triangles``.
         counts : dict of str to int
             `COUNTERS`.
+
+        Raises
+        ------
+        ValueError
+            If a coordinate is out of the grid's range.
         """
         drawn, rows, _, counts = self.rows(triangles, frame)
         planes, sliver = self.planes(drawn, frame)

@@ -15,19 +15,19 @@ __all__ = ["GradientSetup", "Gradients"]
 
 @dataclass(frozen=True)
 class Gradients:
-    """How attributes change over triangles, any shape; all modulo 4.
+    """Start values and steps of attributes over triangles, arrays of any shape; words are modulo 4.
 
     Parameters
     ----------
     start : Fixed, SQ(2, 28)
         Value at the centre of the pixel at the long edge, on the first scanline.
     short, long : Fixed, SQ(2, 32)
-        What is added to go down a scanline, without the long edge's carry and with it.
+        Steps from a scanline to the next, without the long edge's carry and with it.
     inward : Fixed, SQ(2, 32)
-        What is added to go a pixel away from the long edge.
+        Step from a pixel to the next one away from the long edge.
     size : int64 array
-        At least the size of `inward` before it is taken modulo 4, in 2^-20; at most ``2^20 - 1``, for all
-        that is over.
+        Upper bound of ``|inward|`` before it is taken modulo 4, in 2^-20, 1 to ``2^20 - 1``; the largest
+        stands for all larger ones.
     """
 
     start: Fixed
@@ -38,7 +38,7 @@ class Gradients:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         return {
             name: value.codes if isinstance(value, Fixed) else value for name, value in vars(self).items()
         }
@@ -48,8 +48,8 @@ class Gradients:
 class GradientSetup:
     """The plane of an attribute v in the form that the walk along the long edge needs.
 
-    With the corners' values v0, v1, v2 from the top, ``r`` the step of v along the long edge per scanline and
-    ``g`` the step per pixel away from that edge, both without a difference of large numbers:
+    The corners' values are v0, v1, v2 from the top. ``r`` is the step of v along the long edge per scanline,
+    ``g`` the step per pixel away from that edge; neither subtracts large numbers that nearly cancel:
 
         r = (v2 - v0) / D,    g = (v1 - v0 - r D1) / W
 
@@ -58,26 +58,29 @@ class GradientSetup:
     thin the triangle is.
 
     The pixel at the long edge moves by whole columns, so that v moves by ``short = r - f g`` a scanline,
-    ``f`` the fraction of the edge's step, and by ``long = short + g`` with the walk's carry (g and f with the
-    other sign where the edge is on the right). Its start, ``down`` k below the first corner, is
-    ``v0 + (k short + n g) / 256``: ``n = along`` of `Edges` if the edge is on the left, ``256 - along`` if on
-    the right.
+    ``f`` the fraction of the edge's step, and by ``long = short + g`` with the walk's carry. Where the edge
+    is on the right, g has the other sign in both: ``short = r + f g``, ``long = short - g``. The start is
+    ``v0 + (k short + n g) / 256`` with ``k = down`` of `Edges`, and with ``n = along`` if the edge is on the
+    left, ``n = 256 - along`` if it is on the right.
+
+    D' and W' are the powers of two with ``1/2 < D'/D <= 1`` and ``1/2 <= W'/W < 1``; `PlaneSetup` gives these
+    quotients and the exponents.
 
     ============ ============ =====================================================================
     word         format       why
     ============ ============ =====================================================================
     v            SQ(1, 23)
-    r D          SQ(2, 24)    `wide_product`, 7 and 9 low bits
+    r D'         SQ(2, 24)    `wide_product` with D'/D, 7 and 9 low bits
     v1 - v0 - r D1  SQ(2, 24) `wide_product`, 8 and 3 low bits; saturates
-    g W'         SQ(2, 24)    `wide_product` with the mantissa of 1/W, 8 and 8 low bits
+    g W'         SQ(2, 24)    `wide_product` with W'/W, 8 and 8 low bits
     f            UQ(0, 33)    32 bits, and a 1 for the half step that they leave out
     f g W'       SQ(2, 40)    `wide_product`, 16 and 8 low bits; cut, not rounded
     r, g, f g    SQ(10, 32)   shifted by the scales' exponents, rounded half up
     k short, n g fraction 28  one sum, cut after the division by 256
     ============ ============ =====================================================================
 
-    Sums are taken modulo 4 once they are made: attributes are in [-1, 1), so that those of covered pixels are
-    right whatever passes in between. `error` is the bound. Twelve multiplications.
+    Finished sums are taken modulo 4. Attributes are in [-1, 1), so that the values at covered pixels are
+    right even where a step or a value on the way wraps. `error` is the bound. Twelve multiplications.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -98,19 +101,25 @@ class GradientSetup:
     def error(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
         """Bound on the error of an attribute at any pixel that a triangle covers, before it is cut.
 
-        ``r D`` is off by ``e1 = 2 E + L``, E that of the reciprocal, L that of a `wide_product`, as v2 - v0
-        is below 2; ``v1 - v0 - r D1`` by ``2 e1 + L``; ``g W'`` by ``e2``, that and ``2 w + L``, w the
-        relative error of 1/W. Over the height r passes at most 2 times its error, g over the width, too, as
-        the mantissas are below 2 and at least 1/2. A scanline adds the roundings of r, f g and g, 2^-33 each,
-        and what f and the product f g leave out, 2^-33 each times a g of at most 2/W; a column adds that of
-        g, and the start four cuts at 2^-28.
+        E is the error of `Reciprocal`, L that of a `wide_product`, w the relative error of 1/W. As v2 - v0 is
+        below 2, ``r D'`` is off by ``e1 = 2 E + L``, ``v1 - v0 - r D1`` by ``2 e1 + L``, and ``g W'`` by
+        ``e2 = 2 e1 + L + 2 w + L``. Over the height the error of ``r D'`` counts ``D/D'`` times, over the
+        width that of ``g W'`` counts ``W/W'`` times: both factors are at most 2. Each scanline adds the
+        roundings of r, f g and g, 2^-33 each. It also adds the errors of f, 2^-33, and of the product
+        ``f g W'``, 2^-33 + 2^-39, times ``2/W`` at most. Each column adds the rounding of g, and the start
+        four cuts at 2^-28.
 
         Parameters
         ----------
         rows : array
             Scanlines of the triangles.
         width : array
-            Their widths W in pixels, more than 1/256.
+            Widths W of the triangles in pixels, more than 1/256.
+
+        Returns
+        -------
+        float array
+            In units of the attribute, which is in [-1, 1).
         """
         product = LOST * 2.0**-24 + 2.0**-32
         along = PlaneSetup.HEIGHT_ERROR + product
@@ -127,6 +136,10 @@ class GradientSetup:
             An attribute's values at the sorted corners, or those of several attributes.
         scales : PlaneScales
             Of the triangles, from `PlaneSetup`.
+
+        Returns
+        -------
+        Gradients, shape (T, ...)
 
         Raises
         ------
@@ -186,7 +199,7 @@ class GradientSetup:
         return (parts[0] + (parts[1] + parts[2])).wrap(SQ(2, 40))
 
     def _shifted(self, value: Fixed, shift: np.ndarray) -> Fixed:
-        """``2^8 value``, shifted right and rounded half up."""
+        """``2^8 value``, shifted right by ``shift`` places and rounded half up, SQ(10, 32)."""
         word = value.scale(8).extend(self.SHIFTED_FORMAT).codes
         return Fixed(self.SHIFTED_FORMAT, ((word << 1 >> shift) + 1) >> 1)
 

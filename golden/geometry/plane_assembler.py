@@ -12,14 +12,14 @@ __all__ = ["PlaneAssembler", "Planes"]
 
 @dataclass(frozen=True)
 class Planes:
-    """Triangles ready to be walked.
+    """Planes of triangles: gradients of their attributes, and the largest length of a piece.
 
     Parameters
     ----------
     gradients : Gradients, shape (T, 4)
         Of the components of N/W and of the depth.
     piece : int64 array, shape (T,)
-        Exponent of the pixels that a piece of a span has at most, 0 to 12.
+        A piece of a span has at most ``2^piece`` pixels; 0 to 12.
     """
 
     gradients: Gradients
@@ -30,7 +30,7 @@ class Planes:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         gradients = self.gradients.beats
         del gradients["size"]
         return gradients | {"piece": self.piece}
@@ -38,23 +38,24 @@ class Planes:
 
 @dataclass(frozen=True)
 class PlaneAssembler:
-    """The largest power of two of pixels over which no unit normal of a triangle turns by more than a limit.
+    """Finds the largest power of two of pixels over which the unit normal turns by no more than a limit.
 
     Unit vectors along a and b are at most ``2 |a - b| / (|a| + |b|)`` apart (Dunkl and Williams), so that
-    over p pixels of a scanline the chord is at most ``p |g| / m``, g the step of N/W per pixel and m its
-    least length in the triangle. With
+    over p pixels of a scanline the chord is at most ``p |g| / m``, g the step of N/W per pixel and m the
+    least length of N/W in the triangle. Both are bounded:
 
-    - ``|g| <= (largest + sum) / 2`` of the sizes of its components, less than 1.16 times too much,
-    - m at least what `AttributeSerialiser` gives,
+    - ``|g| <= (largest + sum) / 2``, of the absolute values of the three components of g: at most
+      ``sqrt(3/2) < 1.23`` times too large;
+    - ``m >= least`` of `AttributeSerialiser`.
 
-    p is ``2^piece`` with the largest ``piece`` of 0 to 12 for which ``2^piece (largest + sum) / 2`` is at
-    most that bound times the frame's limit. Single pixels have no chord, so that there is nothing that a
-    triangle could not be cut to.
+    ``piece`` is the largest number from 1 to 12 for which ``2^piece (largest + sum) / 2`` is at most
+    ``least`` times the frame's limit, or 0 if there is none. A piece of one pixel has no chord, so that every
+    triangle can be cut to the limit.
 
     Parameters
     ----------
     cuts : bool
-        Whether spans are cut; else ``piece`` is 12, more pixels than a span has.
+        Whether spans are cut; else ``piece`` is 12: a span has fewer than 2^12 pixels.
 
     Source: docs/theory/geometry.md#normals; C. F. Dunkl, K. S. Williams, *A simple norm inequality*, 1964.
     """
@@ -73,7 +74,7 @@ class PlaneAssembler:
         least : int64 array, shape (T,)
             From `AttributeSerialiser`, in 2^-11.
         frame : Frame
-            Its ``limit``.
+            Frame whose ``limit`` counts.
         """
         if not self.cuts:
             return Planes(gradients, np.full(len(least), self.LARGEST))

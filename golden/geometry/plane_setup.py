@@ -15,28 +15,29 @@ __all__ = ["PlaneScales", "PlaneSetup", "leading_bit"]
 
 
 def leading_bit(codes: np.ndarray) -> np.ndarray:
-    """Place of the first 1 of positive integers below 2^52, from 0."""
+    """Place of the highest 1 of positive integers below 2^52, counted from 0 at the lowest bit."""
     return np.frexp(codes.astype(np.float64))[1].astype(np.int64) - 1
 
 
 @dataclass(frozen=True)
 class PlaneScales:
-    """What the attributes of a triangle share.
+    """Words of a triangle that all its attributes share.
 
     Parameters
     ----------
     height_reciprocal : Fixed, shape (T,), UQ(1, 25)
-        Reciprocal of the height's mantissa.
+        Reciprocal of the mantissa d of the height, which is ``d 2^e`` with d from 1 to 2.
     knee : Fixed, shape (T,), UQ(1, 19)
-        Height of the middle corner below the first, over the power of two of that mantissa.
+        Distance from the first corner down to the middle one, over ``2^e``.
     width_reciprocal : Fixed, shape (T,), UQ(0, 25)
         Mantissa of the reciprocal of the width; 0 for a sliver.
     row_shift, column_shift : int64 arrays, shape (T,)
-        Places by which steps of a scanline and of a column are shifted right, 0 to 19.
+        Places by which steps per scanline and per column are shifted right, 0 to 19; the column shift of a
+        sliver is any number modulo 32, without meaning.
     fraction, down, along, right
-        As they came.
+        Of `Edges` and `SortedTriangles`, unchanged.
     sliver : bool array, shape (T,)
-        The triangle is nowhere wider than 1/256 pixel.
+        Whether the triangle is nowhere wider than 1/256 pixel.
     """
 
     height_reciprocal: Fixed
@@ -55,7 +56,7 @@ class PlaneScales:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         return {
             name: value.codes if isinstance(value, Fixed) else value for name, value in vars(self).items()
         }
@@ -63,19 +64,19 @@ class PlaneScales:
 
 @dataclass(frozen=True)
 class PlaneSetup:
-    """``1/D`` and ``1/W`` of a triangle of height D and of width W at its middle corner, its largest.
+    """``1/D`` and ``1/W`` of a triangle: D its height, W its width at the middle corner, its largest width.
 
     With ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2, the width in pixels is
     ``a / (D 2^s)``, so that ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and ``1/A``, the
     latter of A cut to 25 fraction bits; ``d / A`` is one `wide_product`, and is halved where it is 1 or more.
 
-    A step per scanline is ``2^s v / D = (v / d) 2^(s - e)`` and one per column ``v / W``: both are kept 8
-    bits up, and shifted down by ``row_shift = 8 - s + e`` and by ``column_shift = 8`` less the exponent of
-    ``1/W``, which is -11 to 8. Triangles of ``W <= 1/256`` are slivers and get 0: their attributes are those
-    of the long edge.
+    For a difference v of attributes the step per scanline is ``2^s v / D = (v / d) 2^(s - e)``, the step per
+    column ``v / W``. `GradientSetup` multiplies the mantissas by 2^8, and shifts right by
+    ``row_shift = 8 - s + e`` and by ``column_shift``, which is 8 less the exponent of ``1/W``, -11 to 8.
+    Triangles of ``W <= 1/256`` are slivers. Their ``1/W`` is 0: they have the attributes of the long edge.
 
-    Errors, relative: ``1/d`` is off by 2 `Reciprocal.ERROR`; ``1/W`` by that, the cut of A, 2^-25, and a
-    rounding: `WIDTH_ERROR`, 2^-22.9. Seven multiplications.
+    Relative errors: ``1/d`` is off by `HEIGHT_ERROR`, 2 `Reciprocal.ERROR`; ``1/W`` by that, by 2^-25 for the
+    cut of A, and by 2^-24 for the `wide_product`: `WIDTH_ERROR`, 2^-22.7. Seven multiplications.
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ class PlaneSetup:
         triangles : SortedTriangles
             From `VertexSort`.
         edges : Edges
-            Theirs, from `EdgeSetup`.
+            Edges of the triangles, from `EdgeSetup`.
         """
         s, area = self.grid.subpixel_bits, triangles.area
         height, knee = edges.height[:, 0], triangles.triangles.y[:, 1] - triangles.triangles.y[:, 0]

@@ -11,22 +11,23 @@ __all__ = ["Reciprocal"]
 
 
 class Reciprocal:
-    """``1/x`` for x from 1 on and below 2, as ``c0 - u (c1 - u c2)``, u from the middle of the segment.
+    """``1/x`` for ``1 <= x < 2``, as ``c0 - u (c1 - u c2)``; u is the distance from the segment's middle.
 
     ============ ============ =====================================================================
     word         format       why
     ============ ============ =====================================================================
     x            UQ(1, 25)    first bit 1; the next 8 are the segment
-    u            SQ(-8, 25)   the other 17, the first of them turned: -2^-9 to 2^-9
-    c0           UQ(0, 28)    fitted last, for what the rounding of the others leaves
+    u            SQ(-8, 25)   the other 17, the first of them inverted: -2^-9 to 2^-9
+    c0           UQ(0, 28)    fitted last, to the remainder after c1 and c2 are rounded
     c1           UQ(0, 19)
-    c2           UQ(0, 10)    below 1, as x is over 1; its error counts 2^-18
-    c1 - u c2    UQ(0, 17)    17 bits for the multiplier; rounded; its error counts 2^-9
+    c2           UQ(0, 10)    below 1, as x is over 1; its error is multiplied by 2^-18
+    c1 - u c2    UQ(0, 17)    17 bits for the multiplier; rounded; its error is multiplied by 2^-9
     1/x          UQ(1, 25)    rounded; 1 for x = 1
     ============ ============ =====================================================================
 
-    The error is at most `ERROR`, 1.75 steps of the result: 2^-18 times 2^-9 by the slope, the rest of the fit
-    and of c0, below 2^-28, and the last rounding. Two multiplications.
+    The error is at most `ERROR`, 0.875 steps of the result: 2^-27 for the rounding of the slope, 2^-18 times
+    2^-9; less than 2^-28 for the fit and the rounding of c0; 2^-26 for the last rounding. Two
+    multiplications.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -67,6 +68,11 @@ class Reciprocal:
         Returns
         -------
         Fixed, same shape, UQ(1, 25)
+
+        Raises
+        ------
+        ValueError
+            If the operand has another format or is less than 1.
         """
         if x.format != self.FORMAT or (x.codes.size and x.codes.min() < 1 << 25):
             raise ValueError(f"operands must be {self.FORMAT}, from 1 on")

@@ -10,7 +10,7 @@ from blysk.golden.reference.scene import Scene
 __all__ = ["SceneTriangles", "scene_triangles"]
 
 _LARGEST = ATTRIBUTE.max_code
-# Nothing is as far as the depth that a picture is cleared to.
+# One less than the depth that a picture is cleared to.
 _FARTHEST = DEPTH.max_code - 1
 
 
@@ -25,11 +25,11 @@ class SceneTriangles:
     frame : Frame
         The picture.
     source : int64 array, shape (T,)
-        Face of the mesh that each is, or is a piece of.
+        Index of the mesh face that each triangle is, or is a piece of.
     clipped : int
-        Faces of which the near plane or the guard band cut something off.
+        Number of faces from which the near plane or the guard band cut a part off.
     outside : int
-        Faces left out because nothing of them is between the near plane and the guard band.
+        Number of faces left out because they have no part inside the near plane and the guard band.
     """
 
     triangles: Triangles
@@ -39,7 +39,7 @@ class SceneTriangles:
     outside: int
 
     def by_material(self) -> "SceneTriangles":
-        """The same, those of one material after the other; within one the order stays."""
+        """The same triangles sorted by material; those of one material stay in their order."""
         order = np.argsort(self.triangles.material, kind="stable")
         return replace(self, triangles=self.triangles[order], source=self.source[order])
 
@@ -65,6 +65,11 @@ def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -
     Returns
     -------
     SceneTriangles
+
+    Raises
+    ------
+    ValueError
+        If the picture is too large, or the limit out of range.
     """
     frame = Frame.centred(scene.width, scene.height, back_faces=scene.back_faces, limit=limit)
     mesh = scene.mesh
@@ -113,7 +118,10 @@ def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -
 def _clip(
     records: np.ndarray, source: np.ndarray, plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cut triangles by a plane, a row that is not negative inside; also which faces were cut."""
+    """Cut triangles by a plane; also which faces were cut.
+
+    ``plane`` has four coefficients and a constant; a point is inside where the sum is not negative.
+    """
     distance = records[..., :4] @ plane[:4] + plane[4]
     inside = distance >= 0
     count = inside.sum(axis=1)
@@ -146,7 +154,9 @@ def _clip(
 
 
 def _between(inner: np.ndarray, outer: np.ndarray, d_inner: np.ndarray, d_outer: np.ndarray) -> np.ndarray:
-    """Where the line from an inner to an outer corner meets the plane: always from the inside, so that two
-    triangles cut their shared edge in the same bits.
+    """Intersections of the plane with lines from inner to outer corners.
+
+    They are always computed from the inner corner, so that two triangles that share an edge cut it at the
+    same point, to the bit.
     """
     return inner + (d_inner / (d_inner - d_outer))[:, np.newaxis] * (outer - inner)

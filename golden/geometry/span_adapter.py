@@ -15,12 +15,12 @@ __all__ = ["LineAdapter", "LineSpans", "shading_spans"]
 
 @dataclass(frozen=True)
 class LineSpans(PlacedSpans):
-    """Spans with the ends of their true lines.
+    """Spans with the ends of their true lines in place of unit normals.
 
     Parameters
     ----------
     x, y, length, depth, depth_last, depth_step, material, triangle
-        As `PlacedSpans` has them.
+        As in `PlacedSpans`.
     normal_left, normal_right : int64 arrays, shape (S, 3)
         Ends of the line at the first and at the last pixel's centre, SQ(1, 22).
     """
@@ -33,9 +33,10 @@ class LineSpans(PlacedSpans):
 class LineAdapter:
     """Ends of a span's true line for `LineSetup`: N/W at both, shifted together and rounded.
 
-    The six components are shifted left by as many places as none of them needs, at most `LARGEST_SHIFT`, and
-    rounded half up to 22 fraction bits, within ``1 - 2^-22``. Where ``flip`` is set they are negated. What
-    all six share does not change a direction, so that the unit normals along the line are those of N/W:
+    The six components are shifted left by the same number of places: the sign copies that all of them have,
+    at most `LARGEST_SHIFT`. They are negated where ``flip`` is set, rounded half up to 22 fraction bits, and
+    saturate to ``+-(1 - 2^-22)``. A factor that all six share does not change a direction, so that the unit
+    normals along the line are those of N/W:
 
     ========== ============ =====================================================================
     word       format       why
@@ -44,7 +45,8 @@ class LineAdapter:
     ends       SQ(1, 22)    of `LineSetup`; the largest component is 1/2 or more where the shift reaches
     ========== ============ =====================================================================
 
-    Rounding moves each component of an end by at most `ERROR`, 2^-23, besides what N/W itself is off.
+    Rounding moves a component of an end by at most `ERROR`, 2^-23; saturation, for components within 2^-23 of
+    -1 or 1, by at most 2^-22. The error of N/W itself is added to that.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """

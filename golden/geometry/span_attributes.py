@@ -28,18 +28,17 @@ class Pieces:
     Parameters
     ----------
     x, y, length : int64 arrays, shape (S,)
-        First pixel, and pixels from there on, 1 or more.
+        Column and scanline of the first pixel, and number of pixels, 1 or more.
     left, right : Fixed, shape (S, 3), SQ(1, 26)
         N/W at the first and at the last pixel's centre.
-    depth : Fixed, shape (S,), UQ(24, 9)
-        At the first pixel.
-    depth_last : Fixed, shape (S,), UQ(24, 9)
-        At the last pixel.
+    depth, depth_last : Fixed, shape (S,), UQ(24, 9)
+        Depth at the first and at the last pixel.
     depth_step : Fixed, shape (S,), SQ(25, 9)
-        From a pixel to the next; of a single pixel it means nothing.
+        Step of the depth from a pixel to the next; without meaning in a span of one pixel.
     flip : bool array, shape (S,)
-        Normals are to be negated.
+        Whether the normals are to be negated.
     material : int64 array, shape (S,)
+        Index of the material.
     triangle : int64 array, shape (S,)
         Index of the triangle.
     """
@@ -61,7 +60,7 @@ class Pieces:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         return {
             name: value.codes if isinstance(value, Fixed) else value
             for name, value in vars(self).items()
@@ -73,16 +72,16 @@ class Pieces:
 class SpanAttributes:
     """Accumulators along the long edge, and from there along each span by shifts and additions.
 
-    Down a scanline the value at the long edge's pixel takes `Gradients.short` or, with the walk's carry,
-    `Gradients.long`: no product. Along the scanline it takes ``n inward`` to the pixel n from the edge, a sum
-    of shifts of ``inward`` for the ones of n, which takes as many cycles as n has bits and so never more than
-    the span has pixels. What the picture's border cuts off at the long edge is skipped in the same way.
+    From a scanline to the next `Gradients.short` is added to the value at the long edge's pixel or, with the
+    walk's carry, `Gradients.long`: no product. Along a scanline the value n pixels from the long edge is
+    ``n inward`` more, a sum of shifts of ``inward`` for the ones of n. Pixels that the picture's border cuts
+    off at the long edge are skipped in the same way.
 
-    A span of more than ``2^piece`` pixels leaves as pieces of that many, from the long edge on, and a last
-    one: each as a span of its own with the true normals at both its ends.
+    A span of more than ``2^piece`` pixels is cut into pieces of ``2^piece`` pixels, from the long edge on,
+    and a last one of the pixels that are left. Each is a span of its own, with the true N/W at both its ends.
 
-    Values are exact sums of the gradients' codes, modulo 4; they are cut to the pieces' formats, and saturate
-    where errors carry them over the ends.
+    Values are exact sums of the gradients' codes, modulo 4. They are cut to the pieces' formats, and saturate
+    where errors carry them out of range.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
@@ -95,12 +94,12 @@ class SpanAttributes:
         rows : ClippedRows
             From `SpanClip`.
         planes : Planes
-            Of the triangles whose scanlines they are, from `PlaneAssembler`.
+            Planes of the triangles of the scanlines, from `PlaneAssembler`.
 
         Returns
         -------
         pieces : Pieces
-            In the order of the scanlines, of one from the long edge on.
+            In the order of the scanlines, within a scanline from the long edge on.
         counts : dict of str to int
             ``empty`` and ``cut``.
         """

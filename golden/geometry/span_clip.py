@@ -17,14 +17,15 @@ class ClippedRows:
     Parameters
     ----------
     x, y : int64 arrays, shape (R,)
-        First column, and scanline, counted from the picture's top left pixel; 0 where ``length`` is.
+        First column, and scanline, counted from the picture's top left pixel; 0 where ``length`` is 0.
     length : int64 array, shape (R,)
-        Pixels, 0 to 4095.
+        Pixels in the picture, 0 to 4095.
     skip : int64 array, shape (R,)
-        Pixels cut off at the long edge; 0 where ``length`` is.
+        Pixels cut off at the long edge; 0 where ``length`` is 0.
     carry, last, right, flip : bool arrays, shape (R,)
+        As in `Rows`.
     material : int64 array, shape (R,)
-        As `Rows` has them.
+        As in `Rows`.
     """
 
     x: np.ndarray
@@ -42,16 +43,16 @@ class ClippedRows:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         return vars(self) | {"covered": self.length > 0, "skips": self.skip > 0}
 
 
 @dataclass(frozen=True)
 class SpanClip:
-    """``x = max(begin, left)``, ``length = min(end, right) - x``; nothing above the picture.
+    """``x = max(begin, left) - left``, ``length = min(end, right) - max(begin, left)``.
 
-    A scanline of which nothing is left goes on with length 0: what follows the long edge counts it, and
-    makes no span of it.
+    Scanlines above the picture, and those without a pixel in it, are passed on with length 0:
+    `SpanAttributes` steps down the long edge for them, and makes no span.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """

@@ -24,10 +24,10 @@ PIXEL_BITS = 12
 """Bits of a coordinate before the binary point: pixels -2048 to 2047."""
 
 ATTRIBUTE = SQ(1, 23)
-"""Number format of what is interpolated: components of N/W, and the depth over half its range."""
+"""Number format of the attributes: components of N/W, and ``depth / 2^23 - 1``."""
 
 ATTRIBUTES = 4
-"""Components of N/W, then the depth."""
+"""Number of attributes of a corner: the components x, y, z of N/W, then the depth."""
 
 DEPTH = UQ(24, 0)
 """Number format of a corner's depth, 0 nearest."""
@@ -69,7 +69,7 @@ class Grid:
 
     @property
     def bits(self) -> int:
-        """Bits of a coordinate, and of the difference of two in sorted order."""
+        """Bits of a coordinate, and of the unsigned difference of two sorted coordinates."""
         return self.coordinate.width
 
     @property
@@ -83,7 +83,7 @@ class Grid:
         return self.steps // 2
 
     def first_centre(self, codes: np.ndarray) -> np.ndarray:
-        """First pixel whose centre is not before a coordinate: ``ceil((c - half) / steps)``."""
+        """First column or scanline whose centre is not before a coordinate: ``ceil((c - half) / steps)``."""
         return (codes + (self.half - 1)) >> self.subpixel_bits
 
 
@@ -93,7 +93,7 @@ GRID = Grid()
 
 @dataclass(frozen=True)
 class Frame:
-    """What stays while the triangles of a frame pass.
+    """Settings that stay constant while the triangles of a frame pass.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Frame:
         The picture, in pixels of the grid: columns ``left`` to ``right - 1``, scanlines ``top`` to
         ``bottom - 1``, each at least one and at most 4095; from -2048 to 2048.
     back_faces : str
-        One of `BACK_FACES`.
+        Treatment of back faces, one of `BACK_FACES`.
     limit : int
         Largest chord between the unit normals of a span's ends, in 1/1024: 0 to 1023. See
         `PlaneAssembler`; `limit_of` gives it for an angle.
@@ -134,18 +134,26 @@ class Frame:
 
     @classmethod
     def centred(cls, width: int, height: int, **options) -> "Frame":
-        """The picture in the middle of the grid, so that the guard band is as wide on either side."""
+        """Frame with the picture in the middle of the grid, so that the guard band is equal on all sides.
+
+        Parameters
+        ----------
+        width, height : int
+            Size of the picture, 1 to 4095.
+        **options
+            ``back_faces`` and ``limit``.
+        """
         left, top = -(width // 2), -(height // 2)
         return cls(left, top, left + width, top + height, **options)
 
     @staticmethod
     def limit_of(angle: float) -> int:
-        """The largest ``limit`` of which no span is wider than an angle in degrees, 0 to 59."""
+        """Largest ``limit`` for which no span's normals are more than ``angle`` degrees apart, 0 to 59."""
         return min(int(2048 * np.sin(np.radians(angle) / 2)), (1 << LIMIT_BITS) - 1)
 
     @property
     def codes(self) -> dict[str, int]:
-        """What the hardware is given."""
+        """Codes of the fields of the hardware's port ``constants``, by name."""
         return {
             "left": self.left,
             "top": self.top,
@@ -165,13 +173,14 @@ class Triangles:
     x, y : int64 arrays, shape (T, 3)
         Corners in steps of the grid, y down.
     depth : int64 array, shape (T, 3)
-        0 to 2^24 - 1, linear on the screen, less when nearer.
+        0 to 2^24 - 1, linear on the screen; the nearer the smaller.
     normal : int64 array, shape (T, 3, 3)
         Components of N/W over the largest 1/W of the triangle, `ATTRIBUTE`; the last axis is x, y, z.
     material : int64 array, shape (T,)
         Index of the material.
     two_sided : bool array, shape (T,)
-        Whether a frame that leaves out back faces negates the normals of this one instead.
+        Whether the triangle is drawn with negated normals, not culled, if its back is seen in a frame that
+        culls back faces.
     """
 
     x: np.ndarray
@@ -190,12 +199,12 @@ class Triangles:
 
     @property
     def attributes(self) -> np.ndarray:
-        """Codes of what is interpolated, shape (T, 3, 4): N/W, then the depth less half its range."""
+        """Codes of the attributes, int64 array of shape (T, 3, 4): N/W, then ``depth - 2^23``."""
         depth = self.depth + ATTRIBUTE.min_code
         return np.concatenate((self.normal, depth[..., np.newaxis]), axis=-1)
 
     @property
     def beats(self) -> dict:
-        """What is sent to the hardware."""
+        """Fields of the input beats of the hardware, by name: arrays of codes."""
         names = ("x", "y", "depth", "normal", "material", "two_sided")
         return {name: getattr(self, name) for name in names}

@@ -15,11 +15,12 @@ __all__ = ["VectorNormaliser"]
 
 @dataclass(frozen=True)
 class VectorNormaliser:
-    """``v / |v|`` by a shift, a table of the reciprocal root in 384 linear segments, and three products.
+    """``v / |v|`` by a shift, a table of the reciprocal root in 384 linear segments, and products.
 
-    The components are shifted left together until the largest has no sign copies left, and rounded to 18
-    bits. Their squared length s is then 1/4 to 3. With ``s' = s``, or ``s / 4`` from 1 on, the table gives
-    ``f = (ONE/2^17) / sqrt(s')``, and the result is ``v + e v`` with ``e = f - 1``, or ``f/2 - 1``.
+    The components are shifted left together, by at most 15 places, until one of them has no sign copies left,
+    and are rounded to 18 bits. Their squared length s is then 1/4 to 3. With ``s' = s``, or ``s' = s / 4`` if
+    s is 1 or more, the table gives ``f = (ONE/2^17) / sqrt(s')``, and the result is ``v + e v`` with
+    ``e = f - 1``, or ``e = f/2 - 1``.
 
     ============ ============ =====================================================================
     word         format       why
@@ -28,28 +29,29 @@ class VectorNormaliser:
     shifted v    SQ(1, 17)    18 bits for the multipliers; rounded half up; saturates to ONE
     s            SQ(4, 34)    exact
     s'           UQ(0, 20)    cut; the first 9 bits are the segment
-    u            SQ(-9, 21)   the others from the segment's middle, with the half step that the cut leaves out
-    f            UQ(2, 20)    ``c0 - c1 u``
-    c1           UQ(3, 9)     its error counts 2^-10
-    e            SQ(1, 17)    18 bits for the multipliers; rounded, which no factor is too large for
+    u            SQ(-9, 21)   the other bits of s' less the segment's middle, plus half a step for the cut
+    f            UQ(1, 20)    ``c0 - c1 u``
+    c1           UQ(2, 9)     its error is multiplied by 2^-10
+    e            SQ(1, 17)    18 bits for the multipliers; rounded; no factor overflows
     v / |v|      SQ(1, 17)    rounded half up; saturates to ONE
     ============ ============ =====================================================================
 
-    A vector of components all below 2^-16 is *lost*: it has no direction that its bits could tell.
+    A vector whose components are all in [-2^-16, 2^-16) is *lost*: it has too few bits for a direction.
 
-    The length of the result is off by at most `LENGTH_ERROR`, 2^-15.7: that of f relative to f, `FIT` and
-    2^-20 for the cut, with 2^-20 for the roundings; of e, 2^-18 times the shifted length, below 1.74; and of
-    three components, ``sqrt(3) 2^-18``. `FIT` is a sixteenth of the second derivative, 24 at most, times the
-    squared segment, over f = 2, with the roundings of c0 and c1. The last error also turns the direction,
-    and so does the rounding of the shifted components, whose length is 1/2 at least: by at most
-    `DIRECTION_ERROR`, 2^-15.6.
+    The length of the result is off by at most `LENGTH_ERROR`, 2^-15.7, the sum of: the relative error of f,
+    which is `FIT`, 2^-20 for the cut of s' and 2^-20 for the roundings; the rounding of e, 2^-18, times the
+    length of the shifted vector, below 1.74; and the rounding of the three components, ``sqrt(3) 2^-18``.
+    `FIT` is a sixteenth of the second derivative, 24 at most, times the square of a segment's width, over
+    f = 2, and the roundings of c0 and c1. The direction is off by at most `DIRECTION_ERROR`, 2^-15.6: by the
+    rounding of the components of the result, and by that of the shifted components, whose length is at
+    least 1/2.
 
     Six multiplications, and one of 12 by 11 bits that is made of adders.
 
     Parameters
     ----------
     format : Format
-        Of the components, signed, below 1 or 2 in size.
+        Number format of the components, signed, with one or two integer bits.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -74,14 +76,14 @@ class VectorNormaliser:
         middle = (np.arange(segments // 4, segments) + 0.5) / segments
         u = np.linspace(-0.5, 0.5, 65)[:, np.newaxis] / segments
         exact = ONE * COMPONENT.step / np.sqrt(middle + u)
-        # The chord's slope is that of the best line.
+        # The best line has the slope of the chord.
         c1 = Fixed.round(self.C1_FORMAT, (exact[0] - exact[-1]) * segments)
         left = exact + c1.values * u
         c0 = Fixed.round(self.C0_FORMAT, (left.min(axis=0) + left.max(axis=0)) / 2)
         return tuple(Fixed(c.format, np.r_[np.zeros(segments // 4, dtype=int), c.codes]) for c in (c0, c1))
 
     def shifted(self, vector: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Components shifted left until the largest fills the word, and whether the vector is lost."""
+        """Components shifted left together until one fills the word, SQ(1, 17); and whether each is lost."""
         codes, width = vector.codes, self.format.width - 1
         ones = np.bitwise_or.reduce(np.where(codes < 0, ~codes, codes), axis=-1)
         length = np.frexp(ones.astype(np.float64))[1].astype(np.int64)

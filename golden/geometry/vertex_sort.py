@@ -20,11 +20,11 @@ class SortedTriangles:
     area : int64 array, shape (T,)
         Twice the area in squared steps of the grid, at least 1.
     right : bool array, shape (T,)
-        The long edge, from the first corner to the last, is on the right.
+        Whether the long edge, from the first corner to the last, is on the right.
     flip : bool array, shape (T,)
-        Normals are to be negated.
+        Whether the normals are to be negated.
     source : int64 array, shape (T,)
-        Index of each among those that came.
+        Index of each in the triangles before the sort.
     """
 
     triangles: Triangles
@@ -38,7 +38,7 @@ class SortedTriangles:
 
     @property
     def beats(self) -> dict:
-        """What the hardware gives."""
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
         beats = self.triangles.beats | {"area": self.area, "right": self.right, "flip": self.flip}
         return {name: values for name, values in beats.items() if name != "two_sided"}
 
@@ -49,15 +49,14 @@ class VertexSort:
 
     In this order a triangle is
 
-    1. counted as ``empty`` and dropped where no pixel of the picture has its centre in the triangle's box,
-       the box's right and lower side left out. The top-left rule covers no centre there, so that no pixel
-       is lost;
-    2. counted as ``zero_area`` and dropped where twice its area,
+    1. counted as ``empty`` and dropped if no pixel of the picture has its centre in the triangle's bounding
+       box without the right and the lower side. By the top-left rule no centre on these sides is covered;
+    2. counted as ``zero_area`` and dropped if twice its area,
        ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)``, is 0;
-    3. counted as ``culled`` and dropped where it is seen from behind, not two-sided, and the frame asks for
-       that. Corners that are counterclockwise as seen, y up, face the viewer.
+    3. counted as ``culled`` and dropped if its back is seen, it is not two-sided, and the frame culls back
+       faces. A triangle shows its front if its corners are counterclockwise on the screen.
 
-    A sorted triangle has its long edge on the right where a of the sorted corners is negative. All is exact.
+    The long edge is on the right if a of the sorted corners is negative. All results are exact.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ class VertexSort:
     grid: Grid = GRID
 
     def order(self, triangles: Triangles) -> np.ndarray:
-        """Index of the corners from top to bottom, shape (T, 3): a key of y, then x; equal ones stay."""
+        """Indices of the corners sorted by y, then x, shape (T, 3); equal corners stay in their order."""
         key = (triangles.y << (self.grid.bits + 1)) + triangles.x
         return np.argsort(key, axis=1, kind="stable")
 
@@ -82,12 +81,12 @@ class VertexSort:
         triangles : Triangles
             Corners in the grid's range.
         frame : Frame
-            The picture, and what happens to back faces.
+            The picture, and the treatment of back faces.
 
         Returns
         -------
         sorted : SortedTriangles
-            In the order in which they came.
+            The triangles to be drawn, in the order of ``triangles``.
         counts : dict of str to int
             ``empty``, ``zero_area`` and ``culled``.
 
@@ -116,7 +115,7 @@ class VertexSort:
         )
         dx, dy = (values[:, 1:] - values[:, :1] for values in (kept.x, kept.y))
         area = dx[:, 0] * dy[:, 1] - dx[:, 1] * dy[:, 0]
-        # Of a triangle's six orders those three are odd that have one corner in its place or turn two round.
+        # Of the six orders of three corners the odd ones exchange two, and leave one corner in its place.
         odd = (order == np.arange(3)).sum(axis=1) == 1
         back = (area > 0) ^ odd
         solid = area != 0

@@ -8,22 +8,22 @@ GUARD_BITS = 3
 """Bits that the three products keep below the result's last one."""
 
 LOST = 2.0**-1 + 3 * 2.0**-GUARD_BITS
-"""Error of the sum in steps of the result, beside the product left out: its rounding and three cuts."""
+"""Error of a `wide_product` in steps of the result, but for the omitted product: rounding, three cuts."""
 
 
 def low_format(format: Format, low_bits: int) -> Format:
-    """Format of the last bits of a word, which are not negative."""
+    """Number format of the last ``low_bits`` bits of a word, unsigned."""
     return UQ(low_bits - format.fraction_bits, format.fraction_bits)
 
 
 def halves(value: Fixed, low_bits: int) -> tuple[Fixed, Fixed]:
-    """A number as the sum of its first bits, with its sign, and its last, which are not negative."""
+    """High part of a number, signed, and its low part of ``low_bits`` bits, unsigned; their sum is exact."""
     low = low_format(value.format, low_bits)
     return value.truncate(value.format.fraction_bits - low_bits), Fixed(low, value.codes & low.max_code)
 
 
 def wide_product(a: Fixed, b: Fixed, a_low: int, b_low: int, fraction_bits: int) -> Fixed:
-    """``a b`` from the products of the halves, without that of the two low ones.
+    """``a b`` from three products of the halves; the product of the two low halves is omitted.
 
     Each product is cut to `GUARD_BITS` more than the result's fraction bits, and their sum rounded half up.
 
@@ -34,12 +34,13 @@ def wide_product(a: Fixed, b: Fixed, a_low: int, b_low: int, fraction_bits: int)
     a_low, b_low : int
         Bits of their low halves.
     fraction_bits : int
-        Of the result.
+        Fraction bits of the result.
 
     Returns
     -------
     Fixed
-        Off by at most `LOST` steps, and less than ``2^(a_low + b_low)`` times a step of the exact product.
+        The product. It is off by at most `LOST` steps of the result, and by less than ``2^(a_low + b_low)``
+        steps of the exact product, for the omitted one.
     """
     (a_high, a_rest), (b_high, b_rest) = halves(a, a_low), halves(b, b_low)
     keep = fraction_bits + GUARD_BITS

@@ -12,7 +12,7 @@ from blysk.hdl.core.stream import skid_buffer
 __all__ = ["AttributeSerialiserUnit", "corner_attributes_shape", "serial_attribute_shape"]
 
 _GIVES = 8
-"""Step at which the first attribute goes to the output: the bound is there."""
+"""Step at which the first attribute goes to the output: from then on the bound is known."""
 
 
 def corner_attributes_shape() -> data.StructLayout:
@@ -33,11 +33,12 @@ def serial_attribute_shape() -> data.StructLayout:
 
 
 class AttributeSerialiserUnit(wiring.Component):
-    """Four attributes of each triangle in a row: those of `AttributeSerialiser`, the bit-accurate model.
+    """The four attributes of each triangle, one after the other: `AttributeSerialiser` is the model.
 
-    The attributes of a triangle taken in on one cycle are offered from 9 cycles later on, one a cycle unless
-    the output waits, and the next triangle is taken in on the cycle of the last of them: one takes 12 cycles.
-    Without a skid buffer the attributes come every second cycle, and a triangle takes 15. No multipliers.
+    The first attribute is offered 9 cycles after the triangle is taken in, the others on the next three
+    cycles, unless the output waits. The next triangle is taken in on the cycle of the last attribute: the
+    initiation interval is 12 cycles. Without a skid buffer attributes come every second cycle, and the
+    interval is 15. No multipliers.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ class AttributeSerialiserUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The corners' words, in rings: once round for the bound, and once more for the output."""
+        """The corners' words in rings, which turn once for the bound and once more for the output."""
         m = Module()
         corners = [
             [Signal(FixedShape(ATTRIBUTE), name=f"corner_{k}_{a}") for a in range(ATTRIBUTES)]
@@ -86,7 +87,7 @@ class AttributeSerialiserUnit(wiring.Component):
             m.d.sync += [step.eq(self.i.valid), free.eq(~self.i.valid)]
             for k, words in enumerate(corners):
                 values = [Value.cast(value) for value in self.i.payload.normal[k]]
-                # The depth less half its range: its first bit turned.
+                # The depth less half its range: its first bit inverted.
                 depth = Value.cast(self.i.payload.depth[k])
                 values.append(Cat(depth[:-1], ~depth[-1]))
                 m.d.sync += [Value.cast(word).eq(value) for word, value in zip(words, values, strict=True)]
@@ -106,7 +107,7 @@ class AttributeSerialiserUnit(wiring.Component):
         return m
 
     def _least(self, m: Module, step: Signal, words: list) -> Signal:
-        """The bound, from the components in turns; a comparison a cycle, and it stands at step `_GIVES`."""
+        """The bound, from one component of each corner a cycle; it is there from step `_GIVES` on."""
         bits = AttributeSerialiser.FRACTION_BITS + 1
         sign = Value.cast(words[0])[-1]
         turned = [(Value.cast(word)[-bits:] ^ sign.replicate(bits)).as_signed() for word in words]

@@ -6,14 +6,19 @@ __all__ = ["booth_term"]
 
 
 def booth_term(value: Value, bits: Value) -> Value:
-    """Value times the Booth digit of three bits, the lowest first: -2 to 2.
+    """Value times the Booth digit that three bits encode, -2 to 2.
 
     Parameters
     ----------
     value : Value
         Signed.
     bits : Value
-        Three bits: that below the digit, and the digit's two.
+        Three bits, the lowest first: the bit below the digit, and the digit's two bits.
+
+    Returns
+    -------
+    Value
+        Signed.
     """
     low, middle, high = bits
     one, two = low ^ middle, (low == middle) & (middle != high)

@@ -16,12 +16,12 @@ from blysk.hdl.core.stream import skid_buffer
 
 __all__ = ["CoarseDepthUnit", "deep_span_shape"]
 
-# As in the depth test: a sign, and a bit more than any step of a span can add.
+# As in the depth test: more bits than a depth or a step has.
 _SUM_BITS = 37
 
 
 def deep_span_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
-    """Shape of a span's place and depth, and of a bit that changes with each picture."""
+    """Shape of a span: first pixel, length, depth and its step, and a bit that changes with each picture."""
     place = {"x": unsigned(x_bits), "y": unsigned(y_bits), "length": unsigned(x_bits)}
     depth = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
     return data.StructLayout(place | depth | {"picture": unsigned(1)})
@@ -30,28 +30,29 @@ def deep_span_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 class CoarseDepthUnit(wiring.Component):
     """Tells which spans are hidden for their whole length: `CoarseDepth` is the bit-accurate model.
 
-    A block of pixels a cycle, so that a span takes as many cycles as it touches blocks; the answer stands on
-    the output 8 cycles after a span of one block came in. A block's word is read, compared and written; the
-    three blocks before it count if they are the same, as the memory does not have them yet. No multipliers:
-    a part of a block's step is a sum of shifts.
+    A span takes as many cycles as it has blocks: one block a cycle. The answer for a span of one block is on
+    the output 8 cycles after the span was taken in. The word of a block is read, compared and written; words
+    of the last three blocks, which the memory does not have yet, are forwarded. No multipliers: products with
+    a number of pixels are sums of shifts.
 
-    The first span whose ``picture`` is another than that of the span before begins the next picture: it waits
-    until those before it have left and `CoarseDepth.swept` words are swept, one a cycle. After a reset the
-    picture is 0, and all words are swept, but those of a memory that is as it was at power-up.
+    A span whose ``picture`` differs from that of the span before begins the next picture: it waits until all
+    words of the spans before it are written, and `CoarseDepth.swept` words are cleared, one a cycle. After a
+    reset ``picture`` counts as 0 and all words are cleared, unless no span came in since power-up, when the
+    memory is clear.
 
     Parameters
     ----------
     parameters : CoarseDepth
         Bit-accurate model.
     x_bits, y_bits : int
-        Bits of a place.
+        Bits of a column, or a length, and of a scanline.
 
     Members
     -------
     i : :py:`In(stream.Signature(deep_span_shape(x_bits, y_bits)))`
-        Spans, inside the picture.
+        Spans of one pixel or more, inside the picture.
     o : :py:`Out(stream.Signature(1))`
-        Of each span in its turn whether it is hidden.
+        For each span, in order, 1 if it is hidden.
 
     Attributes
     ----------
@@ -61,7 +62,7 @@ class CoarseDepthUnit(wiring.Component):
     Raises
     ------
     ValueError
-        If the picture has places of more bits.
+        If a column or a scanline of the picture needs more bits.
 
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
@@ -105,7 +106,7 @@ class CoarseDepthUnit(wiring.Component):
 
         part = Signal(bound.shape(), name="part")
         there = Signal(word, name="there", reset_less=True)
-        # Words that the memory did not have yet when the part's was read.
+        # Words that the memory did not have yet when the word of the part was read.
         late = data.StructLayout({"valid": 1, "place": range(given.blocks), "word": word})
         written = [Signal(late, name=f"written_{k}") for k in range(3)]
         same = [Signal(name=f"same_{k}") for k in range(3)]
@@ -151,7 +152,7 @@ class CoarseDepthUnit(wiring.Component):
         return m
 
     def _pictures(self, m: Module, tag: Signal, empty: Signal) -> tuple:
-        """The span that is to go on, and whether it must wait; the words that are swept."""
+        """The span taken in, and whether it must wait for its picture; the words that are cleared."""
         given = self.parameters
         shape = {"x": self.x_bits, "last": self.x_bits, "line": range(given.blocks), "picture": 1}
         shape |= {"depth": SPAN_DEPTH.width, "step": DEPTH_STEP.width}
@@ -166,7 +167,7 @@ class CoarseDepthUnit(wiring.Component):
             held.eq(fresh | sweeping | other),
         ]
         with m.If(fresh):
-            # What a reset leaves in the memory counts for nothing.
+            # A reset does not clear the memory.
             m.d.sync += [fresh.eq(0), left.eq(Mux(used, given.blocks, 0))]
         with m.Elif(sweeping):
             m.d.sync += [left.eq(left - 1), place.eq(Mux(place == given.blocks - 1, 0, place + 1))]
@@ -177,7 +178,7 @@ class CoarseDepthUnit(wiring.Component):
         return span, span_valid, place, sweeping, held
 
     def _blocks(self, m: Module, bits: int, advance: Signal, given_span: tuple) -> tuple[data.View, Value]:
-        """Spans in blocks, one a cycle; whether there is a block, or one to follow."""
+        """Spans split into blocks, one a cycle; also whether a block is there or will follow."""
         given, incoming = self.parameters, self.i.payload
         span, span_valid, held = given_span
         step = {"step": DEPTH_STEP.width}
@@ -237,7 +238,7 @@ class CoarseDepthUnit(wiring.Component):
         return block, following_valid | block.valid
 
     def _bounds(self, m: Module, bits: int, advance: Signal, block: data.View) -> tuple[data.View, ...]:
-        """What goes to the ends of a part; its depths there; the least and the largest, on three cycles."""
+        """Three stages: depth changes to both ends of a part; depths there; the least and the largest."""
         given, last = self.parameters, self.parameters.block - 1
         common = {"valid": 1, "begins": 1, "ends": 1, "place": range(given.blocks), "mask": given.block}
         both = dict.fromkeys(("near", "far"), _SUM_BITS)
@@ -248,7 +249,7 @@ class CoarseDepthUnit(wiring.Component):
         bound = Signal(data.StructLayout(common | bounds), name="bound")
         slope = block.step.as_signed()
         marked = Mux(block.ends & ~block.border, block.last, last)
-        # The first is never beyond the last place, and the last never before place 0.
+        # ``first`` is never beyond the last pixel of a block, and ``marked`` never before pixel 0.
         begun = [block.first <= k for k in range(last)] + [Const(1)]
         not_over = [Const(1)] + [marked >= k for k in range(1, given.block)]
         with m.If(advance):
@@ -267,14 +268,14 @@ class CoarseDepthUnit(wiring.Component):
         return steps, ends, bound
 
     def _upper(self, code: Value) -> Value:
-        """Upper bits of a depth, between 0 and the farthest."""
+        """Upper bits of a depth, which saturates to 0 and to `DepthTest.FARTHEST`."""
         depth, farthest = code.as_signed() >> SPAN_DEPTH.fraction_bits, DepthTest.FARTHEST
         inside = Mux(depth < 0, 0, Mux(depth > farthest, farthest, depth))
         return inside[DEPTH.width - self.parameters.depth_bits : DEPTH.width]
 
 
 def _times(value: ValueLike, count: Value) -> Value:
-    """A product as a sum of shifts; of a constant, of those of its ones."""
+    """A product as a sum of shifts, for the ones of a constant ``value`` or for the bits of ``count``."""
     if isinstance(value, int):
         return sum((count << k for k in range(value.bit_length()) if value >> k & 1), start=Const(0))
     return sum((Mux(count[k], value << k, 0) for k in range(len(count))), start=Const(0))

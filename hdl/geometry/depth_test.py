@@ -32,15 +32,15 @@ def drawn_pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 
 
 class DepthMemory(wiring.Signature):
-    """Port to a memory of depths, a word a pixel: what is read on a clock stands on the next.
+    """Port to a memory of depths, one word a pixel; a word that is read is there on the next cycle.
 
-    A write and a read of one place on the same clock give the read what was there before. What is read stays
-    while ``read_enable`` is low. The memory is cleared to `DepthTest.CLEARED` before a frame.
+    A read and a write of the same place on the same cycle give the read the old word. ``read_data`` keeps its
+    value while ``read_enable`` is low. The memory is cleared to `DepthTest.CLEARED` before a frame.
 
     Parameters
     ----------
     x_bits, y_bits : int
-        Bits of a place.
+        Bits of a column and of a scanline.
     """
 
     def __init__(self, x_bits: int = 12, y_bits: int = 12):
@@ -60,28 +60,28 @@ class DepthMemory(wiring.Signature):
 class DepthTestUnit(wiring.Component):
     """Drops pixels behind what was drawn before: `DepthTest` is the bit-accurate model.
 
-    A pixel is taken in on each cycle, and leaves `latency` cycles later if it is drawn: 3, or 4 where the
-    memory is elsewhere, whose words go to a register first. Those of the last two or three cycles that stand
-    at the same place count though the memory does not have them yet. No multipliers.
+    The initiation interval is 1, the latency, `latency`, of a pixel that is drawn 3 cycles, or 4 with a
+    memory outside, whose words go through a register first. A pixel is also compared with those of the last
+    two or three cycles at the same place, which the memory does not have yet. No multipliers.
 
     Parameters
     ----------
     x_bits, y_bits : int
-        Bits of a place.
+        Bits of a column and of a scanline.
     size : (int, int) or None
-        Width and height of a memory of its own, at most 2^x_bits and 2^y_bits, cleared at power-up; ``None``:
-        there is a port ``memory``.
+        Width and height of a memory inside the unit, at most 2^x_bits and 2^y_bits, which is cleared at
+        power-up only; ``None``: the memory is outside, at the port ``memory``.
 
     Members
     -------
     i : :py:`In(stream.Signature(deep_pixel_shape(x_bits, y_bits)))`
         Pixels.
     o : :py:`Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits)))`
-        Those that are drawn.
+        Pixels that are drawn.
     status : :py:`Out(counters_shape("pixels", "hidden"))`
-        Pixels, and those of them that were dropped, since the reset.
+        Number of pixels, and number of those that were dropped, since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
-        Depths so far.
+        Depths so far; only if ``size`` is ``None``.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class DepthTestUnit(wiring.Component):
         missed = Signal(name="missed")
         m.d.comb += self.idle.eq(~(Cat(valid).any() | self.o.valid | missed))
 
-        # The sum has a sign, and a bit more than any step of a span can add.
+        # The sum has a sign, and more bits than a depth or a step has.
         first, total = Signal(name="first", init=1), Signal(37, name="total")
         step = Signal(FixedShape(DEPTH_STEP), name="step")
         begin = Value.cast(incoming.depth)
@@ -147,7 +147,7 @@ class DepthTestUnit(wiring.Component):
             there = Signal.like(port.read_data, name="there")
             with m.If(advance):
                 m.d.sync += there.eq(port.read_data)
-        # Compared before it is known which counts: the memory's word comes late.
+        # Compared before it is known which depth counts: the memory's word comes late.
         m.d.comb += [nearer.eq(judged.depth < there), drawn.eq(valid[last - 1] & nearer)]
         # Whether places are the same is known a cycle before.
         nexts = [judged, *(pixel for _, pixel in late[:-1])]
@@ -185,8 +185,8 @@ class DepthTestUnit(wiring.Component):
         return m
 
     def _remember(self, m: Module) -> None:
-        """A memory of the picture's size behind the port."""
-        # Turned round, so that a cleared memory is one of zeros.
+        """A memory of the picture's size at the port; it holds inverted depths."""
+        # Inverted, so that a cleared memory holds zeros.
         port, (width, height) = self._port, self.size
         m.submodules.depths = memory = Memory(shape=DEPTH.width, depth=width * height, init=[])
         read, write = memory.read_port(), memory.write_port()

@@ -24,14 +24,14 @@ def true_spans_shape() -> data.StructLayout:
 
 
 class EdgeNormalsUnit(wiring.Component):
-    """Normalises the ends and the middle of pieces in turns: `EdgeNormals` is the bit-accurate model.
+    """Normalises the ends and the middle of a piece one after the other: `EdgeNormals` is the model.
 
-    A piece of one pixel takes a cycle, of two pixels two, of more three; it leaves `latency` cycles after it
-    was taken in, and a cycle later for each further normal. Six multipliers, those of
-    `VectorNormaliserUnit`.
+    A piece of one pixel takes one cycle, of two pixels two, of more three: one for each normal. The span of
+    one pixel is offered `latency` cycles, 19, after its piece is taken in, and one cycle later for each
+    further normal. Six multipliers, those of `VectorNormaliserUnit`.
 
-    In the *compact* style a normal takes `COMPACT_INTERVAL` cycles, by two multipliers, and the span's words
-    stay in the FIFO until it is taken.
+    In the *compact* style a normal takes `COMPACT_INTERVAL` cycles and the latency is 32; three multipliers,
+    those of `SharedVectorNormaliserUnit`. The other words of a span stay in a FIFO until the span is taken.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class EdgeNormalsUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """A piece's vectors in turns; what is beside them waits in a FIFO; its normals are collected."""
+        """Sends a piece's vectors one by one; its other words wait in a FIFO; then collects its normals."""
         m = Module()
         m.submodules.normaliser = normaliser = self._normaliser
         rest_shape = _rest_shape()
@@ -88,7 +88,7 @@ class EdgeNormalsUnit(wiring.Component):
         return m
 
     def _send(self, m: Module, normaliser, rest) -> None:
-        """Left, right and middle vector of the piece in the register, as many as it needs."""
+        """Send the left, right and middle vector of the piece in the register, as many as it needs."""
         busy, turn, last = Signal(name="busy"), Signal(2, name="turn"), Signal(name="last_turn")
         piece, moves = Signal(self.i.payload.shape(), name="piece"), Signal(name="moves")
         middle = Signal(data.ArrayLayout(FixedShape(SPAN_NORMAL), 3), name="middle")
@@ -116,7 +116,7 @@ class EdgeNormalsUnit(wiring.Component):
                 m.d.sync += busy.eq(~last)
 
     def _collect(self, m: Module, normaliser, words, rest) -> Value:
-        """Normals as they come, a lost one replaced by the one before; whether one was, on this cycle."""
+        """Collect normals, with lost ones replaced; whether one is replaced on this cycle."""
         valid, result = Signal(name="valid"), Signal(self.o.payload.shape(), name="result")
         good = Signal(normal_shape(), name="good", init=_init())
         left, right = (Signal(normal_shape(), name=name) for name in ("left_normal", "right_normal"))
@@ -148,12 +148,12 @@ class EdgeNormalsUnit(wiring.Component):
         return moves & lost
 
     def _collect_in_place(self, m: Module, normaliser, words, rest) -> Value:
-        """The same where a span leaves from the registers of its normals, and its words from the FIFO."""
+        """The same without a register for the result: the other words of a span come from the FIFO itself."""
         valid, result = Signal(name="valid"), self.o.payload
         good = Signal(normal_shape(), name="good", init=_init())
         left, right = (Signal(normal_shape(), name=name) for name in ("left_normal", "right_normal"))
         turn, last, moves = Signal(2, name="turn"), Signal(name="last_normal"), Signal(name="takes")
-        # The words go on the cycle after the span.
+        # The FIFO moves on in the cycle after the span is taken.
         gone = Signal(name="gone")
         m.d.sync += gone.eq(self.o.valid & self.o.ready)
         lost = normaliser.o.payload.lost

@@ -14,14 +14,14 @@ from blysk.hdl.geometry.triangles import first_centre, tag_shape
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
 
 _DIVISORS = (0, "divisor"), (1, "triple")
-"""Names of a divisor and of three times it, with half the bits that they have more."""
+"""For k in 0 and 1 the name of a register: a divisor, and three times it with 2 k bits more."""
 
 ALONG_BITS = 9
-"""Bits of `Edges.along`, from 0 to 511: columns to the first centre are 2 only with a fraction."""
+"""Bits of `Edges.along`, 0 to 511: in `EdgeSetup` n is 2 only where b is over 0."""
 
 
 def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of what edges are made from: sorted corners, twice the area, and the tag."""
+    """Shape of the input of the edge setup: sorted corners, twice the area, and the tag."""
     coordinate = data.ArrayLayout(FixedShape(grid.coordinate), 3)
     return data.StructLayout(
         {"x": coordinate, "y": coordinate, "area": unsigned(2 * grid.bits)} | tag_shape()
@@ -29,7 +29,7 @@ def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
 
 
 def plane_corners_shape(grid: Grid = GRID) -> dict:
-    """Members that the attributes need of a triangle's corners: heights, area, and how the walk starts."""
+    """Members that the plane setup needs: heights, twice the area, and fraction and start of the walk."""
     return {
         "long_height": unsigned(grid.bits),
         "knee": unsigned(grid.bits),
@@ -41,7 +41,7 @@ def plane_corners_shape(grid: Grid = GRID) -> dict:
 
 
 def edges_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of `Edges.beats`, three edges each, with the tag, and what the attributes need."""
+    """Shape of `Edges.beats`, with the tag and the members of `plane_corners_shape`."""
 
     def three(shape):
         return data.ArrayLayout(shape, 3)
@@ -65,7 +65,7 @@ def edges_shape(grid: Grid = GRID) -> data.StructLayout:
 
 @dataclass(frozen=True)
 class _Ages:
-    """Ages at which the parts of an edge's division are loaded and read."""
+    """Stages of a beat (`PipelinedUnit.at`) at which an edge's division and start are loaded, and done."""
 
     divide: int
     start: int
@@ -73,11 +73,13 @@ class _Ages:
 
 
 class EdgeSetupUnit(PipelinedUnit):
-    """Quotients, remainders and starts of three edges: those of `EdgeSetup`, the bit-accurate model.
+    """Quotients, remainders and starts of three edges: `EdgeSetup` is the bit-accurate model.
 
-    Each edge takes a division of a difference of x by the height, non-restoring, then the products of the
-    start, bit by bit with the remainder. The long edge's division goes on to the fraction's 32 bits. With
-    three dividers the edges of a triangle go side by side, with one they take turns. No multipliers.
+    For each edge a non-restoring division of the difference in x by the height gives quotient and remainder;
+    then the start is summed up from them, bit by bit. The division of the long edge goes on for the 32 bits
+    of the fraction. Three dividers work on the edges of a triangle side by side; with one divider the edges
+    take turns. The latency, `latency`, is 32 cycles with three dividers of two bits, 50 with one of two bits
+    and 80 with one of one bit (1/256 pixel). No multipliers.
 
     Parameters
     ----------
@@ -88,22 +90,22 @@ class EdgeSetupUnit(PipelinedUnit):
     bits_per_cycle : int
         Quotient bits that a divider finds in a cycle: 1 or 2.
     initiation_interval : int or None
-        Cycles from a triangle to the next at the closest; ``None``: the least, `least_interval`, which is 16
-        for three dividers of two bits, 67 for one of one.
+        Least number of cycles from a triangle to the next. ``None``: the least possible, `least_interval`,
+        16 with three dividers of two bits, 37 with one of two bits, 67 with one of one bit (1/256 pixel).
     skid : bool
-        As `PipelinedUnit` has it.
+        As in `PipelinedUnit`.
 
     Raises
     ------
     ValueError
-        If a number is none of those, or the interval is too short.
+        If ``dividers`` or ``bits_per_cycle`` is another number, or the interval is too short.
 
     Members
     -------
     i : :py:`In(stream.Signature(edge_corners_shape(grid)))`
         Sorted corners.
     o : :py:`Out(stream.Signature(edges_shape(grid)))`
-        Edges, and what the attributes need.
+        Edges, and the words for the plane setup.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
@@ -144,13 +146,13 @@ class EdgeSetupUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """Differences, divisions, starts; what is found early is kept until the last is."""
+        """Differences, divisions, starts; early results are kept until the last one is found."""
         grid = self.grid
         result = Signal(self.o.payload.shape())
         x, y = ([Value.cast(operands[name][k]) for k in range(3)] for name in "xy")
 
         def keep(value, name, age):
-            # Taken at an age, stands for an interval; taken again as often as needed to stand at the last.
+            # A word stays for an interval from its age on; it is copied until it is there at the latency.
             register = value
             while True:
                 register = self.register(m, register, f"{name}_{age}", when=self.at(age))
@@ -190,7 +192,7 @@ class EdgeSetupUnit(PipelinedUnit):
         return result
 
     def _divide(self, m: Module, number: int, members: list[int], edges: list, result, keep) -> None:
-        """One divider with what follows it, for the edges that take turns at it."""
+        """One divider, and the start that follows it, for the edges that take turns at it."""
         grid, ages = self.grid, [self._ages[k] for k in members]
         bits = grid.bits
 
@@ -200,7 +202,7 @@ class EdgeSetupUnit(PipelinedUnit):
                 value = Mux(self.at(moment), other, value)
             return value
 
-        # The division: remainder from -d to d - 1, and the bits still to come, from below filled by quotient.
+        # A remainder from -d to d - 1, and a word: dividend bits to come, quotient bits found below them.
         load = [age.divide for age in ages]
         rest, word = Signal(signed(bits + 1), name=f"rest_{number}"), Signal(bits, name=f"word_{number}")
         negative = Signal(name=f"negative_{number}")
@@ -219,7 +221,7 @@ class EdgeSetupUnit(PipelinedUnit):
             after, quotient = self._steps(rest, word, divisor, triple)
             m.d.sync += [rest.eq(after), word.eq(quotient)]
 
-        # Its remainder put right; the start from it.
+        # The remainder is corrected; the start follows from it.
         corrected = Mux(rest < 0, rest + divisor, rest)[:bits]
         quotient = Cat(word, negative).as_signed()
         read = [age.start - 1 for age in ages]
@@ -234,7 +236,7 @@ class EdgeSetupUnit(PipelinedUnit):
             m.d.comb += result.fraction.eq(keep(fraction, "fraction", self._fraction_read))
 
     def _start(self, m, number, members, edges, division, result, keep) -> None:
-        """``b`` bit by bit, lowest first, and with it ``u``; then x and error."""
+        """``b`` and ``u`` of `EdgeSetup` bit by bit, lowest first; then x and error."""
         grid, (step, error_step, height) = self.grid, division
         ages = [self._ages[k] for k in members]
         load = [age.start for age in ages]
@@ -278,7 +280,7 @@ class EdgeSetupUnit(PipelinedUnit):
         under, over = carried < 0, less >= 0
         places = Mux(under, 0, Mux(over, 2, 1))
         error = Mux(under, more, Mux(over, less, carried))[: grid.bits]
-        # The column has another cycle.
+        # The column takes one cycle more.
         whole = self.register(m, ((begin >> s) + total)[:X_BITS], f"whole_{number}")
         column = (whole + self.register(m, places, f"places_{number}"))[:X_BITS].as_signed()
         along = ((places << s) - low).as_signed() << (8 - s)
@@ -299,7 +301,7 @@ class EdgeSetupUnit(PipelinedUnit):
                 m.d.comb += result.along.eq(along)
 
     def _fraction(self, m: Module, error_step: Value, height: Value, triple: Value) -> Value:
-        """The division goes on: ``floor(2^32 error_step / height)``."""
+        """The division of the long edge goes on: ``floor(2^32 error_step / height)``."""
         bits = self.grid.bits
         rest, word = (
             Signal(signed(bits + 1), name="fraction_rest"),
@@ -316,9 +318,10 @@ class EdgeSetupUnit(PipelinedUnit):
         return word
 
     def _steps(self, rest: Value, word: Value, divisor: Value, triple: Value) -> tuple[Value, Value]:
-        """Steps of a division: ``rest`` takes bits of ``word``, less or more the divisor by its sign.
+        """One or two steps of a division: ``rest`` takes in a bit of ``word``, minus or plus the divisor.
 
-        Of two steps the second is made for both signs of the first, with one or three times the divisor.
+        The sign of ``rest`` decides between minus and plus. The second step is computed for both signs of the
+        first one's result, from ``rest``, with one or three times the divisor. Returns ``rest`` and ``word``.
         """
         # Of a number without a sign a comparison with 0 would be constant.
         subtract = rest >= 0 if rest.shape().signed else Const(1)
@@ -326,7 +329,7 @@ class EdgeSetupUnit(PipelinedUnit):
         size = len(divisor) + 1
 
         def added(bits, less, more):
-            # One adder: the 1 of a subtraction comes in by a bit below.
+            # One adder: the 1 of a subtraction comes in through a bit below.
             number = Cat(bits, rest)[:size]
             less, more = (Cat(other, Const(0, 1))[:size] for other in (less, more))
             turned = Mux(subtract, ~less, more)
@@ -336,7 +339,7 @@ class EdgeSetupUnit(PipelinedUnit):
         positive = first >= 0
         if self.bits_per_cycle == 1:
             return first, Cat(positive, word[:-1])
-        # Less three times the divisor, or more the divisor; less it, or more three times.
+        # If the first result is not negative: minus 3 or plus 1 divisors; if it is: minus 1 or plus 3.
         down, up = added(word[-2:], triple, divisor), added(word[-2:], divisor, triple)
         second = Mux(positive, down, up).as_signed()
         return second, Cat(Mux(positive, down >= 0, up >= 0), positive, word[:-2])

@@ -51,9 +51,10 @@ def rows_shape() -> data.StructLayout:
 class EdgeWalkUnit(wiring.Component):
     """Two edges walked side by side, a scanline a cycle: those of `EdgeWalk`, the bit-accurate model.
 
-    A triangle of n scanlines taken in on one cycle gives them 2 cycles later and more on each of the n - 1
-    cycles after, unless the output waits; the next triangle is taken in on the cycle that leaves no gap.
-    Scanlines above the picture are walked, those below are not. No multipliers.
+    The first scanline of a triangle is offered `latency` cycles, 2, after the triangle is taken in, the
+    others on the cycles that follow, unless the output waits. Triangles follow each other without a gap: one
+    of n scanlines takes n cycles. Scanlines above the picture are walked, those below are not. No
+    multipliers.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ class EdgeWalkUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The long edge, the short one, and the lower one that waits; counters; a register for the result."""
+        """The long edge, the short edge, the lower edge that waits; counters; a register for the result."""
         m = Module()
         triangle, advance, load = self.i.payload, Signal(), Signal()
         active, last = Signal(name="active"), Signal(name="last_row", init=1)
@@ -101,7 +102,7 @@ class EdgeWalkUnit(wiring.Component):
                 skid_buffer(m, self.o, valid, row) if self._skid else stop_output(m, self.o, active, row)
             ),
             self.i.ready.eq(advance & last),
-            # What is not valid is not active.
+            # An input that is not valid leads to no active scanline.
             load.eq(self.i.ready),
         ]
 
@@ -111,7 +112,7 @@ class EdgeWalkUnit(wiring.Component):
         flat = triangle.flat
         short = self._edge(m, "short", last, [(flat, 2), (~flat, 1)], advance, low_is_next, lower)
 
-        # Scanlines of the triangle, and those down to the picture's border: what is first at its end.
+        # Scanlines left in the triangle, and left in the picture: the walk ends with the smaller number.
         total = (triangle.upper + triangle.lower - 2).as_signed()
         inside = self.constants.bottom - triangle.first - 2
         with m.If(advance):
@@ -136,7 +137,11 @@ class EdgeWalkUnit(wiring.Component):
         return m
 
     def _edge(self, m: Module, name: str, last, sources, advance, turns=None, lower=None):
-        """Registers of an edge: loaded after a triangle's last scanline, and stepped while ``advance``."""
+        """Registers of an edge: loaded while ``last``, else stepped with ``advance``.
+
+        ``sources`` are conditions, each with the index of the edge to load. On ``turns`` the registers take
+        the words of the edge ``lower``. An edge without ``advance`` is loaded, and not stepped.
+        """
         triangle, bits = self.i.payload, self.grid.bits
         edge = _Edge(name, bits)
         # The remainder is compared before it is reduced: both sums are there.

@@ -42,20 +42,20 @@ PORT_DESCRIPTIONS = {
 """Fields of a span, for the table in Verilog."""
 
 _SORTED = 17
-"""Triangles that wait for the edge setup, while others are dropped by the sort."""
+"""Triangles that the FIFO before the edge setup holds, while the sort drops others."""
 
 _SCALES = 4
-"""Triangles whose scales wait for their attributes."""
+"""Triangles whose scales the FIFO before the gradient setup holds."""
 
 _COMPACT_GRADIENT = 12
-"""Cycles from an attribute to the next in the compact style: as many as it has products."""
+"""Initiation interval of an attribute in the compact style: the number of its products."""
 
 _INSIDE_BITS = 10
-"""Bits of the difference of two counters: more than triangles are inside at most."""
+"""Bits of the counters of triangles: they count modulo more than the unit holds."""
 
 
 class _TriangleSetup(wiring.Component):
-    """From sorted triangles to what is walked and to planes: one of the lanes of `GeometryUnit`.
+    """From sorted triangles to edges for the walk and to planes: one of the lanes of `GeometryUnit`.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class _TriangleSetup(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The units, and what waits between them."""
+        """The units, and the FIFOs or registers between them."""
         m = Module()
         for name in ("serialiser", "edges", "planes", "gradients", "assembler"):
             m.submodules[name] = getattr(self, f"_{name}")
@@ -99,7 +99,7 @@ class _TriangleSetup(wiring.Component):
         for to in (edges.i.payload, serialiser.i.payload):
             m.d.comb += [to[name].eq(drawn.payload[name]) for name in to.shape().members]
 
-        # How many triangles are between their edges and their planes at most.
+        # Largest number of triangles whose edges wait for their planes.
         delay = planes.latency + self._gradients.latency + ATTRIBUTES * self._gradients.initiation_interval
         inside = delay // self.interval + 3
         corners, walks = _between("corners", planes.i), _between("walk", self.walks)
@@ -118,7 +118,7 @@ class _TriangleSetup(wiring.Component):
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
         connect_fifo(m, "waiting_attributes", serialiser.o, attributes, depth=ATTRIBUTES * ahead)
         if self._compact:
-            # The planes go on with the next triangle while the attributes of this one are set up.
+            # The plane setup goes on with the next triangle while the gradients of this one are computed.
             connect_register(m, "waiting_scale", planes.o, scales)
         else:
             connect_fifo(m, "waiting_scales", planes.o, scales, depth=_SCALES)
@@ -140,24 +140,27 @@ class _TriangleSetup(wiring.Component):
 
 
 class GeometryUnit(wiring.Component):
-    """Triangles to spans, up to one triangle each 16 cycles and one span a cycle: `Geometry` is the model.
+    """Triangles to spans, at most a triangle in 8 or 16 cycles and a span a cycle: `Geometry` is the model.
 
-    The units of the room in a row. Corners go to the edges and, one attribute after the other, to a FIFO,
-    where they meet the scales of their triangle; edges wait in a FIFO until their planes are there. In the
-    *compact* style one divider finds the quotients of all edges, attributes share a multiplier, and on the
-    way along the spans attributes take turns, as do the normals of a span; no FIFO is wider than one of them.
+    The units of this package in a row. The corners of a sorted triangle go to the edge setup and, one
+    attribute after the other, to a FIFO, where the attributes wait for the scales of their triangle. The
+    edges wait in a FIFO for the planes of their triangle. In the *compact* style one divider serves all edges
+    and one multiplier the gradients of all attributes; attributes take turns along the spans, too, and so do
+    the normals of a span. There only the attributes have a FIFO in the setup; other words wait in registers.
 
-    A triangle takes as long as the slowest of its units, while others work on its neighbours:
+    The units work on several triangles at the same time, and the slowest one sets the pace. A triangle takes:
 
-    - setup: `interval` cycles where it is drawn, 16 or compact 48, with two lanes half of that; 5 to 9 where
-      it is dropped by the sort;
-    - the walk: a cycle for a scanline without pixels in the picture;
-    - a span, or a piece of it, of p pixels: as many cycles as ``p - 1`` has bits, but at least 1 for 1 pixel,
-      2 for 2 pixels and 3 for more. Never more than it has pixels. In the compact style four for every two
-      of those bits, and for each scanline, and three for each normal.
+    - in the setup `interval` cycles if it is drawn: 16, compact 48, with two lanes half of that. A triangle
+      that the sort drops takes 4 to 9 cycles, compact 5 to 15 (`VertexSortUnit`);
+    - in the walk one cycle for each scanline without pixels in the picture;
+    - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits, but at least 1 for 1
+      pixel, 2 for 2 pixels and 3 for more (with ``lines`` at least 1): never more than it has pixels. For n
+      pixels cut off at the long edge it takes as many cycles more as n has bits. In the compact style it
+      takes four cycles for each scanline and for every two of those bits; at the same time the normals take
+      three cycles each.
 
-    The multipliers are `multipliers`: 10, in the compact style 5; without normals 4 and 2; a second lane
-    has 4, compact 2.
+    The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` 4 and 2. The second
+    lane adds 4, in the compact style 2.
 
     Parameters
     ----------
@@ -166,9 +169,10 @@ class GeometryUnit(wiring.Component):
     compact : bool
         The compact style.
     lines : bool
-        Spans keep the true line in place of unit normals: no span is cut, and none normalised.
+        Whether spans have their true line, N/W at both ends, in place of unit normals; then no span is cut
+        into pieces, and no normal is normalised.
     setups : int
-        Lanes from the edges to the planes that triangles take in turns, 1 or 2.
+        Number of lanes, from the edges to the planes, that triangles take in turns: 1 or 2.
 
     Raises
     ------
@@ -180,16 +184,16 @@ class GeometryUnit(wiring.Component):
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
-        Their spans; of lines in `line_spans_shape`.
+        Their spans; with ``lines`` of `line_spans_shape`.
     constants : :py:`In(frame_shape())`
         The frame; stays while triangles are inside.
     status : :py:`Out(counters_shape(*COUNTERS))`
-        What was counted since the reset.
+        Counters since the reset.
 
     Attributes
     ----------
     idle : Signal
-        No triangle is inside, nor any of its spans. Rises a cycle after the last left.
+        No triangle and no span is inside. Rises one cycle after the last one left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -220,7 +224,7 @@ class GeometryUnit(wiring.Component):
         self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
-        """The units, what waits between them, and the counters."""
+        """The units, the FIFOs between them, and the counters."""
         m = Module()
         for name in ("sort", "attributes", "walk", "clip", "normals"):
             m.submodules[name] = getattr(self, f"_{name}")
@@ -240,7 +244,7 @@ class GeometryUnit(wiring.Component):
         return m
 
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
-        """From the sort, through the lanes in turns, to what is walked and to planes."""
+        """From the sort, through the lanes in turns, to edges for the walk and to planes."""
         drawn = _between("drawn", self._sort.o)
         if self.compact:
             connect(m, self._sort.o, drawn)
@@ -269,7 +273,7 @@ class GeometryUnit(wiring.Component):
         return tuple(merged)
 
     def _walk_planes(self, m: Module, planes: stream.Interface) -> None:
-        """Scanlines meet their planes: the first of a triangle waits for them, the others do not."""
+        """Scanlines and planes to the span attributes: a triangle's first scanline waits for its planes."""
         rows, to = self._clip.o, self._attributes.i
         first, ends = Signal(name="first", init=1), 1
         if self.compact:
@@ -309,7 +313,7 @@ class GeometryUnit(wiring.Component):
         )
 
     def _count(self, m: Module) -> None:
-        """Counters of the units; those that two have are added."""
+        """Counters of the units; a counter that two units have is their sum."""
         sliver = Signal(unsigned(len(self.status.sliver)), name="slivers")
         m.d.sync += sliver.eq(sliver + sum(lane.sliver for lane in self._lanes))
         sort, attributes = self._sort.status, self._attributes.status
@@ -324,12 +328,12 @@ class GeometryUnit(wiring.Component):
 
 
 def _between(name: str, port: stream.Interface) -> stream.Interface:
-    """A stream of the shape of a unit's, between two of them."""
+    """A stream between two units, with the payload shape of ``port``."""
     return stream.Signature(port.payload.shape()).create(path=(name,))
 
 
 def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int = 1) -> Signal:
-    """Whose turn it is, the next one's when so many payloads, a power of two of them, have gone."""
+    """Index of the lane whose turn it is; the next one's after ``each`` payloads, a power of two."""
     passed = Signal(range(count * each), name=f"turn_of_{name}")
     with m.If(moving.valid & moving.ready):
         m.d.sync += passed.eq(passed + 1)
@@ -337,7 +341,7 @@ def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int
 
 
 def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: stream.Interface) -> None:
-    """Both take a payload, on the same cycle; what they take of it is not connected here."""
+    """Two streams take a payload on the same cycle; its fields are connected by the caller."""
     m.d.comb += [
         first.valid.eq(source.valid & second.ready),
         second.valid.eq(source.valid & first.ready),

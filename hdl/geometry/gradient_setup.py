@@ -16,10 +16,10 @@ from blysk.hdl.geometry.wide_product import three_products, wide_product
 __all__ = ["LEAST_BITS", "GradientSetupUnit", "attribute_shape", "gradient_shape"]
 
 LEAST_BITS = 12
-"""Bits of the bound of `PlaneAssembler.least`."""
+"""Bits of the bound `AttributeSerialiser.least`."""
 
 _ROUND = 1
-"""Bits that a shifted word has more, to be rounded."""
+"""Further bits of a shifted word, for its rounding."""
 
 
 def attribute_shape() -> data.StructLayout:
@@ -37,17 +37,17 @@ def gradient_shape() -> data.StructLayout:
 
 
 class GradientSetupUnit(PipelinedUnit):
-    """Start and steps of an attribute: those of `GradientSetup`, the bit-accurate model.
+    """Start and steps of an attribute: `GradientSetup` is the bit-accurate model.
 
     The twelve multiplications of an attribute take turns at ``ceil(12 / I)`` multipliers of 18x18 bits, I
     the initiation interval: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter; the sum of
     the start takes four turns at an adder, two bits of both factors a turn. The latency, `latency`, follows
-    from the turns.
+    from the schedule: 40 cycles for an interval of 4, 52 for 12.
 
     Parameters
     ----------
     initiation_interval : int
-        Cycles from an attribute to the next at the closest, at least 4.
+        Least number of cycles from an attribute to the next, at least 4.
 
     Raises
     ------
@@ -112,7 +112,7 @@ class GradientSetupUnit(PipelinedUnit):
         high, crossed = three_products(g, "part", f, inward, p.FRACTION_LOW, p.PRODUCT_LOW, 40)
         part = g.register("part", lambda a, b: (a + b).wrap(SQ(2, 40)), high, crossed)
 
-        # The others wait for the last: what they are made of is narrower.
+        # The other two are shifted after this one: their operands are narrower, and cheaper to keep.
         shifter = self._shifter()
         part = g.use(shifter, "part_shifted", (part, column_shift), self._to_shift)
         row, step = (
@@ -142,7 +142,7 @@ class GradientSetupUnit(PipelinedUnit):
         }
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last words."""
+        """The graph, read at the stage of its last words."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")
         for name, word in self._results.items():

@@ -12,9 +12,10 @@ __all__ = ["HalfwayVectorUnit"]
 
 
 class HalfwayVectorUnit(wiring.Component):
-    """Half-way vectors by sum and normaliser: those of `HalfwayVector`, the bit-accurate model.
+    """Half-way vectors by a sum and a normaliser: `HalfwayVector` is the bit-accurate model.
 
-    The latency is that of `VectorNormaliserUnit`, whose six multipliers are all, the initiation interval 1.
+    Latency, `latency`, and initiation interval are those of `VectorNormaliserUnit`, 17 cycles and 1. It has
+    the only multipliers, six.
 
     Parameters
     ----------
@@ -24,9 +25,9 @@ class HalfwayVectorUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"light": ..., "viewer": ...})))`
-        Unit vectors L and V.
+        Unit vectors L and V, ``SQ(1, 17)``.
     o : :py:`Out(stream.Signature(StructLayout({"halfway": ..., "opposite": 1})))`
-        H; ``opposite``: L and V are, and H is 0.
+        H, ``SQ(1, 17)``; ``opposite``: L and V are opposite, and H is 0.
 
     Source: docs/theory/geometry.md#half-way-vector; [T] figure 4.10.
     """
@@ -40,7 +41,7 @@ class HalfwayVectorUnit(wiring.Component):
         super().__init__({"i": In(stream.Signature(given)), "o": Out(stream.Signature(made))})
 
     def elaborate(self, platform):
-        """The sum, half of which is its bits with another point; zeros in place of what is lost."""
+        """The sum; half of it has the same bits, with another binary point. H is 0 if the sum is lost."""
         m = Module()
         m.submodules.normaliser = normaliser = self._normaliser
         vector, normal = normaliser.i.payload.vector, normaliser.o.payload.normal

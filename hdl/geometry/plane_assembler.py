@@ -38,13 +38,13 @@ def plane_shape() -> data.StructLayout:
 class PlaneAssemblerUnit(wiring.Component):
     """Collects four gradients, and finds ``piece``: `PlaneAssembler` is the bit-accurate model.
 
-    With the first gradient the product of bound and limit begins, two bits of the limit a cycle; after the
-    third ``piece`` is searched for, a bit a cycle. If gradients are at least 4 cycles apart a triangle is
-    offered 3 cycles after its fourth one at the earliest, and the next one's first is taken in from the cycle
-    after that on; so one each four cycles never waits. No multipliers. Where spans are not cut there is
-    neither product nor search.
+    With the first gradient of a triangle the product of bound and limit begins, two bits of the limit a
+    cycle; after the third gradient the search for ``piece`` begins, one bit a cycle. If gradients are at
+    least 4 cycles apart, a triangle is offered 3 cycles after its fourth gradient was taken in, and the first
+    gradient of the next triangle can be taken in on the cycle after that: gradients that come every four
+    cycles never wait. If spans are not cut, there is neither product nor search. No multipliers.
 
-    *Serial*, it offers the attributes of a triangle one after the other.
+    In the *serial* form the attributes of a triangle are offered one after the other.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class PlaneAssemblerUnit(wiring.Component):
     i : :py:`In(stream.Signature(gradient_shape()))`
         Gradients of N/W by component, then of the depth.
     o : :py:`Out(stream.Signature(planes_shape()))`
-        Triangles; serial their attributes, in `plane_shape`.
+        Planes of triangles; if ``serial``, of one attribute at a time, in `plane_shape`.
     constants : :py:`In(frame_shape())`
         The frame, of which ``limit`` is read; stays while triangles are inside.
 
@@ -114,7 +114,7 @@ class PlaneAssemblerUnit(wiring.Component):
         return m
 
     def _allowed(self, m: Module, begins: Value, least: Value) -> tuple[Signal, Value]:
-        """Bound times limit, and whether it is there."""
+        """Bound times limit, two bits of the limit a cycle; and whether the product is finished."""
         bits = AttributeSerialiser.BITS + LIMIT_BITS
         allowed, factor = Signal(bits, name="allowed"), Signal(AttributeSerialiser.BITS, name="factor")
         rest, left = Signal(LIMIT_BITS, name="rest"), Signal(range(LIMIT_BITS // 2 + 1), name="left")
@@ -132,7 +132,7 @@ class PlaneAssemblerUnit(wiring.Component):
 
     @staticmethod
     def _search(m: Module, accept, count, size, allowed, multiplied, piece) -> Signal:
-        """The largest exponent, from its first bit on; whether it is found."""
+        """The largest exponent that fits, its first bit first; returns whether it is found."""
         bits = GradientSetup.SIZE_BITS
         largest, total = Signal(bits, name="largest"), Signal(bits + 2, name="total")
         norm, step = Signal(max(bits + 2, len(allowed)), name="norm"), Signal(3, name="search_step")
@@ -153,10 +153,10 @@ class PlaneAssemblerUnit(wiring.Component):
         with m.If(step == 1):
             m.d.sync += [norm.eq(largest + total), exponent.eq(0)]
         with m.Elif(step != 0):
-            # By 8, 4, 2 and 1 places: the exponent takes the answers in, its first bit first.
+            # By 8, 4, 2 and 1 places: the answers are the bits of the exponent, the first bit first.
             turn = (step - 2)[:2]
             more = Mux(turn[1], Mux(turn[0], norm << 1, norm << 2), Mux(turn[0], norm << 4, norm << 8))
-            # By a carry: of a comparison the mapper makes look-up tables.
+            # A subtraction, for its carry chain: the mapper makes look-up tables of a comparison.
             fits = ~(allowed - more)[-1]
             m.d.sync += exponent.eq(Cat(fits, exponent))
             with m.If(fits):

@@ -17,7 +17,7 @@ __all__ = ["PlaneSetupUnit", "scales_shape"]
 
 
 def scales_shape() -> dict:
-    """Members of `PlaneScales.beats` that the attributes are made with."""
+    """Members of `PlaneScales.beats` that the gradient setup needs: all but ``sliver``."""
     walk = {
         name: shape for name, shape in plane_corners_shape().items() if name in ("fraction", "down", "along")
     }
@@ -33,25 +33,31 @@ def scales_shape() -> dict:
 
 
 class PlaneSetupUnit(PipelinedUnit):
-    """``1/D``, ``1/W`` and their exponents: those of `PlaneSetup`, the bit-accurate model.
+    """``1/D`` and ``1/W`` as mantissas and exponents: `PlaneSetup` is the bit-accurate model.
 
-    A shared shifter finds the first bits of height and area, a shared table starts both reciprocals, and
-    the seven multiplications take turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation
-    interval. The latency, `latency`, follows from the turns.
+    One shifter normalises height and area, one table serves both reciprocals, and the seven multiplications
+    take turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency,
+    `latency`, follows from the schedule: 26 cycles for an interval of 16.
 
     Parameters
     ----------
     grid : Grid
         Fraction bits of the coordinates.
     initiation_interval : int
-        Cycles from a triangle to the next at the closest, at least 1; not more than the latency count.
+        Least number of cycles from a triangle to the next, at least 1; a number larger than the latency
+        counts as the latency.
     skid : bool
-        As `PipelinedUnit` has it.
+        As in `PipelinedUnit`.
+
+    Raises
+    ------
+    ValueError
+        If the interval is less than 1.
 
     Members
     -------
     i : :py:`In(stream.Signature(plane_corners_shape(grid) with right))`
-        Heights, area, and what goes on as it is.
+        Heights, area, and words that pass unchanged.
     o : :py:`Out(stream.Signature(scales_shape() with sliver))`
         Scales.
 
@@ -86,7 +92,7 @@ class PlaneSetupUnit(PipelinedUnit):
             name: g.input(name, lambda o, name=name: o[name]) for name in ("fraction", "down", "along")
         }
 
-        # A word to its first 1, and the places it moved by: bytes with a 1, whole bytes, the rest.
+        # A word shifted left to its first 1, and the places: bytes that have a 1; whole bytes; the rest.
         def normalise(register, word):
             used = register(Cat(byte.any() for byte in _bytes(word)), "used")
             word = register(word, "given")
@@ -103,11 +109,11 @@ class PlaneSetupUnit(PipelinedUnit):
         shifter = g.share("shifter", (unsigned(bits),), 3, normalise)
         top = g.use(shifter, "height_moved", (height,), lambda h: (Cat(Const(0, grid.bits), h),))
         wide = g.use(shifter, "area_moved", (area,), lambda a: (a,))
-        # Both stand for one cycle, and are needed for longer.
+        # The shifter holds its results for one cycle; they are needed for longer.
         top, wide = (g.register(f"{w.name}_kept", lambda v: v, w) for w in (top, wide))
 
         def mantissa(view):
-            # The first bits of a word, as many as the format has.
+            # As many of the first bits of a word as the format has.
             return FixedValue(Reciprocal.FORMAT, _resized(view.word, bits, point + 1))
 
         d = g.wire("mantissa", mantissa, top)
@@ -163,7 +169,7 @@ class PlaneSetupUnit(PipelinedUnit):
         }
 
     def datapath(self, m: Module, operands):
-        """The graph, read at the age of its last words."""
+        """The graph, read at the stage of its last words."""
         self._module = m
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")
@@ -177,11 +183,11 @@ def _bytes(word: Value) -> list[Value]:
 
 
 def _move(word: Value, step: int, moved: list) -> tuple[Value, list]:
-    """Left by so many places if as many first bits are 0."""
+    """Left by ``step`` places if the first ``step`` bits are 0; ``moved`` takes in whether they are."""
     empty = ~word[-step:].any()
     return Mux(empty, (word << step)[: len(word)], word), [*moved, empty]
 
 
 def _resized(code: Value, bits: int, wanted: int) -> Value:
-    """First bits of a word, or the word with zeros behind it."""
+    """First ``wanted`` bits of a word of ``bits`` bits, with zeros behind it if it is too short."""
     return code[bits - wanted : bits] if bits >= wanted else Cat(Const(0, wanted - bits), code)

@@ -20,14 +20,19 @@ def _row_shape() -> data.StructLayout:
 
 
 def shared_table(graph: Dataflow, module: Callable[[], Module]) -> FunctionalUnit:
-    """The table of `Reciprocal`.
+    """The table of `Reciprocal` as a functional unit: 256 rows, two cycles.
 
     Parameters
     ----------
     graph : Dataflow
-        Graph that gets it.
+        Graph that gets the table.
     module : callable
-        The module that gets the table, when it is made.
+        Returns the module that gets the table's memory; called when the hardware is built.
+
+    Returns
+    -------
+    FunctionalUnit
+        Takes a segment, gives a row with ``c0``, ``c1`` and ``c2``.
     """
 
     def make(register, address):
@@ -44,7 +49,24 @@ def shared_table(graph: Dataflow, module: Callable[[], Module]) -> FunctionalUni
 
 
 def reciprocal_word(graph: Dataflow, table: FunctionalUnit, name: str, x: Word) -> Word:
-    """The word of `Reciprocal.compute`, of a word UQ(1, 25) with a first bit of 1: two multiplications."""
+    """The word of `Reciprocal.compute`, by one use of the table and two multiplications.
+
+    Parameters
+    ----------
+    graph : Dataflow
+        Graph that gets the words.
+    table : FunctionalUnit
+        From `shared_table`.
+    name : str
+        Name of the result.
+    x : Word
+        Operand, UQ(1, 25), from 1 on.
+
+    Returns
+    -------
+    Word
+        ``1/x``, UQ(1, 25).
+    """
     p, bits = Reciprocal, Reciprocal.OFFSET_FORMAT.width
 
     def offset(value):

@@ -13,7 +13,7 @@ __all__ = ["LineAdapterUnit", "connect_shading_span", "line_spans_shape"]
 
 
 def line_spans_shape() -> data.StructLayout:
-    """Shape of a span with the ends of its true line, in ``SQ(1, 22)``, and what a piece has beside them."""
+    """Shape of a span: the ends of its true line, ``SQ(1, 22)``, and `span_words_shape` without ``flip``."""
     end = data.ArrayLayout(FixedShape(LineAdapter.FORMAT), 3)
     words = {name: shape for name, shape in span_words_shape().items() if name != "flip"}
     return data.StructLayout({"normal_left": end, "normal_right": end} | words)
@@ -22,8 +22,8 @@ def line_spans_shape() -> data.StructLayout:
 class LineAdapterUnit(PipelinedUnit):
     """Ends of true lines for a method that takes them: `LineAdapter` is the bit-accurate model.
 
-    The latency is 3: the bits that are used; the shift and the sign; the rounding. The initiation interval is
-    1. No multipliers.
+    The latency is 3 cycles (the bits that are used; the shift; sign and rounding), the initiation interval 1.
+    No multipliers.
 
     Members
     -------
@@ -62,7 +62,7 @@ class LineAdapterUnit(PipelinedUnit):
         m.d.comb += [Value.cast(result[name]).eq(word) for name, word in words.items()]
         cut, most = bits - p.FORMAT.fraction_bits, p.FORMAT.max_code
         for k, code in enumerate(codes):
-            # The sign's other 1 is the lowest bit's, together with the half step of the rounding.
+            # The 1 that completes the negation is added together with the half step of the rounding.
             turned = (code[:] ^ flip.replicate(bits + 1)).as_signed() + flip + (1 << (cut - 1))
             rounded = turned >> cut
             clipped = Mux(rounded > most, most, Mux(rounded < -most, -most, rounded))
@@ -75,8 +75,8 @@ class LineAdapterUnit(PipelinedUnit):
 def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
     """Wire a span of geometry to a span of the shading pipeline: `shading_spans` in hardware.
 
-    Coordinates, lengths and materials lose the first bits that the pipeline does not have, as the picture is
-    no larger.
+    Coordinates, lengths and materials are cut to the pipeline's widths, which hold them in any of its
+    pictures.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
     Raises
     ------
     TypeError
-        If normals have another format on the other side.
+        If a normal has different formats in the two spans.
     """
     given = span.shape().members
     for name, shape in shaded.shape().members.items():

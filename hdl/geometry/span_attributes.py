@@ -22,9 +22,9 @@ _WORDS = ("start", "short", "long", "inward")
 
 
 def planes_rows_shape(serial: bool = False) -> data.StructLayout:
-    """Shape of a scanline with its triangle's planes, which are read with the triangle's first.
+    """Shape of a scanline with its triangle's planes, which are read with the triangle's first scanline.
 
-    *Serial*: with one of the planes; the scanline comes once for each.
+    With ``serial`` the shape has the plane of one attribute, and a scanline comes once for each attribute.
     """
     planes = plane_shape() if serial else planes_shape()
     return data.StructLayout({"planes": planes, "row": clipped_rows_shape()})
@@ -49,28 +49,29 @@ class SpanAttributesUnit(wiring.Component):
 
     A scanline without pixels takes a cycle. One with pixels takes, for every piece of p pixels, as many
     cycles as ``p - 1`` has bits, at least one; and for n pixels cut off at the long edge as many as n has
-    bits. So a piece never takes more cycles than it has pixels. A span of one piece of one or two pixels is
-    offered `latency` cycles after its scanline was taken in. No multipliers: additions of shifted steps,
-    modulo 4.
+    bits. So a piece never takes more cycles than it has pixels. A span of one or two pixels, in
+    one piece and with no pixel cut off at the long edge, is offered `latency` cycles, 3, after its scanline
+    was taken in. No multipliers: additions of shifted steps, modulo 4.
 
-    *Serial*, one attribute after the other goes through the same adders, and its words through rings of
-    registers: a scanline takes four cycles, and so does a piece for every two bits of its pixels and of those
-    cut off, or one more if the piece before it has not gone. A scanline is given four times, each time with
-    another attribute's plane.
+    In the *serial* form one attribute after the other goes through the same adders, and its words through
+    rings of registers. A scanline comes four times, each time with another attribute's plane. It takes four
+    cycles without pixels, and else four cycles for every two bits of the numbers above; `latency` is 6, from
+    the fourth time on. A piece also waits until the piece before it has been taken.
 
     Parameters
     ----------
     serial : bool
-        Whether attributes take turns.
+        Whether the attributes of a scanline come and are computed one after the other.
 
     Members
     -------
     i : :py:`In(stream.Signature(planes_rows_shape(serial)))`
-        Scanlines; the planes are read with a triangle's first one, which follows another's last.
+        Scanlines. The planes are read with the first scanline of a triangle: the first of all, or the one
+        after a scanline with ``last``.
     o : :py:`Out(stream.Signature(pieces_shape()))`
         Pieces.
     status : :py:`Out(counters_shape("empty", "cut"))`
-        Triangles without a span, and spans of more than one piece, since the reset.
+        Number of triangles without a span, and of spans of more than one piece, since the reset.
 
     Attributes
     ----------
@@ -110,7 +111,7 @@ class SpanAttributesUnit(wiring.Component):
             with m.If(first):
                 m.d.sync += [mask.eq(most), along.single.eq(planes.piece == 0)]
                 if self.serial:
-                    # The last of a whole piece's steps is of one bit, or of two.
+                    # The last step of a whole piece takes one bit or two.
                     m.d.sync += along.double.eq(~planes.piece[0] & (planes.piece != 0))
         count = 1 if self.serial else ATTRIBUTES
         found = Signal(self._found_shape(count), name="found")
@@ -131,7 +132,7 @@ class SpanAttributesUnit(wiring.Component):
             Signal(name="result_valid"),
         )
         if self.serial:
-            # The result is made anew by what is found, and must have gone by then.
+            # The words that are found replace the result, which must have been taken by then.
             m.d.comb += [self.o.valid.eq(result_valid), self.o.payload.eq(result)]
             stands = Mux(result_valid, ~self.o.ready, valid & found.ends)
             m.d.comb += pace.advances.eq(Mux(pace.advance, ~(stands & along.gives), self.o.ready))
@@ -187,7 +188,7 @@ class SpanAttributesUnit(wiring.Component):
         return base, inward.value
 
     def _convert(self, m: Module, valid: Signal, found, result) -> None:
-        """Left and right from near and far; components cut, the depth moved, all saturated."""
+        """Left and right end from near and far end; components cut, depth made unsigned, all saturated."""
         right, components = found.tag.right, ATTRIBUTES - 1
         for k in range(len(found.near)):
             near, far = (
@@ -221,18 +222,18 @@ class SpanAttributesUnit(wiring.Component):
 
 
 class _Pace:
-    """When the walk goes on, and which attribute's turn it is: all on one cycle, or *serial* on four.
+    """Control of the attributes' turns: all attributes on one cycle, or *serial* one a cycle, four in all.
 
-    What is done with the attributes in turns is settled with the first one, and the control moves on with the
-    last one, `ends`.
+    In the serial form the first attribute decides whether a scanline comes in, for all four, and the control
+    of the walk moves on with the last one, `ends`.
     """
 
     def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool):
         self.serial, self.given = serial, rows.valid
         self.advance, self.leaves = Signal(name="advance", init=serial), Signal(name="would_leave")
         self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
-        # Whether a scanline comes in, of each attribute if there is a step; then, whether the control moves
-        # on, has taken a scanline, and one with pixels.
+        # ``accepts``: a scanline comes in, on a step of each attribute; ``goes``: the control moves on;
+        # ``takes``: it takes a scanline; ``loads``: it takes one with pixels.
         self.accepts, self.goes, self.takes = (Signal(name=name) for name in ("accepts", "goes", "takes"))
         self.loads, covered = Signal(name="loads_walk"), rows.payload.row.covered
         opens = ~busy | self.leaves
@@ -273,7 +274,7 @@ class _Pace:
 
 
 class _Kept:
-    """A word of an attribute; *serial* of all of them, in a ring that turns with every step.
+    """A register of one attribute; *serial* a ring with a word of each attribute, moved on by every step.
 
     Of a *late* word what it becomes is chosen a step later, from `_Pace.late`, on its way round the ring.
     """
@@ -292,15 +293,15 @@ class _Kept:
                 ]
 
     def becomes(self, m: Module, value: ValueLike) -> None:
-        """Take another value; until then it stands."""
+        """Replace the word; a word that is not replaced stays."""
         m.d[self._domain] += self._next.eq(value)
 
 
 class _Along:
-    """Control of the walk along a scanline: pixels to skip, then pieces, a bit of each number a cycle."""
+    """Control of the walk along a scanline: first pixels to skip, then pieces, one or two bits a step."""
 
     def __init__(self, m: Module, row, tag, most: Value, mask: Signal, loads: Signal, busy: Signal, pace):
-        # What is left of the span less one pixel, of which a piece takes part; bits of the walk.
+        # ``left``: pixels of the span that are left, less one; ``bits``: bits of a number still to be walked.
         left, bits = Signal(PIXEL_BITS, name="left"), Signal(PIXEL_BITS, name="bits")
         self.pixels, begin = Signal(PIXEL_BITS, name="pixels"), Signal(PIXEL_BITS, name="begin")
         self.pace = pace
@@ -316,12 +317,12 @@ class _Along:
             self.gives.eq(busy & self.ends & ~self.skipping),
             self.emits.eq(self.gives & pace.advance & pace.steps),
         ]
-        # A piece that is whole and not the last has a pixel more than the mask.
+        # A whole piece that is not the last takes one pixel more than the mask: minus mask, minus 1.
         after = (left + ~mask)[:PIXEL_BITS]
         count = row.length - 1
         if pace.serial:
-            # The scanline comes three times before it is taken, and a step takes four cycles: each of the
-            # numbers that follow from it has one.
+            # The scanline is there for three cycles before it is taken, and a step takes four cycles: the
+            # numbers that follow from both are computed one a cycle, with registers between them.
             def kept(value, name):
                 register = Signal.like(value, name=name)
                 m.d.sync += register.eq(value)
@@ -384,7 +385,7 @@ class _Along:
         self.x = Mux(tag.right, begin + left - self.pixels, begin)[:PIXEL_BITS]
 
     def values(self, m: Module, name: str, loads, base, inward, kept) -> tuple[Value, Value]:
-        """Values of an attribute at the piece's ends; ``inward`` is its step, once loaded ``kept``."""
+        """Values of an attribute at the piece's ends; its step is ``inward`` on loading, ``kept`` later."""
         # Behind a register, as the sums are as long as a cycle.
         nears, totals = (_Kept(m, f"{name}_{word}", self.pace, late=True) for word in ("near", "total"))
         steps = _Kept(m, f"{name}_step", self.pace)
@@ -429,11 +430,11 @@ def _code(value) -> Value:
 
 
 def _mask(piece: Value) -> Value:
-    """Pixels of a whole piece less one."""
+    """Pixels of a whole piece, less one: ``2^piece - 1``."""
     return Cat(piece > k for k in range(PIXEL_BITS))
 
 
 def _piece(left: Value, mask: Value) -> tuple[Value, Value]:
-    """Pixels of the next piece less one, and whether others follow it."""
+    """Pixels of the next piece, less one, and whether another piece follows it."""
     more = (left & ~mask).any()
     return Mux(more, mask, left), more

@@ -12,21 +12,21 @@ __all__ = ["SpanClipUnit", "clipped_rows_shape"]
 
 
 def clipped_rows_shape() -> data.StructLayout:
-    """Shape of `ClippedRows.beats`: pixels of a scanline in the picture, what is cut off, and whether any."""
+    """Shape of `ClippedRows.beats`: a scanline's pixels in the picture and pixels cut off, flags, the tag."""
     words = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length", "skip")}
     flags = {name: unsigned(1) for name in ("covered", "skips", "carry", "last")}
     return data.StructLayout(words | flags | tag_shape())
 
 
 class SpanClipUnit(PipelinedUnit):
-    """Scanlines cut to the picture: those of `SpanClip`, the bit-accurate model.
+    """Scanlines cut to the picture: `SpanClip` is the bit-accurate model.
 
     The latency is 2 cycles (borders, differences) and the initiation interval is 1. No multipliers.
 
     Parameters
     ----------
     skid : bool
-        As `PipelinedUnit` has it.
+        As in `PipelinedUnit`.
 
     Members
     -------
@@ -44,7 +44,7 @@ class SpanClipUnit(PipelinedUnit):
         super().__init__(rows_shape(), clipped_rows_shape(), latency=2, constants=frame_shape(), skid=skid)
 
     def datapath(self, m, operands):
-        """Borders first, then what is between them."""
+        """First the borders, then the pixels between them."""
         frame, result = self.constants, Signal(self.o.payload.shape(), name="result")
         first, last = operands.begin < frame.left, operands.end > frame.right
         begin = self.register(m, Mux(first, frame.left, operands.begin), "begin")
@@ -55,7 +55,7 @@ class SpanClipUnit(PipelinedUnit):
             Mux(first, frame.left - operands.begin, 0),
         )
         cut = self.register(m, cut[:PIXEL_BITS], "cut")
-        # The first column against the right border too: outside of it nothing is covered.
+        # Both columns also against the opposite borders: a scanline beside the picture has no pixel.
         inside = (operands.y >= frame.top) & (operands.end > frame.left) & (operands.begin < frame.right)
         inside = self.register(m, inside, "inside")
         y = self.register(m, (operands.y - frame.top)[:PIXEL_BITS], "line")

@@ -1,4 +1,4 @@
-"""Shapes of triangles, of what stays during a frame, and of counters."""
+"""Shapes of triangles, of the settings of a frame, and of counters."""
 
 from amaranth.hdl import Module, Signal, Value, ValueLike, signed, unsigned
 from amaranth.lib import data
@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 COUNTER_BITS = 32
-"""Bits of a counter; after so many it starts from 0 again."""
+"""Bits of a counter, which counts modulo 2^32."""
 
 
 def corners_shape(grid: Grid = GRID) -> dict:
@@ -48,7 +48,7 @@ def triangle_shape(grid: Grid = GRID) -> data.StructLayout:
 
 
 def tag_shape() -> dict:
-    """Members that go with a triangle to its spans: long edge on the right, normals negated, material."""
+    """Members that go with a triangle to its scanlines: long edge on the right, normals negated, material."""
     return {"right": unsigned(1), "flip": unsigned(1), "material": unsigned(MATERIAL_BITS)}
 
 
@@ -64,7 +64,7 @@ def counters_shape(*names: str) -> data.StructLayout:
 
 
 def count_events(m: Module, counters: data.View, **events: ValueLike) -> None:
-    """Count the cycles on which each event is 1, in registers behind a member ``status``."""
+    """Count the cycles on which each event is 1, in registers that drive the fields of ``counters``."""
     for name, event in events.items():
         count = Signal(COUNTER_BITS, name=f"count_{name}")
         with m.If(event):
@@ -73,6 +73,6 @@ def count_events(m: Module, counters: data.View, **events: ValueLike) -> None:
 
 
 def first_centre(code: Value, grid: Grid) -> Value:
-    """First pixel whose centre is not before a coordinate, `X_BITS` signed: `Grid.first_centre`."""
+    """First column or scanline whose centre is not before a coordinate, signed: `Grid.first_centre`."""
     code = Value.cast(code)
     return (code + (grid.half - 1))[grid.subpixel_bits :].as_signed()

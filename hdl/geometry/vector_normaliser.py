@@ -21,7 +21,7 @@ __all__ = ["SharedVectorNormaliserUnit", "VectorNormaliserUnit", "vectors_shape"
 
 
 def vectors_shape(parameters: VectorNormaliser) -> tuple[data.StructLayout, data.StructLayout]:
-    """Shapes of a vector with whether its unit vector is negated, and of a normal with whether it is lost."""
+    """Shapes of a vector with the flag ``flip``, and of a unit vector with the flag ``lost``."""
     vector = data.ArrayLayout(FixedShape(parameters.format), 3)
     return (
         data.StructLayout({"vector": vector, "flip": unsigned(1)}),
@@ -30,12 +30,12 @@ def vectors_shape(parameters: VectorNormaliser) -> tuple[data.StructLayout, data
 
 
 class VectorNormaliserUnit(PipelinedUnit):
-    """Unit vector along a vector of any length: that of `VectorNormaliser`, the bit-accurate model.
+    """Unit vector along a vector of any length: `VectorNormaliser` is the bit-accurate model.
 
-    The latency is `DotProductUnit`'s and 14 cycles: four for shift and rounding; segment, table, three for
-    ``c0 - c1 u``, one for e; four for ``v + e v``. The initiation interval is 1. Six multipliers of 18x18
-    bits: three squares and three scalings; ``c1 u`` is a sum of Booth digits. The table holds 512 words of
-    32 bits.
+    The latency is 17 cycles, 3 in `DotProductUnit` and 14 others: four for shift and rounding; one each for
+    segment and table, three for ``c0 - c1 u``, one for e; four for ``v + e v``. The initiation interval is 1.
+    Six multipliers of 18x18 bits: three squares and three scalings; ``c1 u`` is a sum of Booth digits. The
+    table holds 512 words of 32 bits.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class VectorNormaliserUnit(PipelinedUnit):
         return value
 
     def _shift(self, m: Module, operands) -> tuple[list[FixedValue], Value]:
-        """Components without common sign copies, rounded to 18 bits, and whether they are lost: age 4."""
+        """Shifted components, rounded to 18 bits, and whether the vector is lost: at stage 4."""
         bits = self.parameters.format.width - 1
         codes = [Value.cast(component).as_signed() for component in operands.vector]
         ones = 0
@@ -125,9 +125,9 @@ class VectorNormaliserUnit(PipelinedUnit):
         rest = register(m, s[:bits], "rest")
         large = self._delay(m, large, "large", 5)
         c0, c1 = self._coefficients(m, segment)
-        # In halves of a step, odd: the half step that the cut leaves out.
+        # In half steps, always odd: half a step for the bits that were cut.
         u = register(m, _offset(rest), "u")
-        # c1 has no sign: a zero above makes its last Booth digit whole.
+        # c1 is unsigned: a zero above it completes its last Booth digit.
         digits = Cat(Const(0, 1), Value.cast(c1), Const(0, 2))
         count = (len(Value.cast(c1)) + 2) // 2
         terms = [booth_term(u, digits[2 * k : 2 * k + 3]) << (2 * k) for k in range(count)]
@@ -149,18 +149,18 @@ class VectorNormaliserUnit(PipelinedUnit):
 
 
 class SharedVectorNormaliserUnit(PipelinedUnit):
-    """`VectorNormaliserUnit` for vectors a few cycles apart: components take turns, as do the products.
+    """`VectorNormaliserUnit` for vectors some cycles apart: components and products take turns.
 
-    One shifter and one unit for the last rounding serve the three components; seven multiplications take
-    ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency, `latency`, follows from
-    the turns.
+    One shifter and one unit for the last rounding serve the three components; the seven multiplications take
+    turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency, `latency`,
+    follows from the schedule: 30 cycles for an interval of 3 or 4.
 
     Parameters
     ----------
     parameters : VectorNormaliser
         Bit-accurate model.
     initiation_interval : int
-        Cycles from a vector to the next at the closest, at least 3.
+        Least number of cycles from a vector to the next, at least 3.
 
     Raises
     ------
@@ -170,7 +170,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
     Members
     -------
     i, o
-        As `VectorNormaliserUnit` has them.
+        As in `VectorNormaliserUnit`.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -234,7 +234,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return {"lost": lost} | {f"normal_{k}": normal for k, normal in enumerate(normals)}
 
     def _places(self, vector: Word) -> Word:
-        """Places of the shift, and whether a first bit is found with them."""
+        """Places of the shift, four bits, and above them whether a first bit is found with them."""
         g, bits = self._graph, self.parameters.format.width - 1
 
         def ones(v):
@@ -243,7 +243,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
             return found[0] | found[1] | found[2]
 
         def moved(word, step):
-            # By no, one, two or three steps: both places from the word as it is.
+            # By zero to three steps: both bits of this number follow from the word before it is shifted.
             empties = [~word[bits - (k + 1) * step : bits - k * step].any() for k in range(3)]
             two = empties[0] & empties[1]
             one = Mux(two, empties[2], empties[0])
@@ -284,7 +284,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return self._graph.share("last", operands, 3, last)
 
     def datapath(self, m, operands):
-        """The graph, read at the age of its last words."""
+        """The graph, read at the stage of its last words."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")
         m.d.comb += [
@@ -302,12 +302,12 @@ def _row_shape(p: VectorNormaliser) -> data.StructLayout:
 
 
 def _clipped(code: Value) -> Value:
-    """A component from -ONE to ONE."""
+    """A component saturated to -ONE and ONE."""
     return Mux(code > ONE, ONE, Mux(code < -ONE, -ONE, code))[: COMPONENT.width]
 
 
 def _component(code: Value, bits: int) -> Value:
-    """A shifted component, of so many bits behind its sign, rounded half up."""
+    """A shifted component with ``bits`` bits below its sign, rounded half up to 18 bits."""
     places = bits - COMPONENT.fraction_bits
     return _clipped((code + (1 << (places - 1))) >> places)
 
@@ -320,7 +320,7 @@ def _root_place(square: FixedValue) -> tuple[Value, Value]:
 
 
 def _offset(rest: Value) -> Value:
-    """Bits below the segment from its middle: in halves of a step, odd, the half that the cut leaves out."""
+    """``u``: the bits below the segment less its middle, in half steps, odd for the bits that were cut."""
     return Cat(Const(1, 1), rest[:-1], ~rest[-1]).as_signed()
 
 
@@ -331,7 +331,7 @@ def _root(p: VectorNormaliser, c0: Value, product: Value) -> Value:
 
 
 def _excess(p: VectorNormaliser, f: Value, large: Value) -> FixedValue:
-    """``e``, of f in steps of 2^-21: it is halved with all its bits."""
+    """``e = f - 1``, or ``f/2 - 1`` if ``large``: in steps of 2^-21, so that f/2 is exact, then rounded."""
     one = 1 << p.C0_FORMAT.fraction_bits
     e = FixedValue(SQ(2, 21), Mux(large, f - 2 * one, (f - one) << 1)[:23].as_signed())
     return e.round_half_up(17).wrap(p.FACTOR_FORMAT)

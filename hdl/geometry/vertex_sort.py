@@ -20,7 +20,7 @@ from blysk.hdl.geometry.triangles import (
 __all__ = ["VertexSortUnit", "sorted_triangle_shape"]
 
 DIGIT_BITS = 4
-"""Bits of a height that the area takes in on a cycle."""
+"""Bits of a height that go into the area on each cycle."""
 
 
 def sorted_triangle_shape(grid: Grid = GRID) -> data.StructLayout:
@@ -33,15 +33,17 @@ class VertexSortUnit(wiring.Component):
 
     Two stages, each with a triangle inside. The first compares neighbouring corners in three cycles,
     exchanges them a cycle later, and compares the triangle's box with the picture. The second sums
-    ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in digits of four bits of the heights, from the first on,
-    with two Booth digits of each product a cycle; flat triangles have fewer digits. Exact; no multipliers.
+    ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in n digits of four bits of the heights, from the first
+    one on, with two Booth digits of each product a cycle; low triangles have fewer digits. Results are exact.
+    No multipliers.
 
-    Cycles a triangle: 4 if its box is empty; else the larger of 5 and of n + 2, or n + 3 if it is drawn, n
-    the digits: 3 for boxes of up to 7 scanlines, 4 to 127, 5 to 2047, 6 beyond (of a grid of 8 bits).
-    A drawn triangle is offered n + 7 cycles after it was taken in.
+    On a grid of 1/256 pixel n is 3 for boxes of up to 6 scanlines, 4 for up to 126, 5 for up to 2046, and 6
+    for more. A triangle takes 4 cycles if its box is empty, else n + 3 cycles if it is dropped and n + 4 if
+    it is drawn, unless the output waits. A drawn triangle is offered n + 8 cycles after it was taken in.
 
-    In the *compact* style one triangle is inside, whose corners stand where they were sorted: 5 cycles if its
-    box is empty, else n + 9, or n + 9 and those that it waits to be taken if it is drawn.
+    In the *compact* style there is one triangle inside, and its corners stay in the registers of the first
+    stage. It takes 5 cycles if its box is empty, else n + 9 cycles, and if it is drawn also those on which it
+    is offered, at least one.
 
     Parameters
     ----------
@@ -55,11 +57,11 @@ class VertexSortUnit(wiring.Component):
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(sorted_triangle_shape(grid)))`
-        Those that are drawn.
+        Triangles that are drawn.
     constants : :py:`In(frame_shape())`
         The frame; stays while triangles are inside.
     status : :py:`Out(counters_shape("empty", "zero_area", "culled"))`
-        Triangles dropped, since the reset.
+        Number of triangles dropped for each reason, since the reset.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
@@ -107,7 +109,7 @@ class VertexSortUnit(wiring.Component):
                 m.d.sync += step.eq(step + 1)
         takes = step == 0
         if not self.compact:
-            # The next one comes as one leaves.
+            # The next triangle comes in on the cycle on which one leaves the first stage.
             takes |= leaves | ((step == 4) & ~covered)
         m.d.comb += self.i.ready.eq(takes)
         self._exchange(m, corners, odd, step, takes)
@@ -120,21 +122,21 @@ class VertexSortUnit(wiring.Component):
         return m
 
     def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> None:
-        """Take corners in, and exchange neighbours where they are the wrong way round.
+        """Take corners in, and exchange neighbours that are in the wrong order.
 
-        The first two, the last two, the first two. All pairs are compared on the first cycle; which of the
-        comparisons a later exchange goes by follows from those before it.
+        First corners 0 and 1, then 1 and 2, then 0 and 1 again. All three pairs are compared on the first
+        cycle, before any exchange; the exchanges so far decide which comparison the next one needs.
         """
         turn, same, other = (Signal(name=name) for name in ("turn", "same", "other"))
-        # x counts from the lowest one, so that y and x are one signed number.
+        # The sign bit of x is inverted, so that y and x together are one signed number.
         columns = [Value.cast(corner.x) for corner in corners]
         key = [
             Cat(x[:-1], ~x[-1], Value.cast(corner.y)).as_signed()
             for x, corner in zip(columns, corners, strict=True)
         ]
-        # Of the last corner with the one that is second, and with the other one.
+        # ``same`` and ``other``: the last corner against the second one, and against the first one.
         with m.If(step == 1):
-            # By a carry: of a comparison the mapper makes look-up tables.
+            # A subtraction, for its carry chain: the mapper makes look-up tables of a comparison.
             for flag, (upper, lower) in ((turn, (0, 1)), (same, (1, 2)), (other, (0, 2))):
                 m.d.sync += flag.eq((key[lower] - key[upper])[-1])
         with m.Elif(step == 2):
@@ -164,7 +166,7 @@ class VertexSortUnit(wiring.Component):
             in_order = first_code < second_code
             with m.If(step == 1):
                 m.d.sync += [low.eq(Mux(in_order, a, b)), high.eq(Mux(in_order, b, a))]
-            # Exchanges begin on the second cycle.
+            # Exchanges begin on the second cycle, so that the third corner is kept.
             third = Signal.like(c, name=f"third_{name}")
             m.d.sync += third.eq(c)
             with m.If(step == 2):
@@ -178,9 +180,9 @@ class VertexSortUnit(wiring.Component):
                     m.d.sync += digits.eq(count)
 
     def _area(self, m, corners, tag, odd, digits, leaves, free, ends) -> tuple[Value, Value]:
-        """The second stage; whether a triangle has no area, or is culled, on this cycle.
+        """The second stage; returns whether a triangle without area, or a culled one, ends on this cycle.
 
-        The tag is the index of the material, and whether it is two-sided.
+        ``tag`` has the index of the material and whether the triangle is two-sided.
         """
         (material, is_two_sided), two_sided = tag, Signal(name="two_sided_area")
         grid, result = self.grid, self.o.payload
@@ -192,7 +194,7 @@ class VertexSortUnit(wiring.Component):
         terms = []
         for k, (across, height) in enumerate(((1, 2), (2, 1))):
             width = Signal(signed(grid.bits + 1), name=f"width_{k}")
-            # With the bit that a Booth digit looks back to.
+            # With one bit below for the first Booth digit.
             rest = Signal(DIGIT_BITS * most + 1, name=f"rest_{k}")
             down = (y[height] - y[0])[: grid.bits]
             with m.If(leaves):
@@ -236,7 +238,7 @@ class VertexSortUnit(wiring.Component):
         found, positive, zero = (Signal(name=name) for name in ("found", "positive", "zero"))
         flags = [positive.eq(~total[-1]), zero.eq(~total.any())]
         if self.compact:
-            # What the area is like is a register.
+            # Sign and zero of the area are registers.
             m.d.sync += [found.eq(sums & ~busy), done.eq(found), *flags]
         else:
             m.d.sync += done.eq(sums & ~busy)
@@ -273,9 +275,10 @@ class VertexSortUnit(wiring.Component):
 
 
 def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Value]:
-    """Value times a Booth digit, of three bits as for `booth_term`, or its opposite: less 1 where told.
+    """Value times a Booth digit (`booth_term`), or minus that if ``negative``; without a carry.
 
-    A negative product is the complement, and lacks 1: there is no carry.
+    A negated multiple has inverted bits and so is 1 too small: the second result tells where this 1 is to be
+    added.
     """
     low, middle, high = bits
     one, two = low ^ middle, (low == middle) & (middle != high)
@@ -289,10 +292,10 @@ def _corner_shape(grid: Grid) -> data.StructLayout:
 
 
 def _largest_digits(grid: Grid) -> int:
-    """Digits that any height has, with a bit for its sign."""
+    """Digits of the largest height, with one bit for its sign."""
     return -(-(grid.bits + 1) // DIGIT_BITS)
 
 
 def _rows_of(digits: int, grid: Grid) -> int:
-    """Scanlines from which on a height may not fit so many digits, signed."""
+    """Least number of scanlines for which a height may need more than ``digits`` digits."""
     return (1 << (DIGIT_BITS * digits - 1 - grid.subpixel_bits)) - 1

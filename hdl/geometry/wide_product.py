@@ -15,7 +15,7 @@ __all__ = ["halves", "three_products", "wide_product"]
 
 
 def halves(low_bits: int) -> tuple[Callable[[Any], FixedValue], Callable[[Any], FixedValue]]:
-    """Wiring from a number to its first bits, with its sign, and to its last, which are not negative."""
+    """Functions from a number to its high part, signed, and to its low part, unsigned; both are wiring."""
 
     def high(value: FixedValue) -> FixedValue:
         return value.truncate(value.format.fraction_bits - low_bits)
@@ -29,9 +29,10 @@ def halves(low_bits: int) -> tuple[Callable[[Any], FixedValue], Callable[[Any], 
 def three_products(
     graph: Dataflow, name: str, a: Word, b: Word, a_low: int, b_low: int, keep: int
 ) -> tuple[Word, Word]:
-    """The product of the high halves, and the sum of the two of a high and a low one, all cut.
+    """The product of the high halves, and the sum of the two products of a high and a low half.
 
-    Three multiplications, and a register for the sum.
+    All three are cut to ``keep`` fraction bits. Three multiplications, and a register for the sum. Other
+    parameters are those of `wide_product`.
     """
     (a_high, a_rest), (b_high, b_rest) = halves(a_low), halves(b_low)
     high = graph.multiply(f"{name}_high", a, b, a_high, b_high)
@@ -60,15 +61,20 @@ def wide_product(
     graph : Dataflow
         Graph that gets the words.
     name : str
-        Of the result.
+        Name of the result.
     a, b : Word
         Operands.
     a_low, b_low : int
         Bits of their low halves.
     fraction_bits : int
-        Of the result.
+        Fraction bits of the result.
     result : Format or callable
-        The format to which the rounded sum wraps, or what is made of it.
+        Format to which the rounded sum wraps, or a function of the rounded sum.
+
+    Returns
+    -------
+    Word
+        The result.
     """
     high, crossed = three_products(graph, name, a, b, a_low, b_low, fraction_bits + GUARD_BITS)
     made = (lambda value: value.wrap(result)) if isinstance(result, Format) else result

@@ -22,12 +22,12 @@ def _case(rng, count, spread):
 
 
 def _near(unit, rng, count):
-    """Corners with normals near to each other, of all lengths."""
+    """Normals of all lengths, those of a triangle's corners near to each other."""
     return _case(rng, count, 0.3)
 
 
 def _far(unit, rng, count):
-    """Normals of any directions, components near 0 and at the ends of the word."""
+    """Normals of any direction, some with components near 0 and at the ends of the word."""
     case = _case(rng, count, 2.0)
     low, high = -(1 << 23) + 1, (1 << 23) - 1
     words = [low, high, 0, -1, 1, 4095, 4096, -4096, -4097]

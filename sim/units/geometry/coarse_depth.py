@@ -13,7 +13,7 @@ __all__ = ["RECORD"]
 
 
 def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
-    """Spans of a small picture, one over the other, with depths from 0 to ``most`` at both ends."""
+    """Overlapping spans of a small picture, with depths below ``most``, or the largest, at the ends."""
     given = unit.parameters
     longest = min(longest, given.width)
     length = rng.integers(1, longest + 1, count)
@@ -22,7 +22,7 @@ def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
     y = rng.integers(0, lines or given.height, count)
     x[1::4] = np.minimum(x[0::4] + length[0::4], given.width - length[1::4])[: len(x[1::4])]
     y[1::4] = y[0::4][: len(y[1::4])]
-    # The later ones are farther, more often than not.
+    # Later spans are farther in most cases.
     base = np.sort(rng.integers(0, most, count)) // 2
     left, right = (base[:, np.newaxis] + rng.integers(0, most // 3, (count, 2))).T.clip(0, most - 1) << 9
     left[::5], right[::7] = rng.choice([0, (1 << 33) - 1], len(left[::5])), 0
@@ -33,21 +33,22 @@ def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
 
 
 def _short(unit, rng, count):
-    """Spans of one to six pixels in few blocks: words that are on their way to the memory."""
+    """Spans of one to six pixels in few blocks, whose words are needed before the memory has them."""
     return _spans(unit, rng, count, 6, lines=1)
 
 
 def _near(unit, rng, count):
-    """Depths of which the upper bits are few."""
+    """Depths of 15 bits, which differ in few of the upper bits that are compared."""
     return _spans(unit, rng, count, 12, 1 << 15, lines=1)
 
 
 def _edges(unit, rng, count):
-    """Three spans a picture: the last is hidden, or is not, by the last bit of a depth.
+    """Three spans a picture, of which the last is hidden, or is not, by the last bit of a depth.
 
-    The first marks pixels of a block; the second fills it, and may go on to blocks where it is nearer. The
-    deepest ends of both in that block are steps of the bound, or the codes before them, and near each other.
-    The nearest end of the third, which is in that block, is the step behind both, or the code before it.
+    The first span marks pixels of a block; the second fills the block, and may go on to blocks where it is
+    nearer. In that block the deepest depths of both are the first code of a step of the bound, or the code
+    before it, and near each other. The nearest depth of the third span is in that block; it is the first code
+    of the step behind both, or the code before it.
     """
     given, groups = unit.parameters, -(-count // 3)
     shift, size, columns = SPAN_DEPTH.width - given.depth_bits, given.block, given.blocks_per_line
@@ -55,7 +56,7 @@ def _edges(unit, rng, count):
     first, end = block * size, np.minimum(block * size + size, given.width) - 1
 
     def line(edge, at, other, falls):
-        """Step of a line of any slope that is ``edge`` at a pixel and in range at another."""
+        """Step of a line of any slope that is ``edge`` at pixel ``at`` and in range at pixel ``other``."""
         room = np.where(falls == (at < other), edge, (1 << SPAN_DEPTH.width) - 1 - edge)
         step = (
             room // np.maximum(abs(at - other), 1) * rng.random(groups) * 2.0 ** rng.integers(-30, 1, groups)
@@ -63,25 +64,25 @@ def _edges(unit, rng, count):
         return np.where(falls, -1, 1) * step.astype(np.int64)
 
     def span(begin, last, edge, falls, deepest):
-        """The span from a pixel to another, whose deepest or nearest end is ``edge``."""
+        """The span from pixel ``begin`` to ``last``, whose deepest or nearest depth is ``edge``."""
         at, other = np.where(falls == deepest, (begin, last), (last, begin))
         step = line(edge, at, other, falls)
         return begin, last - begin + 1, edge - step * (at - begin), step
 
     def code(upper):
-        """A step of the bound, or the code before it."""
+        """The first code of a step of the bound, or the code before it."""
         return (upper << shift) - rng.integers(0, 2, groups)
 
-    # Some fill the block twice, the second time at depth 0 or a step behind it.
+    # Some groups fill the block twice, the second time less deep.
     twice = rng.random(groups) < 0.125
     upper = np.where(twice, 1, rng.integers(2, (1 << given.depth_bits) - 3, groups))
     marked, filled = code(upper + np.where(twice, 2, rng.integers(-1, 2, groups))), code(upper)
-    # Some leave out one pixel of the block, which then has no bound.
+    # Some groups leave out one pixel of the block, which then gets no bound.
     gap, hole = ~twice & (rng.random(groups) < 0.25), rng.integers(first + 1, end)
     begin = np.where(twice | gap, first, rng.integers(first, end + 1))
     last = np.where(gap, hole - 1, np.where(twice, end, rng.integers(begin, end + 1)))
     marks = span(begin, last, marked, rng.random(groups) < 0.5, True)
-    # A line that falls goes on to the right, where it is nearer, one that rises comes from the left.
+    # A falling line may go on to the right, where it is nearer; a rising one may come from the left.
     limits = (
         np.where(gap, hole + 1, np.where(falls, first, size * rng.integers(0, block + 1))),
         np.where(falls & ~gap, np.minimum(size * rng.integers(block + 1, columns + 1), given.width) - 1, end),

@@ -47,17 +47,17 @@ def _case(rng, count, size, longest, most):
 
 
 def _few(unit, rng, count):
-    """Spans of one to eight pixels of a small picture, over and over, some of equal depths."""
+    """Spans of one to eight pixels, many over the same places of a small picture, some of equal depths."""
     return _case(rng, count, unit.size, min(8, unit.size[0]), 1000)
 
 
 def _same(unit, rng, count):
-    """Spans of a pixel or two in a corner: places that were written on the last cycles."""
+    """Spans of one or two pixels in a corner, at places that were written on the last cycles."""
     return _case(rng, count, (2, 1), 2, (1 << 24) - 1)
 
 
 def _far(unit, rng, count):
-    """Depths about the farthest, where a picture is cleared to."""
+    """Depths about `DepthTest.FARTHEST` and the depth that a picture is cleared to."""
     case = _case(rng, count, unit.size, 3, 3)
     case.beats["depth"] = (1 << 33) - 1 - case.beats["depth"]
     case.beats["depth_step"] = -case.beats["depth_step"]
@@ -65,7 +65,7 @@ def _far(unit, rng, count):
 
 
 def _again(unit, rng, count):
-    """A pixel, one at a place a bit off, and one of them again at a depth a bit off, in any order."""
+    """Pixels at two places that differ in a bit, a third at one of them, two depths that differ in a bit."""
     count = -(-count // 3)
     bits = (unit.x_bits, unit.y_bits)
     first = rng.integers(0, 1 << sum(bits), count)
@@ -82,7 +82,7 @@ def _again(unit, rng, count):
 
 
 def _nearer(unit, rng, count):
-    """Each span in front of those before; depths within some steps of a whole code."""
+    """Each span in front of those before it, its first depth at most 8/512 from a whole code."""
     case = _case(rng, count, unit.size, min(8, unit.size[0]), 0)
     last = case.beats["pixel"]["last"]
     span = np.cumsum(last) - last

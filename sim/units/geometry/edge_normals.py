@@ -51,7 +51,7 @@ def _short(unit, rng, count):
 
 
 def _single(unit, rng, count):
-    """Pieces of a pixel, one a cycle."""
+    """Pieces of one pixel, one a cycle."""
     return _case(rng, count, 1)
 
 
@@ -61,7 +61,7 @@ def _long(unit, rng, count):
 
 
 def _deciding(unit, rng, count):
-    """Pieces of a pixel, for whose normal a bit decides how it is rounded."""
+    """Pieces of one pixel whose normal is rounded in a way that depends on a single bit."""
     vector = deciding_vectors(rng, count)
     beats = _single(unit, rng, len(vector)).beats
     return Case(beats | {"left": vector, "right": vector, "flip": np.ones(len(vector), dtype=np.int64)})

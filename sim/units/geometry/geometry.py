@@ -20,14 +20,14 @@ def _spans(unit, case):
 
 
 def _small(unit, rng, count):
-    """Triangles of all kinds in a small picture, that is cut at every side."""
+    """Triangles of all kinds in a small picture, whose borders cut them on every side."""
     return Case(
         ended(random_triangles(rng, count, unit.grid, 6.0, 0.3), unit.grid).beats, small_frame(rng).codes
     )
 
 
 def _tiny(unit, rng, count):
-    """Triangles of a pixel or so, back faces left out."""
+    """Triangles of about one pixel, back faces culled."""
     frame = Frame(-20, -20, 20, 20, "cull", 200)
     return Case(ended(random_triangles(rng, count, unit.grid, 1.0, 0.1), unit.grid).beats, frame.codes)
 
@@ -53,7 +53,7 @@ def _mesh(unit, rng, count):
 
 
 def _large(unit, rng, count):
-    """Triangles of a picture's size, with spans in pieces."""
+    """Triangles as large as the picture, with spans in several pieces."""
     frame = Frame(-100, -80, 100, 80, "flip", 60)
     return Case(ended(random_triangles(rng, count, unit.grid, 80.0, 0.05), unit.grid).beats, frame.codes)
 

@@ -31,25 +31,25 @@ def _beats(rng, stages):
 
 
 def _attributes(unit, rng, count, size=12.0):
-    """Attributes of triangles of all kinds, some at the ends of the word."""
+    """Attributes of triangles of all kinds, some values at the ends of the word."""
     stages = Stages(random_triangles(rng, 4 * count, size=size), WHOLE)
     return Case(first(_beats(rng, stages), count))
 
 
 def _large(unit, rng, count):
-    """Of triangles of any size."""
+    """Attributes of triangles of any size."""
     return _attributes(unit, rng, count, 1500.0)
 
 
 def _measure(rng, count):
-    """The step per pixel times the width, which no attribute's range exceeds."""
+    """The step per pixel times the width of the triangle, against the same in float64."""
     stages = Stages(random_triangles(rng, count, size=100.0), WHOLE)
     y = stages.drawn.triangles.y.astype(float)
     values = stages.drawn.triangles.attributes[:, :, 0] * 2.0**-23
     share = (y[:, 1] - y[:, 0]) / (y[:, 2] - y[:, 0])
     exact = values[:, 1] - values[:, 0] - share * (values[:, 2] - values[:, 0])
     width = stages.drawn.area / (y[:, 2] - y[:, 0]) / 256
-    # The word is modulo 4 a pixel: of narrow triangles it does not tell the step.
+    # The word has the step per pixel modulo 4, which is not the step in narrow triangles.
     kept = ~stages.scales.sliver & (width > 2)
     found = stages.gradients.inward.values[:, 0] * width
     return Sample(found[kept], exact[kept], None, np.log2(width[kept]))

@@ -30,7 +30,7 @@ def _expect(unit, case):
     planes = PlaneAssembler().compute(gradients, beats["least"][:, 0], frame_of(case.constants)).beats
     if not unit.serial:
         return planes
-    # One attribute after the other, each with its triangle's piece.
+    # One attribute after the other, each with the piece of its triangle.
     return {
         name: np.repeat(value, ATTRIBUTES) if name == "piece" else value.reshape(-1)
         for name, value in planes.items()
@@ -44,7 +44,7 @@ def _case(rng, count, limit):
     size[::5, 0] = rng.choice([1, (1 << 20) - 1], len(size[::5]))
     least = rng.integers(0, 3457, count)
     least[::7] = rng.choice([0, 1, 3456], len(least[::7]))
-    # Bounds next to a power of two times the sum.
+    # Bounds for which ``least`` times ``limit`` is next to the sum times a power of two.
     norm = size[:, :3].max(axis=1) + size[:, :3].sum(axis=1)
     close = np.arange(count) % 3 == 0
     near = (norm << rng.integers(0, 13, count)) // max(limit, 1) + rng.integers(0, 2, count)
@@ -54,7 +54,7 @@ def _case(rng, count, limit):
 
 
 def _usual(unit, rng, count):
-    """Sizes of every power of two, bounds next to where a piece gets longer, a usual limit."""
+    """Sizes of every power of two, bounds next to those where a piece gets longer, the default limit."""
     return _case(rng, count, 267)
 
 
@@ -64,7 +64,7 @@ def _largest(unit, rng, count):
 
 
 def _least(unit, rng, count):
-    """Limits of 0 and of 1, which cut all spans but those of no change."""
+    """A limit of 0, which cuts all spans to single pixels, or of 1."""
     return _case(rng, count, int(rng.integers(0, 2)))
 
 

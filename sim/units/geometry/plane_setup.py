@@ -23,7 +23,7 @@ def _triangles(unit, rng, count):
 
 
 def _large(unit, rng, count):
-    """Triangles of any size; heights and areas of one first bit, and of all bits."""
+    """Triangles of any size, some with heights and areas of a single 1, or of ones alone."""
     case = _case(rng, count, unit.grid, 1500.0)
     bits = rng.integers(0, 2 * unit.grid.bits, count)
     area, height = 1 << bits, 1 << (bits // 2)
@@ -41,7 +41,7 @@ def _measure(rng, count):
     scales = scales_of_corners(beats, GRID)
     kept = ~scales.sliver
     width = beats["area"] / beats["long_height"] / GRID.steps
-    # The shift that hides in five bits: 8 less the exponent.
+    # The shift, 8 less the exponent of 1/W, from its five bits.
     shift = (scales.column_shift + 3) % 32 - 3
     found = scales.width_reciprocal.values * 2.0 ** (8.0 - shift) * width
     return Sample(found[kept], np.ones(kept.sum()), None, np.log2(width[kept]))

@@ -35,7 +35,7 @@ def _pieces(beats):
 
 
 def _rows_of(unit, beats):
-    """Scanlines, each with its planes: what a serial unit is given one attribute after the other."""
+    """Scanlines, each once, with all its planes, from the input beats of a unit."""
     if not unit.serial:
         return beats
     whole = len(beats["row"]["last"]) // ATTRIBUTES
@@ -48,7 +48,7 @@ def _rows_of(unit, beats):
 
 
 def _beats_of(unit, planes, row):
-    """What a unit is given: scanlines, of a serial one each with the plane of one attribute."""
+    """Input beats of a unit: scanlines with their planes; for a serial unit one beat for each attribute."""
     if unit.serial:
         row = {name: np.repeat(value, ATTRIBUTES) for name, value in row.items()}
         planes = {
@@ -61,14 +61,14 @@ def _beats_of(unit, planes, row):
 def _status(unit, case):
     beats = _rows_of(unit, case.beats)
     counts, rows = _pieces(beats)[1], beats["row"]
-    # A triangle whose last scanline is not there is not yet known to be empty.
+    # A triangle is not yet known to be empty before its last scanline.
     begun = np.flatnonzero(_firsts(rows["last"]))[-1]
     unknown = not rows["last"][-1] and not rows["length"][begun:].any()
     return counts | {"empty": counts["empty"] - unknown}
 
 
 def _case(unit, triangles, frame, count):
-    # Of high triangles a few would fill the run.
+    # A few high triangles would fill the run.
     low = np.ptp(triangles.y, axis=1) < 64 * GRID.steps
     stages = Stages(triangles[low], frame)
     rows = stages.clipped
@@ -78,19 +78,19 @@ def _case(unit, triangles, frame, count):
 
 
 def _rows(unit, rng, count):
-    """Scanlines of triangles of all kinds, cut to a small picture, and their spans at a limit."""
+    """Scanlines of triangles of all kinds in a small picture, with spans that a limit cuts into pieces."""
     frame = Frame(-18, -22, 21, 19, limit=100)
     return _case(unit, random_triangles(rng, count, spread=0.1), frame, count)
 
 
 def _narrow(unit, rng, count):
-    """Nothing is cut: spans of few pixels."""
+    """Spans of few pixels, none cut into pieces."""
     frame = Frame(-18, -22, 21, 19, limit=1023)
     return _case(unit, random_triangles(rng, count, size=1.5, spread=0.0), frame, count)
 
 
 def _any(unit, rng, count):
-    """Words of any codes, pieces and lengths: sums modulo 4, saturation, the longest spans."""
+    """Planes of any codes, and any pieces and lengths: sums modulo 4, saturation, the longest spans."""
     triangles = rng.integers(1, 12, count)
     total = int(triangles.sum())
     last = np.zeros(total, dtype=bool)
@@ -110,7 +110,7 @@ def _any(unit, rng, count):
         flip=flags[2],
         material=rng.integers(0, 1024, total),
     )
-    # Long spans of short pieces are many.
+    # Long spans with short pieces would give too many of them.
     least = np.maximum(np.ceil(np.log2(np.maximum(length, 1))).astype(np.int64) - 3, 0)
     words = {"start": GradientSetup.START_FORMAT} | dict.fromkeys(
         ("short", "long", "inward"), GradientSetup.FORMAT

@@ -38,7 +38,7 @@ def _small(unit, rng, count):
 
 
 def _whole(unit, rng, count):
-    """A picture of all the grid."""
+    """A picture of nearly all the grid."""
     return _rows(rng, count, WHOLE)
 
 

@@ -26,14 +26,14 @@ def _codes(vectors):
 
 
 def _vectors(unit, rng, count):
-    """Vectors of all lengths, some of any words, some of no direction."""
+    """Vectors of all lengths, some of any words, some without direction."""
     vector = _codes(sphere(rng, count) * 2.0 ** rng.uniform(8, 26.5, (count, 1)))
     vector[::8] = any_codes(rng, SPAN_NORMAL, *vector[::8].shape)
     return Case({"vector": vector, "flip": rng.integers(0, 2, count)})
 
 
 def _corners(unit, rng, count):
-    """Squared lengths next to the borders of the table's segments, axes, ends of the word."""
+    """Squared lengths next to the borders of the table's segments, vectors along axes, ends of the word."""
     squared = (np.arange(128, 512) / 512)[:, np.newaxis] + np.arange(-2, 3) * 2.0**-20
     length = np.sqrt(np.r_[squared.ravel(), 4 * squared.ravel()])
     direction = sphere(rng, len(length))
@@ -49,10 +49,17 @@ def _corners(unit, rng, count):
 
 
 def deciding_vectors(rng: np.random.Generator, draws: int) -> np.ndarray:
-    """Of so many vectors those in which a bit decides how something is rounded: about one of 3,000.
+    """Random vectors of length 1 whose unit vector depends on a single bit: about one of 3,000.
 
-    A step of the squared length changes the factor, or the result, which is negated, is a tie, or would be
-    one but for a bit.
+    A vector is chosen if one step of the squared length, up or down, changes the factor e, or if a component
+    of ``v + e v`` is a tie for the rounding, or differs from a tie in one bit.
+
+    Parameters
+    ----------
+    rng : Generator
+        Random generator.
+    draws : int
+        Number of vectors among which to choose.
 
     Returns
     -------
@@ -72,7 +79,7 @@ def deciding_vectors(rng: np.random.Generator, draws: int) -> np.ndarray:
 
 
 def _deciding(unit, rng, count):
-    """Vectors in which a bit decides, most of them negated."""
+    """Vectors whose unit vector depends on a single bit, most of them negated."""
     vector = deciding_vectors(rng, count)
     return Case({"vector": vector, "flip": (rng.random(len(vector)) < 0.9).astype(np.int64)})
 

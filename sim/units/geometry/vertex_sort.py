@@ -19,23 +19,23 @@ def _sorted(unit, case):
 
 
 def _flipped(unit, rng, count, back_faces="flip"):
-    """Triangles of all kinds in a small picture, back faces turned."""
+    """Triangles of all kinds in a small picture, normals of back faces negated."""
     frame = small_frame(rng, back_faces)
     return Case(random_triangles(rng, count, unit.grid).beats, frame.codes)
 
 
 def _culled(unit, rng, count):
-    """The same, back faces left out."""
+    """The same with back faces culled."""
     return _flipped(unit, rng, count, "cull")
 
 
 def _shown(unit, rng, count):
-    """The same, back faces as they are."""
+    """The same with back faces shown as they are."""
     return _flipped(unit, rng, count, "show")
 
 
 def _whole(unit, rng, count):
-    """A picture of all the grid: triangles of all sizes."""
+    """Triangles of all sizes in a picture of nearly all the grid."""
     return Case(random_triangles(rng, count, unit.grid, 500.0).beats, WHOLE.codes)
 
 
@@ -52,7 +52,7 @@ def _near(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """A picture anywhere; boxes that begin and end at its borders or 2^k from them, or are so high."""
+    """A picture anywhere; boxes that begin or end at its borders or 2^k pixels off, or are 2^k high."""
     grid, first = unit.grid, rng.integers(-2048, 2047, 2)
     end = np.minimum(first + 2 ** rng.integers(0, 11, 2), 2048)
     frame = Frame(*(int(end) for end in (*first, *end)))
@@ -65,7 +65,7 @@ def _borders(unit, rng, count):
     high = low + often(0.7, powers[1]) + rng.integers(-1, 2, (count, 2))
     pixels = np.stack([low, high, rng.integers(np.minimum(low, high), np.maximum(low, high) + 1)], axis=1)
     pixels = rng.permuted(pixels, axis=1)
-    # Anywhere from a pixel's centre to the one before.
+    # Anywhere from a pixel's centre back to just behind the centre before it.
     codes = pixels * grid.steps - grid.half + 1 + rng.integers(0, grid.steps, pixels.shape)
     codes = codes.clip(grid.coordinate.min_code, grid.coordinate.max_code)
     return Case(
