@@ -264,7 +264,7 @@ class _Pace:
             m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(self.accepts)]
 
     def late(self, m: Module, value: ValueLike, name: str) -> Value:
-        """A value of the step before; not *serial*: the value."""
+        """*Serial*: the value on the step before, from a register; else the value itself."""
         if not self.serial:
             return Value.cast(value)
         register = Signal(len(Value.cast(value)), name=name)
@@ -276,7 +276,7 @@ class _Pace:
 class _Kept:
     """A register of one attribute; *serial* a ring with a word of each attribute, moved on by every step.
 
-    Of a *late* word what it becomes is chosen a step later, from `_Pace.late`, on its way round the ring.
+    A *late* word is replaced one step later, on its way round the ring, by values from `_Pace.late`.
     """
 
     def __init__(self, m: Module, name: str, pace: _Pace, late: bool = False):
@@ -386,7 +386,7 @@ class _Along:
 
     def values(self, m: Module, name: str, loads, base, inward, kept) -> tuple[Value, Value]:
         """Values of an attribute at the piece's ends; its step is ``inward`` on loading, ``kept`` later."""
-        # Behind a register, as the sums are as long as a cycle.
+        # Chosen behind registers: the sums take a whole cycle.
         nears, totals = (_Kept(m, f"{name}_{word}", self.pace, late=True) for word in ("near", "total"))
         steps = _Kept(m, f"{name}_step", self.pace)
         near, total, step = nears.value, totals.value, steps.value

@@ -161,7 +161,7 @@ class VertexSortUnit(wiring.Component):
         for name, first, end in (("x", frame.left, frame.right), ("y", frame.top, frame.bottom)):
             low, high = (Signal(signed(X_BITS), name=f"{end}_{name}") for end in ("low", "high"))
             a, b, c = (first_centre(corner[name], self.grid) for corner in corners)
-            # Of the corners, not of the centres, so that the comparison does not wait for their sums.
+            # Corners are compared, not centres: the comparison does not wait for the sums of `first_centre`.
             first_code, second_code = (Value.cast(corner[name]).as_signed() for corner in corners[:2])
             in_order = first_code < second_code
             with m.If(step == 1):
