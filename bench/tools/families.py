@@ -187,7 +187,7 @@ class Place:
     closed : int
         Multipliers with registers inside on both sides; nextpnr does not time the path between these.
     rerouted : bool
-        Whether the target was out of reach, so that it was routed again for a lower one.
+        Whether the target was out of reach, so that slow paths were not routed again and again.
     """
 
     seed: int

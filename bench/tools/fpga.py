@@ -89,12 +89,12 @@ def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
 
 
 def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
-    """A line for each design that is so far from the target that it was routed again for a lower one."""
+    """A line for each design that is so far from the target that nextpnr did not route slow paths again."""
     for layout in layouts:
         if seeds := [str(place.seed) for place in layout.places if place.rerouted]:
             yield (
                 f"{layout.name}: from seed {', '.join(seeds)} the target was out of reach, "
-                "and it was routed again for a lower one"
+                "and slow paths were not routed again"
             )
 
 

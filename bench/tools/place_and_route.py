@@ -67,9 +67,6 @@ _SLACK = re.compile(r"ripped up due to negative slack WNS=(-?[\d.]+)ns")
 _ROUNDS = 10
 """Rounds of the router for paths that are too slow, in which the slowest must become faster."""
 
-_SHARE = 0.97
-"""Lower target, as a share of the clock rate of the best of those rounds."""
-
 _MANY = 1000
 """Least number of look-up tables of a large design."""
 
@@ -304,50 +301,15 @@ def _store(path: Path, parts: Parts, place: Place) -> None:
         write_json(path, {"parts": asdict(parts), "place": asdict(place)})
 
 
-def _stuck(slack: Sequence[float]) -> str:
-    """Why the router will not end, from the slack of the slowest path in each of its rounds; "" if it may.
+def _stuck(said: str) -> str:
+    """Why the router will not end, from its log; "" if it may.
 
     nextpnr routes wires of slow paths again for as long as there are such paths. Where the target cannot be
     met at all it goes on for ever: of the bisection the slowest path was the same to 10 ps in 27 rounds.
     """
+    slack = [float(worst) for worst in _SLACK.findall(said)]
     stuck = len(slack) > _ROUNDS and max(slack[-_ROUNDS:]) <= max(slack[:-_ROUNDS])
     return f"no faster in {_ROUNDS} rounds" if stuck else ""
-
-
-def _route(run: Callable[..., None], arguments: Sequence[str]) -> bool:
-    """Run nextpnr; where it does not end, for a lower target, then without routing slow paths again.
-
-    Parameters
-    ----------
-    run : callable
-        Runs it with arguments, and ``given_up`` as for `ToolRunner.run`.
-    arguments : sequence of str
-        The arguments, with the target behind ``--freq``.
-
-    Returns
-    -------
-    bool
-        Whether it did not end for the target.
-    """
-    arguments, slack = list(arguments), []
-
-    def given_up(said: str) -> str:
-        slack[:] = map(float, _SLACK.findall(said))
-        return _stuck(slack)
-
-    try:
-        run(arguments, given_up=given_up)
-        return False
-    except GivenUp:
-        place = arguments.index("--freq") + 1
-        best = 1000 / (1000 / float(arguments[place]) - max(slack))
-        arguments[place] = f"{_SHARE * best:.1f}"
-    try:
-        run(arguments, given_up=given_up)
-    except GivenUp:
-        arguments.remove(_RIPUP)
-        run(arguments)
-    return True
 
 
 def lay_out(
@@ -440,10 +402,13 @@ def _run(
                 files = ["--json", f"{MOUNT}/top.json", "--report", f"{MOUNT}/{path.name}"]
                 arguments = [*options, *files, "--seed", str(seed)]
                 try:
-                    rerouted = _route(
-                        lambda given, **limit: runner.run("nextpnr", nextpnr, given, folder, **limit),
-                        arguments,
-                    )
+                    rerouted = False
+                    try:
+                        runner.run("nextpnr", nextpnr, arguments, folder, given_up=_stuck)
+                    except GivenUp:
+                        rerouted = True
+                        arguments.remove(_RIPUP)
+                        runner.run("nextpnr", nextpnr, arguments, folder)
                 except ToolError as error:
                     if "legal placement" in str(error):
                         raise TooLarge(f"does not fit: from seed {seed} {error}") from None
