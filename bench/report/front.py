@@ -204,7 +204,7 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
             ys = [max(of[kind][1] for of in drawn), *(y for _, y in corners), corners[-1][1]]
             panel.step(xs, ys, where="post", color="#1c2126", linewidth=1.2, zorder=0)
         # Room for labels below the most exact ones.
-        panel.set_ylim(bottom=min(of[kind][1] for of in drawn) / 4)
+        panel.set_ylim(bottom=max(min(of[kind][1] for of in drawn), _LEAST_LSB) / 4)
         _ticks(panel, in_ns)
     axes[0].set_ylabel("largest error over all scenes, LSB of 8 bits")
     for panel, (kind, _) in zip(axes, kinds, strict=True):
@@ -250,7 +250,7 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
 
 def _on_bars(x: Sequence[float], error: Sequence[float]) -> list[tuple[float, float]]:
     """Points on the bars of a design, which a label must not cover."""
-    low, high = max(error[0], _LEAST_LSB), error[1]
+    low, high = (max(value, _LEAST_LSB) for value in error)
     return [(at, high) for at in np.geomspace(x[0], x[2], 12)] + [
         (x[1], at) for at in np.geomspace(low, high, 24)
     ]
