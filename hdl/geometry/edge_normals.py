@@ -97,12 +97,18 @@ class EdgeNormalsUnit(wiring.Component):
             normaliser.i.valid.eq(busy & ((turn != 0) | rest.w_rdy)),
             moves.eq(normaliser.i.valid & normaliser.i.ready),
             self.i.ready.eq(~busy if self.compact else ~busy | (moves & last)),
-            rest.w_en.eq(moves & (turn == 0)),
             rest.w_data.eq(
                 Cat(*(Value.cast(piece[name]) for name in ("left", "right", *span_words_shape())))
             ),
             normaliser.i.payload.flip.eq(piece.flip),
         ]
+        begins = moves & (turn == 0)
+        if self.compact:
+            # A cycle later: the piece stays for another cycle at least, and the next one begins later still.
+            begun = Signal(name="begun")
+            m.d.sync += begun.eq(begins)
+            begins = begun
+        m.d.comb += rest.w_en.eq(begins)
         for k in range(3):
             ends = Value.cast(piece.left[k]).as_signed(), Value.cast(piece.right[k]).as_signed()
             m.d.sync += Value.cast(middle[k]).eq((ends[0] + ends[1]) >> 1)

@@ -19,6 +19,9 @@ from blysk.hdl.geometry.triangles import (
 
 __all__ = ["VertexSortUnit", "sorted_triangle_shape"]
 
+_PAIRS = (0, 1), (1, 2), (0, 2)
+"""Corners that are compared: whether the second one of a pair comes before the first one."""
+
 DIGIT_BITS = 4
 """Bits of a height that go into the area on each cycle."""
 
@@ -112,17 +115,19 @@ class VertexSortUnit(wiring.Component):
             # The next triangle comes in on the cycle on which one leaves the first stage.
             takes |= leaves | ((step == 4) & ~covered)
         m.d.comb += self.i.ready.eq(takes)
-        self._exchange(m, corners, odd, step, takes)
+        order = self._exchange(m, corners, odd, step, takes)
         if not self.compact:
             with m.If(takes):
                 m.d.sync += enters
-        self._box(m, corners, step, covered, digits)
+        self._box(m, corners, order, step, covered, digits)
         zero, culled = self._area(m, corners, (material, two_sided), odd, digits, leaves, free, ends)
         count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
         return m
 
-    def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> None:
+    def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> list[Signal]:
         """Take corners in, and exchange neighbours that are in the wrong order.
+
+        Returns the comparisons of `_PAIRS`, which are those of the corners as given on the second cycle.
 
         First corners 0 and 1, then 1 and 2, then 0 and 1 again. All three pairs are compared on the first
         cycle, before any exchange; the exchanges so far decide which comparison the next one needs.
@@ -137,7 +142,7 @@ class VertexSortUnit(wiring.Component):
         # ``same`` and ``other``: the last corner against the second one, and against the first one.
         with m.If(step == 1):
             # A subtraction, for its carry chain: the mapper makes look-up tables of a comparison.
-            for flag, (upper, lower) in ((turn, (0, 1)), (same, (1, 2)), (other, (0, 2))):
+            for flag, (upper, lower) in zip((turn, same, other), _PAIRS, strict=True):
                 m.d.sync += flag.eq((key[lower] - key[upper])[-1])
         with m.Elif(step == 2):
             m.d.sync += [turn.eq(Mux(turn, other, same)), other.eq(Mux(turn, same, other))]
@@ -154,23 +159,34 @@ class VertexSortUnit(wiring.Component):
             taken = Cat(Value.cast(given[name][k]) for name in corner.shape().members)
             with m.If(takes | (turn & moves)):
                 m.d.sync += Value.cast(corner).eq(Mux(takes, taken, neighbour))
+        return [turn, same, other]
 
-    def _box(self, m: Module, corners: list, step: Signal, covered: Signal, digits: Signal) -> None:
-        """Whether the box and the picture have a pixel's centre in common, and the digits of the height."""
+    def _box(
+        self, m: Module, corners: list, order: list, step: Signal, covered: Signal, digits: Signal
+    ) -> None:
+        """Whether the box and the picture have a pixel's centre in common, and the digits of the height.
+
+        The order of the corners is that of their centres, so that the comparisons do not wait for the sums of
+        `first_centre`.
+        """
         frame, inside = self.constants, []
-        for name, first, end in (("x", frame.left, frame.right), ("y", frame.top, frame.bottom)):
+        columns = [Value.cast(corner.x).as_signed() for corner in corners]
+        across = [Signal(name=f"across_{upper}_{lower}") for upper, lower in _PAIRS]
+        for flag, (upper, lower) in zip(across, _PAIRS, strict=True):
+            m.d.sync += flag.eq((columns[lower] - columns[upper])[-1])
+        for name, first, end, flags in (
+            ("x", frame.left, frame.right, across),
+            ("y", frame.top, frame.bottom, order),
+        ):
+            centres = [Signal(signed(X_BITS), name=f"centre_{name}_{k}") for k in range(3)]
+            for centre, corner in zip(centres, corners, strict=True):
+                m.d.sync += centre.eq(first_centre(corner[name], self.grid))
+            turn, same, other = flags
             low, high = (Signal(signed(X_BITS), name=f"{end}_{name}") for end in ("low", "high"))
-            a, b, c = (first_centre(corner[name], self.grid) for corner in corners)
-            # Corners are compared, not centres: the comparison does not wait for the sums of `first_centre`.
-            first_code, second_code = (Value.cast(corner[name]).as_signed() for corner in corners[:2])
-            in_order = first_code < second_code
-            with m.If(step == 1):
-                m.d.sync += [low.eq(Mux(in_order, a, b)), high.eq(Mux(in_order, b, a))]
-            # Exchanges begin on the second cycle, so that the third corner is kept.
-            third = Signal.like(c, name=f"third_{name}")
-            m.d.sync += third.eq(c)
-            with m.If(step == 2):
-                m.d.sync += [low.eq(Mux(third < low, third, low)), high.eq(Mux(third > high, third, high))]
+            m.d.sync += [
+                low.eq(Mux(turn, Mux(same, centres[2], centres[1]), Mux(other, centres[2], centres[0]))),
+                high.eq(Mux(turn, Mux(other, centres[0], centres[2]), Mux(same, centres[1], centres[2]))),
+            ]
             inside += [low < high, low < end, first < high]
         rows = high - low
         with m.If(step == 3):

@@ -108,6 +108,22 @@ def test_registers_stay_outside_where_asked_for(options, calls, cache, monkeypat
     assert given == [not options]
 
 
+@pytest.mark.parametrize(("options", "target"), [([], 150), (["--target", "113"], 113)])
+def test_target_of_the_router(options, target, calls, cache, tmp_path, monkeypatch):
+    run, given = place_and_route.ToolRunner.run, []
+
+    def kept(self, name, code, arguments, *others, **more):
+        given.append(arguments)
+        run(self, name, code, arguments, *others, **more)
+
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", kept)
+    path = tmp_path / "out.json"
+    assert main(["fpga", "--unit", "diffuse", "--seeds", "1", *options, "--json", str(path)]) == 0
+    asked = given[-1]
+    assert asked[asked.index("--freq") + 1] == str(target)
+    assert json.loads(path.read_text())["target_mhz"] == target
+
+
 @pytest.mark.parametrize(("options", "family"), [([], ECP5), (["--family", "nexus"], NEXUS)])
 def test_command(options, family, calls, cache, tmp_path, capsys):
     path = tmp_path / "out.json"
