@@ -223,12 +223,27 @@ class HighlightGate:
         self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, threshold: Fixed
     ) -> np.ndarray:
         """Decisions as by `compute`, from thresholds T in place of exponents, of shape () or (spans,)."""
-        dot, angle = self.dot_product, self.angle_format
-        difference = self.one_squared - dot.compute(normal_left, normal_right)
-        cut = difference.truncate(angle.fraction_bits).saturate(angle)
+        pairs = (normal_left, normal_right), (normal_left, halfway), (normal_right, halfway)
+        return self.decide_by(*(self.dot_product.compute(*pair) for pair in pairs), threshold)
+
+    def decide_by(self, cosine: Fixed, left: Fixed, right: Fixed, threshold: Fixed) -> np.ndarray:
+        """Decisions from dot products: of the normals, and of the left and the right one with H.
+
+        Parameters
+        ----------
+        cosine, left, right : Fixed, any shape
+            Dot products as of `dot_product`.
+        threshold : Fixed, shape () or the same, UQ(0, F)
+            T.
+
+        Returns
+        -------
+        bool array, same shape
+        """
+        angle = self.angle_format
+        cut = (self.one_squared - cosine).truncate(angle.fraction_bits).saturate(angle)
         u = Fixed(angle, np.minimum(cut.codes + 3, angle.max_code))
-        a, b = (self._level(dot.compute(normal, halfway)) for normal in (normal_left, normal_right))
-        return (cut > self.widest) | self.decide(a, b, u, threshold)
+        return (cut > self.widest) | self.decide(self._level(left), self._level(right), u, threshold)
 
     def _level(self, cosine: Fixed) -> Fixed:
         step = Fixed(self.level_format, 1)

@@ -91,6 +91,12 @@ class Power(HighlightOperand):
         ValueError
             If the operand has another format or the exponent is out of range.
         """
+        s = self.complement(operand, dark, exponent)
+        one = Fixed(s.format, np.full_like(s.codes, s.format.max_code))
+        return (one - s).truncate(17).saturate(self.RESULT_FORMAT)
+
+    def complement(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
+        """One minus the term, before its last bits are cut, UQ(0, 34); parameters as of `compute`."""
         x = self.one_minus(operand, exponent).extend(SQ(5, 34))
         format = self.COMPLEMENT_FORMAT
         x = Fixed(format, np.where(dark, format.max_code, x.saturate(format).codes))
@@ -99,8 +105,7 @@ class Power(HighlightOperand):
             if exponent >> bit & 1:
                 s = self._combine(s, x)
             x = self._combine(x, x)
-        one = Fixed(format, np.full_like(s.codes, format.max_code))
-        return (one - s).truncate(17).saturate(self.RESULT_FORMAT)
+        return s
 
     def _combine(self, p: Fixed, q: Fixed) -> Fixed:
         """``p + q - p q``."""

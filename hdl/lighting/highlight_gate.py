@@ -179,7 +179,7 @@ class HighlightGateUnit(PipelinedUnit):
             partial,
             multiply("a_b", a, b, since=partial),
         )
-        exceeded = g.register(f"exceeded_{index}", lambda w: w[-1] | ~w[f + 2 :].any(), total)
+        exceeded = g.register(f"exceeded_{index}", lambda w: w[-1], total)
         slack = g.register(f"slack_{index}", lambda w: w[f + 2 :][:f], total)
 
         minus = g.register(f"a_minus_b_{index}", lambda a, b: a - b, a, b)

@@ -8,7 +8,7 @@ from amaranth.hdl import Mux, Signal, Value, unsigned
 from amaranth.lib import data
 
 from blysk.golden.lighting.power import Power
-from blysk.golden.number.fixed import SQ
+from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.lighting.specular import highlight_shape, one_minus
@@ -118,13 +118,17 @@ class PowerUnit(PipelinedUnit):
             s = next_s
         return s
 
+    _SUM = UQ(1, 34)
+    """Format of ``p + q - p q``, which is 0 or more and little more than 1, as factors are cut."""
+
     def _products(self, m, p, q, name):
         """``p + q - p q`` two cycles later, registered, and ``p`` at the same stage."""
         register = self.register
         product = register(m, p.truncate(17) * q.truncate(17), f"{name}_product")
         total = register(m, p + q, f"{name}_sum")
         kept = register(m, p, f"{name}_kept")
-        return register(m, total - product, f"{name}_difference"), register(m, kept, f"{name}_late")
+        difference = register(m, (total - product).wrap(self._SUM), f"{name}_difference")
+        return difference, register(m, kept, f"{name}_late")
 
     def _sequential(self, m, start):
         """Bit j: its square starts at stage 3 + 4j, its product at 4 + 4j; both end four cycles later."""
@@ -145,7 +149,7 @@ class PowerUnit(PipelinedUnit):
         product = register(m, factors[0] * factors[1], "product")
         is_product = any_at(6 + 4 * bit for bit in bits)
         other = FixedValue(format, Mux(is_product, Value.cast(s), Value.cast(x))[:34])
-        total = register(m, x + other - product, "total").saturate(format)
+        total = register(m, (x + other - product).wrap(self._SUM), "total").saturate(format)
         with m.If(at(2)):
             m.d.sync += [x.eq(start), s.eq(FixedValue.constant(format, 0))]
         for bit in bits:
