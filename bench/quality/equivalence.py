@@ -139,6 +139,9 @@ class Miter:
         # What changes nothing is seen before a register is taken apart, and then hardly.
         if not self._write(mutant, shared):
             return True
+        # Whatever the registers hold, as where a fault shows only while its register holds its word.
+        if self._prove(mutant, shared, _SECONDS / 4)[0]:
+            return True
         if register:
             whole = re.compile(re.escape(register) + r"(\W|$)")
             shared = {latch for latch in shared if not any(map(whole.match, self._names[latch]))}

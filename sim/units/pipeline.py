@@ -20,6 +20,8 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.units.cosines.chord_setup import values_of
+from blysk.sim.units.lighting.specular import any_exponent
+from blysk.sim.units.methods.chord_interpolator import spans_at_limits
 from blysk.sim.units.methods.interpolator import SPAN
 from blysk.sim.units.operands import (
     degrees_between,
@@ -28,6 +30,7 @@ from blysk.sim.units.operands import (
     sphere,
     spread_angles,
     turned,
+    word_ends,
 )
 from blysk.sim.units.pipeline_spans import (
     any_constants,
@@ -199,17 +202,35 @@ def _long_spans(unit, rng, count):
     return case_of(unit, joined(rng, row[row.length > 600][:60], farthest), constants, 0x3FFFF)
 
 
-def _highlights(unit, rng, count, *, exponent, invert):
+def _highlights(unit, rng, count, *, exponent, invert, brightness=8):
     """Spans inside a steep highlight of H, or of its opposite: every bit of H is 0 once, and 1 once."""
     peak = sphere(rng, 1)[0]
     direction = normalise(sphere(rng, 1)[0] + 3 * peak)
     peak, direction = (quantise(v) ^ -invert for v in (peak, direction))
-    colors = (Intensity.color(np.array([color])) for color in ((0, 0.01, 0), (8, 7, 6)))
+    bright = brightness * np.array([1, 0.9, 0.8])
+    colors = (Intensity.color(np.array([color])) for color in ((0, 0.01, 0), bright))
     vectors = direction[np.newaxis], peak[np.newaxis]
     constants = tabled(unit.parameters, FrameConstants(exponent, np.zeros(3, dtype=int), *vectors, *colors))
     largest = unit.parameters.interpolator.MAX_ANGLE - 0.01
     spans = spans_in_highlight(rng, largest, normalise(peak), exponent)
     return case_of(unit, spans, constants, 0x3FFFF)
+
+
+def _limits(unit, rng, count):
+    """Spans at the limits of the angle, every bit of which decides; every eighth of ends of words."""
+    exponent = any_exponent(rng)
+    at = spans_at_limits(rng, count, exponent)
+    for name in ("left", "middle", "right"):
+        at[name][::8] = word_ends(rng, len(at[name][::8]), 3)
+    design, zero = unit.parameters, np.zeros(count, dtype=np.int64)
+    length = rng.integers(1, 7, count)
+    spans = Spans(zero, zero, length, at["left"], at["right"], normal_middle=at["middle"])
+    (constants,) = any_constants(rng, design, spans)
+    constants.direction[:], constants.halfway[:] = at["direction"], at["halfway"]
+    if rng.random() < 0.25:
+        constants.direction[:] = word_ends(rng, 3)
+        constants.ambient[:] = rng.integers(0, Intensity.COLOR_FORMAT.max_code, 3)
+    return case_of(unit, spans, tabled(design, replace(constants, exponent=exponent)))
 
 
 def _halves(unit, rng, count):
@@ -363,9 +384,18 @@ RECORD = Record(
         "long spans": Stimulus(_long_spans, stalled=False, variants=_BOTH),
         "highlights": Stimulus(partial(_highlights, exponent=997, invert=0), variants=_BOTH),
         "highlights, inverted": Stimulus(partial(_highlights, exponent=30, invert=1), variants=_BOTH),
+        "peaks": Stimulus(partial(_highlights, exponent=997, invert=0, brightness=1), variants=_BOTH),
+        "limits": Stimulus(_limits, 600, stalled=False, repeats=20, variants=_BOTH[:1]),
         "halves": Stimulus(_halves, 30, repeats=12, variants=_BOTH),
         "brightest": Stimulus(_brightest, 800, stalled=False, variants=_BOTH),
         "counters": Stimulus(_counters, stalled=False, variants=_BOTH),
+    },
+    waivers={
+        "tables.active": "A value for the number of a bank that there is not.",
+        "tables.read": "No table is written while beats read it: then the register may move.",
+        "kept": "The length beside the first of a span's normals is not read.",
+        "multiplier_0_product": "A reciprocal and its square are normalised: the first bit is 1 already.",
+        "chord_values.datapath.result": "u is 6 at most: the bit is 0 already.",
     },
     still={
         "a counter stops at its largest value, and a flag that is set stays": (

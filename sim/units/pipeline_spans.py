@@ -272,11 +272,15 @@ def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarra
 
 
 def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.ndarray, exponent: int) -> Spans:
-    """Spans inside a highlight, 1 - N.H up to 2/n; most where it is an eighth of its peak and less."""
+    """Spans inside a highlight, 1 - N.H up to 2/n: most where it is an eighth of its peak and less, some of
+    every distance by its logarithm.
+    """
     kinds = []
     for count, longest in _LONG_AND_SHORT:
-        least = np.where(rng.random(count) < 0.2, 0.0, 0.6)
-        cosine = 1 - rng.uniform(least, 0.9) * 2 / exponent
+        share = np.where(
+            rng.random(count) < 0.2, 10.0 ** rng.uniform(-7, 0, count), rng.uniform(0.6, 0.9, count)
+        )
+        cosine = 1 - share * 2 / exponent
         middles = turned(rng, np.tile(halfway, (count, 1)), np.degrees(np.arccos(cosine)))
         kinds.append(spans_about(rng, largest, middles, longest))
     return joined(rng, *kinds)

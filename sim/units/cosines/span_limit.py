@@ -19,7 +19,7 @@ from blysk.sim.units.operands import (
 )
 from blysk.sim.units.record import Case, Decisions, Record, Stimulus, Variant
 
-__all__ = ["RECORD"]
+__all__ = ["RECORD", "differences_about"]
 
 EXPONENT = 60
 """Exponent of a run that needs only one."""
@@ -73,21 +73,38 @@ def _limits(unit, rng, count):
     return _case(unit, exponent, quantise(left), quantise(right))
 
 
-def _last_bits(unit, rng, count):
-    """Half the squared chord a few codes about the two limits: every bit of a comparison decides."""
-    p = unit.parameters
-    exponent = 1 << int(rng.integers(10))
-    limit = np.where(np.arange(count) % 2, p.chords.codes[exponent.bit_length()], p.widest.codes)
-    # From two axes, of which one component is any, the chord has any code with so many bits.
-    chord = np.maximum(limit + rng.integers(-3, 4, count) * (1 << rng.integers(0, 20, count)), 0)
-    rest = chord.copy()
+def differences_about(rng: np.random.Generator, chord: np.ndarray) -> np.ndarray:
+    """Differences of two normals whose half squared chord is a few codes, or a bit, off the given ones.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random generator.
+    chord : int array, shape (normals,)
+        Codes of `Chord.FORMAT`.
+
+    Returns
+    -------
+    int array, shape (normals, 3)
+        Codes of `COMPONENT`, none of them negative, the largest component first.
+    """
+    count = len(chord)
+    rest = np.maximum(chord + rng.integers(-3, 4, count) * (1 << rng.integers(0, 20, count)), 0)
     difference = np.zeros((count, 3), dtype=np.int64)
     for c in range(3):
         # Half a squared difference of 34 fraction bits has 35.
         difference[:, c] = np.floor(np.sqrt(rest))
         rest -= difference[:, c] ** 2
-    left = np.zeros_like(difference)
-    left[:] = difference // 2
+    return difference
+
+
+def _last_bits(unit, rng, count):
+    """Half the squared chord a few codes about the two limits: every bit of a comparison decides."""
+    p = unit.parameters
+    exponent = 1 << int(rng.integers(10))
+    limit = np.where(np.arange(count) % 2, p.chords.codes[exponent.bit_length()], p.widest.codes)
+    difference = differences_about(rng, limit)
+    left = difference // 2
     return _case(unit, exponent, left, left - difference)
 
 

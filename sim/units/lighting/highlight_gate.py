@@ -118,7 +118,7 @@ def _near(unit, rng, count, exponent, spread, degrees):
 
 def _spans(unit, rng, count, exponent=EXPONENT):
     """Spans of every angle to 90 degrees whose largest N·H is about the threshold; ends of the words."""
-    degrees = rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 90], count)
+    degrees = rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 75, 90], count)
     case = _near(unit, rng, count, exponent, 1e-3, degrees)
     format = unit.parameters.component_format
     corners = [format.min_code, format.max_code, 0, 1, -1]
@@ -135,6 +135,24 @@ def _any(unit, rng, count):
 def _last_bits(unit, rng, count):
     """The largest N·H off the threshold by the normals' rounding: last bits of products and sums decide."""
     return _near(unit, rng, count, any_exponent(rng), 1e-5, np.geomspace(0.1, 45, count))
+
+
+def _ties(unit, rng, count):
+    """Of many such spans those that are decided otherwise if a dot product is 2^9 of its last bits off."""
+    p, exponent = unit.parameters, any_exponent(rng)
+    case = _near(unit, rng, count, exponent, 1e-5, 45 * rng.random(count) ** rng.choice([1, 3]))
+    left, right = (Fixed(p.component_format, case.beats[f"normal_{end}"]) for end in ("left", "right"))
+    halfway = Fixed(p.component_format, case.constants["halfway"][0])
+    pairs = (left, right), (left, halfway), (right, halfway)
+    dots = [p.dot_product.compute(*pair) for pair in pairs]
+    threshold = p.thresholds[_exponent(unit, case.constants)]
+    decided = p.decide_by(*dots, threshold)
+    kept = np.zeros(count, bool)
+    for k, dot in enumerate(dots):
+        for off in (-1 << 9, 1 << 9):
+            other = Fixed(dot.format, np.clip(dot.codes + off, dot.format.min_code, dot.format.max_code))
+            kept |= p.decide_by(*dots[:k], other, *dots[k + 1 :], threshold) != decided
+    return Case({name: beats[kept] for name, beats in case.beats.items()}, case.constants)
 
 
 def _variants():
@@ -172,6 +190,7 @@ RECORD = Record(
         "spans": Stimulus(_spans, 600),
         "exponents": Stimulus(_any, 600, stalled=False, repeats=20),
         "last bits": Stimulus(_last_bits, 3000, stalled=False, repeats=30),
+        "ties": Stimulus(_ties, 100_000, stalled=False, repeats=20),
     },
     waivers={
         "a_0": (
@@ -181,6 +200,9 @@ RECORD = Record(
             "Without the bit the difference carries past the bits that are cut off once in 2^15 spans."
         ),
         "partial_0": "T (2 - u) is not negative, and less than 2: the controlling bit is 0.",
+        "total_0": "Of bits that are cut off: it carries into what is kept once in 2^14 spans.",
+        "cut": "1 - N_l·N_r is less than 4, also of words that are no unit vectors.",
+        "$auto$ff.cc:*": "All beats begin on the same turn: the unit waits only on the turn of its results.",
     },
     still={
         "the exponent stays for a run, so that what follows from it does not fall": (

@@ -175,7 +175,8 @@ RECORD = Record(
     axis="n u in the middle of the span",
     logarithmic=True,
     waivers={
-        "threshold": "Inverted by its first bit, which no exponent sets: its threshold would be 4 or more."
+        "threshold": "Inverted by its first bit, which no exponent sets: its threshold would be 4 or more.",
+        "least_0": "The bulge has another sign for one of its values, a power of two.",
     },
     still={
         "the exponent stays for a run, so that what follows from it does not fall": (

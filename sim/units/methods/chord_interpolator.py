@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 from amaranth.lib.wiring import Component
 
+from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.value_gate import ValueGate
@@ -12,10 +13,11 @@ from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Operands
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
-from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
+from blysk.sim.units.cosines.span_limit import differences_about
 from blysk.sim.units.lighting.specular import any_exponent
 from blysk.sim.units.methods.interpolator import SPAN, long_lengths, operand_beats
 from blysk.sim.units.operands import (
@@ -34,7 +36,15 @@ from blysk.sim.units.operands import (
 )
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["EXPONENT", "RECORD", "STILL_SPANS", "gated", "gated_beats", "mixed_lengths"]
+__all__ = [
+    "EXPONENT",
+    "RECORD",
+    "STILL_SPANS",
+    "gated",
+    "gated_beats",
+    "mixed_lengths",
+    "spans_at_limits",
+]
 
 EXPONENT = 60
 """Exponent of a run that needs only one."""
@@ -251,6 +261,59 @@ def _limits(unit, rng, count):
     return case
 
 
+def spans_at_limits(rng: np.random.Generator, count: int, exponent: int) -> dict[str, np.ndarray]:
+    """Spans whose angle, N·L and u are by a few codes or a bit off the limits of `SpanLimit`.
+
+    L is a coordinate axis, from which the normals of a span have nearly the same component. A third of the
+    spans begins at the edge of the highlight and goes away from it.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random generator.
+    count : int
+        Number of spans.
+    exponent : int
+        Specular exponent.
+
+    Returns
+    -------
+    dict of int arrays
+        ``left``, ``middle``, ``right``: normals, shape (count, 3); ``direction``, ``halfway``: L and H, shape
+        (3,). Codes of `COMPONENT`; the vectors are no unit vectors.
+    """
+    limit = SpanLimit()
+    narrow = limit.chords.codes[exponent.bit_length()]
+    difference = differences_about(rng, np.where(np.arange(count) % 2, narrow, limit.widest.codes))
+    turn = rng.uniform(0, 2 * np.pi)
+    # Short of 1, so that there is room for the widest differences on both sides.
+    halfway = quantise(np.array([np.cos(turn), np.sin(turn), 0.0])) * 7 // 10
+    along = rng.choice([-1, 1], (count, 1)) * (1 << rng.integers(0, 16, (count, 1)))
+    left = halfway + difference // 2
+    left[:, 2:] += np.int64(limit.BEHIND.values * ONE) + along
+    right = left - difference
+    middle = (left + right) >> 1
+    edge = np.full(len(left[::3]), np.int64(limit.lit(exponent) / Chord.FORMAT.step))
+    left[::3] = halfway + differences_about(rng, edge)
+    right[::3] = left[::3] + differences_about(rng, np.int64(narrow * 1.1) + 0 * edge)
+    middle[::3] = -halfway
+    left, right = (np.clip(normal, COMPONENT.min_code, ONE) for normal in (left, right))
+    vectors = {"direction": np.array([0, 0, ONE]), "halfway": halfway}
+    return {"left": left, "middle": middle, "right": right} | vectors
+
+
+def _decisions(unit, rng, count):
+    """Spans at the limits: every bit of a comparison decides."""
+    exponent = any_exponent(rng)
+    at = spans_at_limits(rng, count, exponent)
+    case = _case(unit, rng, at["left"], at["right"], rng.integers(4, 7, count), exponent)
+    case.beats["normal_middle"] = at["middle"]
+    lights = case.constants["lights"]
+    for name in ("direction", "halfway"):
+        lights[name][0] = at[name]
+    return case
+
+
 def _long_spans(unit, rng, count):
     """Spans of 3000 to 4095 pixels in range, where the last bits of the differences count; shorter ones."""
     length = long_lengths(rng, count)
@@ -293,8 +356,19 @@ RECORD = Record(
         "spans": Stimulus(_spans, 2000),
         "short spans": Stimulus(_short_spans, 800, repeats=3),
         "limits": Stimulus(_limits, 500, stalled=False, repeats=30),
+        "decisions": Stimulus(_decisions, 1000, stalled=False, repeats=20),
         "long spans": Stimulus(_long_spans, 60_000, stalled=False),
         "last bits": Stimulus(_last_bits, 4000, stalled=False),
+    },
+    waivers={
+        "chord_accumulator.values": "It is for the saturation at 2; a quadratic of values up to 1 is less.",
+        "level": "It is the table's entry of exponents under 1, and there are none.",
+        "u_?_exact_square_partial": (
+            "Squares end in 00 or 01, so the last bits of three never carry past the second bit; ten are cut."
+        ),
+        "chord_values.datapath.result": (
+            "The value of the saturation is the inverted sign, and a sum of squares is not negative."
+        ),
     },
     still=STILL_SPANS
     | {

@@ -113,13 +113,17 @@ def test_writes_go_on_while_the_unit_stands_still():
     found = []
 
     async def write(context, table, bank):
-        context.set(unit.write.valid, 1)
         beats = table.writes(bank)
         for value, begins in zip(beats["value"].tolist(), beats["begins"].tolist(), strict=True):
+            context.set(unit.write.valid, 1)
             context.set(unit.write.payload, {"value": value, "begins": begins})
             assert context.get(unit.write.ready)
             await context.tick()
-        context.set(unit.write.valid, 0)
+            # What is in a gap between two values is no value.
+            context.set(unit.write.valid, 0)
+            context.set(unit.write.payload, {"value": ~value & 0x1FFFF, "begins": value % 5 == 0})
+            for _ in range(value % 3):
+                await context.tick()
 
     async def send(context, codes, ready):
         """Beats, one a cycle while the unit takes them; the terms that come."""
