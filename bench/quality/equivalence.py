@@ -17,16 +17,17 @@ from blysk.bench.tools.tool_runner import ToolError
 __all__ = ["Miter", "yosys"]
 
 _SECONDS = 20
-"""Time limit in seconds of a proof of equivalence; most proofs that succeed take at most 3."""
+"""Time limit in seconds of a proof of equivalence; a first attempt may take a quarter of it before. Most
+proofs that succeed take at most 3."""
 
 
 def yosys(script: str, folder: Path) -> None:
-    """Run a script of Yosys (package pyosys) in a folder.
+    """Run a Yosys script in a folder, with the package pyosys.
 
     Raises
     ------
     ToolError
-        If it fails.
+        If Yosys fails.
     """
     done = subprocess.run(
         [sys.executable, "-c", YOSYS], input=script, capture_output=True, encoding="utf-8", cwd=folder
@@ -54,7 +55,7 @@ _NARROW = 12
 
 
 def _numbers(data: bytes) -> Iterator[int]:
-    """Numbers of AIGER's binary format: seven bits a byte, lowest first, and a bit for more bytes to come."""
+    """Numbers in AIGER's binary format: 7 bits a byte, lowest first; bit 7 is set if another byte follows."""
     value = shift = 0
     for byte in data:
         value |= (byte & 127) << shift
@@ -73,18 +74,19 @@ def _coded(number: int) -> bytes:
 
 
 class Miter:
-    """Equivalence check of a unit and a mutant of it, as AND gates and one-bit registers.
+    """Equivalence check of a unit and a mutant of it, both as AND gates and one-bit registers.
 
     A proof through products would take too long. Therefore unit and mutant share their registers, and the
-    proof shows that both compute the same next values: then the registers stay equal by induction. Narrow
-    registers, and those that mark the stages with a beat, control the unit and follow its logic; the other
-    shared registers are free inputs, but 0 if they are always 0 in the unit. Registers that the fault
-    reaches, and bits that differ in a proof, are not shared.
+    proof shows that both compute the same next values: then the registers stay equal by induction. Shared
+    registers of at most 12 bits, and those named ``valid`` or ``ages``, control the unit: they take the next
+    values that the unit computes. The other shared registers are free inputs, or 0 if they are always 0 in
+    the unit. The register that the fault reaches first, and bits that differ in a proof, are not shared.
 
     Parameters
     ----------
     folder : path
-        Folder with the netlist that `mutation.mutate` wrote: with input ``mutant`` 0 it is the unit.
+        Folder with the netlist ``whole.il`` that `mutation.mutate` wrote; with 0 at its input ``mutant`` it
+        is the unit. Intermediate files are written here.
     """
 
     def __init__(self, folder: Path):
@@ -113,10 +115,10 @@ class Miter:
         self._zero = self._constant()
 
     def _constant(self) -> set[int]:
-        """Registers of the unit that are always 0: while all of them are 0, each next value is 0."""
+        """Registers of the unit that are always 0: while all of them are 0, their next values are 0."""
         zero = set(range(len(self._next)))
         while True:
-            # Of each node what it is for certain: 0, 1, or not known.
+            # The value of each node: 0, 1, or ``None`` if it is not constant.
             nodes = [0] + [None] * self._inputs + [0 if k in zero else None for k in range(len(self._next))]
             for place in self._mutant:
                 nodes[1 + place] = 0
@@ -136,10 +138,11 @@ class Miter:
     def is_equivalent(self, mutant: int, register: str = "") -> bool:
         """Whether a mutant, whose fault reaches ``register`` first, is proved equivalent to the unit."""
         shared = set(range(len(self._next)))
-        # What changes nothing is seen before a register is taken apart, and then hardly.
+        # A fault that the simplification of gates removes. With fewer registers shared it would hardly do so.
         if not self._write(mutant, shared):
             return True
-        # Whatever the registers hold, as where a fault shows only while its register holds its word.
+        # A fault without effect whatever the registers contain, such as one that changes a register's input
+        # only while the register holds.
         if self._prove(mutant, shared, _SECONDS / 4)[0]:
             return True
         if register:
@@ -177,7 +180,7 @@ class Miter:
         return found[1] == found[2], {compared[k] for k in asserted} - {-1}
 
     def _write(self, mutant: int, shared: Set[int]) -> list[int]:
-        """Write ``mutant.aig``; the register that each output compares, -1 for an output of the unit."""
+        """Write ``mutant.aig``; the register that each of its outputs compares, -1 for one of the unit's."""
         known, gates = {}, []
         places = itertools.count(1 + self._inputs)
         units = [[0, *range(2, 2 * self._inputs + 2, 2)] for _ in range(2)]
@@ -206,13 +209,13 @@ class Miter:
             a, b = (unit[end >> 1] ^ end & 1 for unit in units)
             if latch >= 0 and not (latch in shared and latch in self._free):
                 now = (unit[1 + self._inputs + latch] >> 1 for unit in units)
-                # Of a register that is shared the unit's comes last.
+                # A shared register has one node, whose next value is the unit's.
                 ends = zip(now, (a, a if latch in shared else b), strict=True)
                 following |= {node: end for node, end in ends if node}
             if a != b and (latch < 0 or latch in shared):
                 outputs.append(both(both(a, b) ^ 1, both(a ^ 1, b ^ 1) ^ 1))
                 compared.append(latch)
-        # What these depend on, through the registers.
+        # Nodes that the outputs depend on, through registers, too.
         needed, open_ = {0}, [end >> 1 for end in outputs]
         while open_:
             node = open_.pop()

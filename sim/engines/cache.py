@@ -1,4 +1,4 @@
-"""The folder of compiled models, and those where other tools keep what they compile; the code's version."""
+"""Cache folders of the compiled models and of the tools that are started; the version of the code."""
 
 import atexit
 import functools
@@ -43,7 +43,7 @@ def _unsafe(folder: Path) -> str | None:
 
 @functools.cache
 def private_folder() -> Path:
-    """A folder of this process, removed at its end.
+    """A temporary folder of this process, removed when the process ends.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def private_folder() -> Path:
 
 
 def _unwritable(folder: Path) -> str | None:
-    """Why nothing can be kept in a folder, or ``None``; found out by trying, as root may write anywhere."""
+    """Why no file can be made in a folder, or ``None``; it is tried, as permission bits do not bind root."""
     try:
         os.rmdir(tempfile.mkdtemp(prefix=".blysk-", dir=folder))
     except OSError as error:
@@ -70,16 +70,18 @@ def _unwritable(folder: Path) -> str | None:
 
 @functools.cache
 def provide_caches() -> None:
-    """Let the tools that are started keep what they compile in a private folder, if they have no other.
+    """Give the tools that are started a private cache folder, if the user's cannot be written.
 
-    Yosys (as WebAssembly), nextpnr, Zig, Matplotlib: each has a cache below the user's cache or home folder,
-    and some end with an error where that cannot be written. A warning says so once; it takes time, as the
-    next run compiles again. Environment variables that name a tool's own folder count as they are.
+    Yosys (as WebAssembly), nextpnr, Zig and Matplotlib each have a cache below the user's cache or home
+    folder, and some end with an error where that cannot be written. The private folder is set in environment
+    variables, once in a process: in ``XDG_CACHE_HOME``, and in a tool's own variable only where it is not
+    set. A warning says that models and tools are compiled anew. If only the home folder cannot be written,
+    Matplotlib alone gets the private folder, without a warning.
 
     Raises
     ------
     InputError
-        If there is no temporary folder, either.
+        If the temporary folder cannot be used, either.
     """
     folder = Path("of the user")
     try:
@@ -89,7 +91,7 @@ def provide_caches() -> None:
         if no_home is None or not folder.is_relative_to(home):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         reason = _unwritable(folder)
-    # A user of no name, and no HOME.
+    # No HOME, and no entry of the user in the password database.
     except RuntimeError:
         reason = no_home = "there is no home folder"
     except OSError as error:
@@ -109,8 +111,9 @@ def provide_caches() -> None:
 def cache_folder() -> Path:
     """Folder of the compiled models: ``$BLYSK_CACHE``, or the user's cache folder.
 
-    A model is code that gets run, so a folder that belongs to another user, or that others can write, is not
-    used: a warning says so, and the models live in a private temporary folder until the process ends.
+    A model is code that is executed. So a folder that belongs to another user, or that others can write, is
+    not used, nor is one that cannot be made or written: a warning says so, and the models are kept in a
+    private temporary folder until the process ends.
 
     Returns
     -------
@@ -134,7 +137,7 @@ def warn_of_cache(folder: Path, reason: str) -> None:
 
 
 def version_of(package: str) -> str | None:
-    """Version of an installed package, ``None`` where it is not; nothing is imported."""
+    """Version of a package, ``None`` if it is not installed; the package is not imported."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -143,7 +146,7 @@ def version_of(package: str) -> str | None:
 
 @functools.cache
 def code_version(*libraries: str) -> str:
-    """Hash of the files of `golden`, `hdl` and `sim`, and of the versions of libraries that are installed."""
+    """Hash of the files of `golden`, `hdl` and `sim` and of the versions of the ``libraries`` installed."""
     installed = {name: version for name in libraries if (version := version_of(name))}
     digest = hashlib.sha256(repr(installed).encode())
     for package in ("golden", "hdl", "sim"):

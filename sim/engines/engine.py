@@ -8,12 +8,13 @@ Both engines do the same on every clock, so they give equal beats at equal cycle
 
 1. The writes are offered first, each until it is taken. From the clock after the last of them on, the
    source offers the next input beat unless ``input_stalls`` says otherwise on this clock; an offered beat
-   stays until it is taken. While ``valid`` is low, every payload bit is 1, so that a component that looks at
-   a payload without ``valid`` gives itself away.
+   stays until it is taken. While ``valid`` is low, every payload bit of an input is 1: so a component that
+   uses a payload without ``valid`` gives wrong results.
 2. The sink is ready unless ``output_stalls`` says otherwise on this clock.
 3. ``ready``, ``valid`` and payloads are read as they stand just before the rising edge; a beat moves at the
    edge where its ``valid`` and ``ready`` are both high.
-4. The edge. Clock 0 is the first after power-up, when every register holds its initial value.
+4. The rising edge ends the cycle. Cycles are numbered: clock 0 is the first after power-up, when every
+   register holds its initial value.
 """
 
 from collections.abc import Callable
@@ -31,11 +32,14 @@ __all__ = ["CompilerMissing", "Model", "Ports", "SimulationError", "Stimulus", "
 
 
 class SimulationError(Exception):
-    """A simulation that went wrong, in one line: the component broke the stream's rules or came to a halt."""
+    """A simulation failed: the component broke the rules of streams or got stuck, or an engine cannot run it.
+
+    The message is one line.
+    """
 
 
 class CompilerMissing(SimulationError):
-    """No C++ compiler that works; the one line says what was tried and what to do."""
+    """No C++ compiler works; the message says what was tried and what to do."""
 
 
 class Ports:
@@ -56,9 +60,10 @@ class Ports:
     Raises
     ------
     TypeError
-        If it is not a `Component`.
+        If ``component`` is not a `Component`.
     ValueError
-        If a member is missing, is of another kind, or is an input that no engine would drive.
+        If stream ``i`` or ``o`` is missing, a member is of another kind, a stream's payload has no bits, or
+        there is another input, or another member with a signature, which no engine drives.
     """
 
     def __init__(self, component: Component):
@@ -112,14 +117,14 @@ class Stimulus:
     input_stalls, output_stalls : bool array
         Stall patterns, repeated; shape (1,) and ``False`` for none.
     count : int or None
-        Output beats expected; ``None`` for as many as come.
+        Number of output beats expected; ``None`` for as many as come.
     idle_timeout : int
-        The run ends (``STUCK``, or ``DONE`` if no count is given and all input is taken) after so many
-        cycles without a transfer.
+        Cycles without a transfer after which the run ends: as ``DONE`` if ``count`` is ``None`` and all input
+        is taken, else as ``STUCK``.
     settle : int
-        Clocks to go on after the last transfer of a complete run.
+        Cycles to go on after the last transfer of a complete run, at most ``idle_timeout``.
     limit : int or None
-        Clocks after which to stop whatever happens (``LIMIT``).
+        Number of cycles after which the run ends in any case (``LIMIT``).
     """
 
     input: np.ndarray
@@ -146,7 +151,7 @@ class StopReason(IntEnum):
 
 @dataclass(frozen=True)
 class Trace:
-    """What an engine saw, packed; `Run` tells the rest of the fields.
+    """What an engine recorded, with packed beats; see `Run` for the same with unpacked beats.
 
     Parameters
     ----------
@@ -155,15 +160,15 @@ class Trace:
     clock : int
         Clock at which it stopped.
     total_cycles : int
-        Clocks up to and with the last transfer.
+        Number of cycles up to and including the last transfer.
     write_count : int
-        Writes taken.
+        Number of writes taken.
     output : uint32 array, shape (count, words)
         Output beats.
     cycles, input_cycles : int64 array
-        Clocks of the transfers.
+        Clock of each output transfer, and of each input transfer.
     status : uint32 array, shape (1, words)
-        Status; 0 after a run that broke off.
+        Status at the end of the run; 0 unless ``end`` is ``DONE`` or ``LIMIT``.
     """
 
     end: StopReason
@@ -184,7 +189,7 @@ class Trace:
 
 
 class Model(Protocol):
-    """A component made ready for an engine: any number of runs, each from power-up."""
+    """A component prepared for an engine: any number of runs, each from power-up."""
 
     def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
-        """Drive the stimulus; ``progress`` gets the number of output beats so far, now and then."""
+        """Drive the stimulus; ``progress`` gets the number of output beats so far, once a batch of cycles."""

@@ -1,9 +1,11 @@
-"""CXXRTL's C++ with the registers put under what lets them change, and written in place.
+"""CXXRTL's C++ with register updates grouped by their conditions, and registers written in place.
 
 CXXRTL gives every register a statement of its own, ``r.next = (rst ? 0 : (advance ? d : r.curr))``, and
-copies every register on every clock. Most of a pipeline stands still most of the time, and most registers ask
-the same question. `group_registers` asks each question once, and orders the statements so that all who read a
-register come before the one who writes it: then it needs no copy.
+copies every register on every clock. Most of a pipeline stands still most of the time, and most registers
+have the same few conditions. `group_registers` tests each condition once, and orders the statements so that
+all that read a register come before the one that writes it: then the register needs no copy from ``next``.
+
+In the names of this module a condition is a *question*, and its two results are the *answers*.
 """
 
 import re
@@ -30,7 +32,7 @@ _OUTPUT = re.compile(r"^\t/\*output\*/ wire<\d+> (\w+)", re.MULTILINE)
 
 
 def _choice(text: str) -> tuple[str, str, str] | None:
-    """Question, yes and no of ``(question ? yes : no)``; ``None`` if the text is anything else."""
+    """The three parts of the text ``(question ? yes : no)``; ``None`` for any other text."""
     if not text.startswith("("):
         return None
     depth, question, colon = 0, None, None
@@ -53,7 +55,10 @@ def _choice(text: str) -> tuple[str, str, str] | None:
 
 @dataclass
 class _Item:
-    """A statement: the value of a register or of its ``field``, or a question and a block for each answer."""
+    """A statement: an assignment to a register or its ``field``, or a condition with a block for each result.
+
+    ``text`` is the assigned value, or the condition; ``answers`` are the blocks for true and for false.
+    """
 
     text: str
     register: str = ""
@@ -62,20 +67,20 @@ class _Item:
 
     @cached_property
     def reads(self) -> set[str]:
-        """Registers that it reads."""
+        """Registers that the statement reads."""
         inner = (item.reads for block in self.answers for item in block.items)
         return set(_READ.findall(self.text)).union(*inner)
 
     @cached_property
     def writes(self) -> set[str]:
-        """Registers that it writes."""
+        """Registers that the statement writes."""
         inner = (item.writes for block in self.answers for item in block.items)
         return ({self.register} if self.register else set()).union(*inner)
 
 
 @dataclass
 class _Block:
-    """What is done under the same answers."""
+    """Statements under the same results of conditions; ``questions``: the conditions among them, by text."""
 
     items: list[_Item] = field(default_factory=list)
     questions: dict[str, _Item] = field(default_factory=dict)
@@ -97,9 +102,10 @@ class _Block:
             answer.add(register, text, field)
 
     def order(self, buffered: set[str]) -> None:
-        """Put those who read a register before the one who writes it.
+        """Order the statements so that those that read a register come before the one that writes it.
 
-        Where they go round in a circle, registers of the statement that needs the fewest are ``buffered``.
+        Where that is impossible, as they depend on each other in a cycle, the statement goes first for which
+        the fewest registers must be copied; these are added to ``buffered``.
         """
         readers = defaultdict(set)
         for k, item in enumerate(self.items):
@@ -138,7 +144,7 @@ class _Block:
                 block.order(buffered)
 
     def lines(self, indent: str, buffered: set[str]) -> Iterator[str]:
-        """C++ of the statements."""
+        """C++ of the statements; registers in ``buffered`` are written as ``next``, others as ``curr``."""
         for item in self.items:
             if item.register:
                 place = "next" if item.register in buffered else "curr"
@@ -154,10 +160,10 @@ class _Block:
 
 
 def _guard_writes(text: str) -> str:
-    """An evaluation that puts a memory's word together only where it is written.
+    """Put each memory write, and the assignments that only make its word, under a test of the enable.
 
-    CXXRTL gives a write all bits of its enable as a mask, on every clock. What only the word is made of goes
-    with it: at the edge the memories come before the registers, which are then as they were.
+    CXXRTL makes the word and calls ``update`` on every clock, with the enable repeated as a mask. The move is
+    valid as at the edge memories are written before registers, which then still have their old values.
     """
 
     def guarded(match: re.Match) -> str:
@@ -173,10 +179,10 @@ def _guard_writes(text: str) -> str:
 
 
 def _write_at_once(text: str) -> tuple[str, set[str]]:
-    """Statements at the edge with each memory of one write port written there, and the memories' names.
+    """Replace ``update`` by ``write`` for each memory with one write port; also returns their names.
 
-    The statements that read a memory come before: nobody reads it any more then. One bit that enables a
-    whole word has been asked for already, by `_guard_writes`.
+    ``write`` changes the memory at once. All statements that read a memory come before it. A mask that
+    repeats one enable bit is dropped, as `_guard_writes` has put the write under a test of that bit.
     """
     counts = Counter(match[1] for match in _UPDATE.finditer(text))
     memories = {name for name, count in counts.items() if count == 1}
@@ -184,7 +190,7 @@ def _write_at_once(text: str) -> tuple[str, set[str]]:
 
 
 class _Made:
-    """How the words of an evaluation are made."""
+    """The lines of an evaluation that declare and assign each word."""
 
     def __init__(self, text: str):
         self._counts = Counter(re.findall(NAME, text))
@@ -194,14 +200,17 @@ class _Made:
                 self._lines.setdefault(match[1], []).append(line)
 
     def lines(self, word: str) -> list[str]:
-        """Declaration and assignments of a word that has one reader; of others nothing."""
+        """Lines that declare and assign a word that is read once; none for any other word."""
         lines = self._lines.get(word, [])
         if not lines or not re.fullmatch(rf"\tvalue<\d+> {word};", lines[0]):
             return []
         return lines if self._counts[word] == len(lines) + 1 else []
 
     def fields(self, word: str) -> tuple[list[tuple[str, str]], set[str]]:
-        """Fields of a word with one reader, and the value of each; the lines that made them; or nothing."""
+        """Fields and their values of a word that is read once, and the lines that make them.
+
+        Both are empty if a field is not a word that is read once, or the fields do not cover the word.
+        """
         if not (lines := self.lines(word)):
             return [], set()
         found, made, bits = [], set(lines), 0
@@ -219,16 +228,22 @@ class _Made:
 
 
 def group_registers(text: str) -> str:
-    """Rewrite the C++ of `write_cxxrtl`: registers that share a question together, and in place.
+    """Rewrite the C++ of `write_cxxrtl`: register updates are grouped by condition, and written in place.
 
-    So are a register's fields, where each has a value of its own; a memory's word is put together where it
-    is written, and a memory with one write port is written in place, too, after all who read it. Four things
-    make it the same machine. The statements at the edge read registers as they were and combinational values
-    that are complete before the first of them, so that their order is free, and a register that nobody reads
-    any more may take its next value. Before every evaluation ``next`` of one that is copied equals its
-    ``curr``, so that ``r.next = r.curr`` may be left out. The driver reads outputs before the copies: those
-    that are registers are copied. The reset is an input that the driver never sets, so that the answer to it
-    is no. A text, or a statement, in which this cannot be seen stays as it is.
+    The fields of a register are updated one by one where each has a value of its own. A memory's word is made
+    only where it is written, and a memory with one write port is written in place, too, after all statements
+    that read it. The rewritten model behaves the same, for four reasons:
+
+    - The statements at the edge read old register values, and combinational values that are complete before
+      the first of them. So their order is free, and a register that no later statement reads may take its
+      next value.
+    - Before every evaluation, ``next`` of a register that is copied equals its ``curr``, so that
+      ``r.next = r.curr`` may be left out.
+    - The driver reads outputs before the copies. So registers that are outputs are copied, not written in
+      place.
+    - The reset is an input that the driver never sets, so that it is always 0.
+
+    A text or a statement for which this cannot be shown stays as it is.
 
     Parameters
     ----------
@@ -283,7 +298,7 @@ def _copy(register: str) -> str:
 
 
 def _edge_blocks(text: str) -> list[str] | None:
-    """Bodies of the statements at the clock's edge; ``None`` if there is anything else among them."""
+    """Bodies of the ``if`` statements at the clock's edge; ``None`` if there are other statements between."""
     blocks: list[str] = []
     body: list[str] | None = None
     for line in text.splitlines():

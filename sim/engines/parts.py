@@ -1,9 +1,9 @@
-"""CXXRTL's C++ with the fields of combinational words read where they come from.
+"""CXXRTL's C++ with the fields of combinational words read from their sources.
 
-Amaranth puts the fields of a structure together, passes the word on from unit to unit under new names, and
-takes it apart where a field is used: frame constants of 271 bits, on every clock. `read_parts` follows each
-field to the word or register that it was, and drops the words that nobody reads any more. The status, which
-the driver reads when there is no edge, is put together only then.
+Amaranth joins the fields of a structure to a word, passes the word on from unit to unit under new names, and
+splits it where a field is used: on every clock, even for frame constants of 271 bits. `read_parts` follows
+each field to the word or register that it comes from, and removes the words that are no longer read. The
+status, which the driver reads in an evaluation without a clock edge, is computed only there.
 """
 
 import re
@@ -14,7 +14,7 @@ from typing import NamedTuple
 __all__ = ["NAME", "read_parts"]
 
 NAME = r"\b[pi]_\w+"
-"""A name that CXXRTL gives: of a port or of something inside."""
+"""Pattern of a name in CXXRTL's C++: ``p_`` precedes a name of the netlist, ``i_`` a generated one."""
 
 _DECLARED = re.compile(rf"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> ({NAME})(?=;| \{{| =)", re.MULTILINE)
 _LOCAL = re.compile(rf"\tvalue<\d+> ({NAME});")
@@ -25,7 +25,7 @@ _READ = re.compile(rf"({NAME})(?:{_SLICE})?(?!\w)")
 
 
 class _Part(NamedTuple):
-    """Bits ``low`` to ``high`` of a word are those of ``source`` from ``start`` on."""
+    """Bits ``low`` to ``high`` of a word equal those of ``source`` from bit ``start`` on."""
 
     low: int
     high: int
@@ -34,7 +34,7 @@ class _Part(NamedTuple):
 
 
 class _Reader:
-    """What is known of the words above a line."""
+    """Sources of the bits of each word, as far as known from the statements so far."""
 
     def __init__(self, text: str):
         self.widths = {name: (kind, int(width)) for kind, width, name in _DECLARED.findall(text)}
@@ -44,14 +44,14 @@ class _Reader:
         return self.widths[source.removesuffix(".curr")][1]
 
     def found(self, name: str, low: int, high: int) -> _Part | None:
-        """What bits of a word are, if they are bits of one source."""
+        """Source of bits ``low`` to ``high`` of a word; ``None`` if unknown, or if there are several."""
         for part in self.parts.get(name, ()):
             if part.low <= low and high <= part.high:
                 return _Part(low, high, part.source, part.start + low - part.low)
         return None
 
     def read(self, text: str) -> str:
-        """An expression, with parts as what they are."""
+        """An expression in which parts with a known source are replaced by it."""
         return _READ.sub(self._replaced, text)
 
     def _replaced(self, match: re.Match) -> str:
@@ -66,11 +66,11 @@ class _Reader:
         stop = part.start + high - low
         if (part.start, stop) == (0, self.width(part.source) - 1):
             return part.source
-        # A word by itself may stand where a slice of another must be made a value.
+        # Where the word stood whole, a slice of its source needs `val()` to be a value.
         return f"{part.source}.slice<{stop},{part.start}>()" + (".val()" if last is None else "")
 
     def statements(self, line: str) -> Iterator[str]:
-        """A statement of `eval`, rewritten; what a word becomes is known from then on."""
+        """Lines for a statement of ``eval``, rewritten; the sources of the word that it assigns are noted."""
         match = _ASSIGNMENT.fullmatch(line)
         kind, width = self.widths.get(match[1], ("", 0)) if match else ("", 0)
         if kind != "value":
@@ -85,7 +85,7 @@ class _Reader:
             if last is None:
                 yield f"\t{name} = {value};"
                 return
-            # A word of its own, by a name that CXXRTL does not give.
+            # The field becomes a word of its own, with a name that CXXRTL does not use.
             source = f"{name}_at_{low}"
             self.widths[source] = ("value", high - low + 1)
             yield f"\tvalue<{high - low + 1}> {source};"
@@ -99,7 +99,7 @@ class _Reader:
         yield f"\t{name}{place} = {value};"
 
     def _sources(self, source: str, start: int, low: int, high: int) -> Iterator[_Part]:
-        """Parts of a word that bits of a source become."""
+        """Parts of a word whose bits ``low`` to ``high`` are set to those of ``source`` from ``start`` on."""
         known = self.parts.get(source, ())
         stop = start + high - low
         inside = [part for part in known if part.high >= start and part.low <= stop]
@@ -113,10 +113,10 @@ class _Reader:
 
 
 def read_parts(text: str) -> str:
-    """Rewrite the C++ of `write_cxxrtl` so that fields are read where they come from.
+    """Rewrite the C++ of `write_cxxrtl` so that fields are read from their sources.
 
-    It is the same machine, as a combinational word is written once, before it is read, and registers change
-    only when the clock's edge is committed. What is written under a condition stays as it is.
+    The behaviour stays the same, as a combinational word is written once, before it is read, and registers
+    change only in ``commit``. A word that is written under a condition is not followed to its sources.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def read_parts(text: str) -> str:
 
 
 def _late(lines: list[str]) -> list[str]:
-    """With the status, and local words that only it needs, under a question for no edge."""
+    """Lines with the status, and the local words that only it needs, moved under a test for no clock edge."""
     local = {match[1] for line in lines if (match := _LOCAL.fullmatch(line))}
     assignments = {k: match for k, line in enumerate(lines) if (match := _ASSIGNMENT.fullmatch(line))}
     late, readers = {"p_status"}, defaultdict(set)
@@ -159,7 +159,7 @@ def _late(lines: list[str]) -> list[str]:
 
 
 def _used(lines: list[str]) -> list[str]:
-    """Without the local words that are written but not read."""
+    """Lines without the local words that are written but not read."""
     local = {match[1] for line in lines if (match := _LOCAL.fullmatch(line))}
     while True:
         read = set()

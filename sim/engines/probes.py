@@ -1,4 +1,4 @@
-"""The pipeline with what goes on inside it brought out: spans that the gate stopped, words of its stages."""
+"""The pipeline with internal values in its status: number of gated pixels, words of its stages."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -30,25 +30,25 @@ class Probe:
     Parameters
     ----------
     name : str
-        Of the word.
+        Name of the word.
     title : str
-        What it is, for a reader.
+        Short description of the word for a reader.
     block : str
-        Part of the pipeline it belongs to: ``interpolator``, ``gate``, ``diffuse``, ``specular``,
+        Part of the pipeline that it belongs to: ``interpolator``, ``gate``, ``diffuse``, ``specular``,
         ``intensity`` or ``output``.
     shape : ShapeLike
-        Its shape; a `FixedShape` where it is a number.
+        Its shape; a `FixedShape` where it is a fixed-point number.
     age : int
-        Clocks from when the lights take a pixel's operands (`ObservedPipeline` tells it by ``taken``) to when
-        the word is that of the pixel; before that, less than 0.
+        Cycles from the one in which the lights take a pixel's operands (``taken`` of `ObservedPipeline`) to
+        the one in which the word belongs to that pixel; negative where the word comes first.
     exact : str
-        Name of what the word would be in exact arithmetic, empty for a mark: ``normal_x``, ``normal_y``,
-        ``normal_z``; ``cosine`` (N·L), ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H);
-        ``product`` (k times that), ``base``, ``base_2``, ``base_4``, ``base_8`` (its powers); ``diffuse``,
-        ``specular``; ``red_diffuse``, ``red_specular``, ``red`` in LSB, not limited; ``r``, ``g``, ``b``
-        limited.
+        Name of the exact quantity that the word approximates: ``normal_x``, ``normal_y``, ``normal_z``;
+        ``cosine`` (N·L), ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H); ``product`` (the
+        specular unit's slope k times 1 - N·H), ``base``, ``base_2``, ``base_4``, ``base_8`` (powers of the
+        base); ``diffuse``, ``specular``; ``red_diffuse``, ``red_specular``, ``red`` in LSB, not limited;
+        ``r``, ``g``, ``b`` in LSB, limited. Empty for flags, columns and the increments of a sum.
     unit : float
-        Value that stands for 1.
+        Value of the word that stands for 1 of the exact quantity.
     """
 
     name: str
@@ -61,26 +61,26 @@ class Probe:
 
 
 class ObservedPipeline(Component):
-    """A pipeline of one light, whose status tells more; its beats are those without.
+    """A pipeline of one light with internal values in its status; its beats are the same as without them.
 
     Parameters
     ----------
     design : Design
-        What is observed; one light, with a gate or without.
+        Design of the pipeline; with one light, with a gate or without.
 
     Members
     -------
     i, o, write
         Those of `ShadingPipelineUnit`.
     status : :py:`Out(StructLayout({..., "gated_pixels": 32}))`
-        Its status; the number of pixels, of spans that the gate has found to be without a highlight, that the
-        lights have taken; ``waits``, whether the interpolator's pixel waits, and ``taken``, whether the
-        lights take one; and each word by the name of its probe.
+        The fields of its status; ``gated_pixels``, the number of pixels that the lights have taken of spans
+        in which the gate found no highlight, 0 without a gate; ``waits``, whether a pixel of the interpolator
+        is stalled; ``taken``, whether the lights take a pixel; and each word, by the name of its probe.
 
     Raises
     ------
     ValueError
-        If the design has another number of lights.
+        If the design has not exactly one light.
     """
 
     def __init__(self, design: Design):
@@ -95,9 +95,9 @@ class ObservedPipeline(Component):
         super().__init__(members | {"status": Out(data.StructLayout(status))})
 
     def elaborate(self, platform):
-        """The pipeline, a counter beside it, and wires from its words."""
+        """The pipeline, the counter of gated pixels, and connections from internal words to the status."""
         m = Module()
-        # Elaborated here, so that the signals inside are known.
+        # Elaborated here, so that its internal signals can be found.
         m.submodules.pipeline = fragment = Fragment.get(self.unit, platform)
         for name, member in self.unit.signature.members.items():
             inner, outer = getattr(self.unit, name), getattr(self, name)
@@ -125,7 +125,7 @@ class ObservedPipeline(Component):
 
 
 def probes_of(unit: ShadingPipelineUnit) -> list[Probe]:
-    """Words that are watched in a pipeline of one light, in the order in which a pixel meets them.
+    """Words that are watched in a pipeline of one light, from the interpolator to the output.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def probes_of(unit: ShadingPipelineUnit) -> list[Probe]:
 
 
 def _part(fragment: Fragment, path: str) -> Fragment | None:
-    """Submodule with dots between the names."""
+    """Submodule by its path, names with dots between; ``None`` if there is none."""
     for name in path.split("."):
         inside = [part for part, own, *_ in fragment.subfragments if own == name]
         if not inside:
@@ -158,7 +158,7 @@ def _registers(fragment: Fragment | None) -> dict[str, Signal]:
 
 
 def _assignments(statements) -> Iterator[tuple[Iterable[Signal], Iterable[Signal]]]:
-    """What is assigned, and from what, whatever it depends on."""
+    """Signals written and signals read by each assignment, under conditions, too; these are not looked at."""
     for statement in statements:
         if hasattr(statement, "cases"):
             for _, inner, *_ in statement.cases:
@@ -168,8 +168,11 @@ def _assignments(statements) -> Iterator[tuple[Iterable[Signal], Iterable[Signal
 
 
 def _ages(fragment: Fragment, operands: Value) -> dict[str, int]:
-    """Clocks from the operands to each register of a data path that goes one way."""
-    # Amaranth's signals are no keys of a dictionary.
+    """Latency in cycles from the operands to each register of a data path without feedback, by name.
+
+    Registers that do not depend on the operands are left out.
+    """
+    # By `id`, as signals of Amaranth cannot be keys of a dictionary.
     registers = _registers(fragment)
     clocked = {id(signal) for signal in registers.values()}
     sources: dict[int, list[Signal]] = defaultdict(list)
@@ -191,7 +194,7 @@ def _ages(fragment: Fragment, operands: Value) -> dict[str, int]:
 
 
 def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Probe, Value]]:
-    """Probes, and the values that they watch."""
+    """Each probe and the value that it watches."""
     design = unit.parameters
 
     def number(name, title, block, value, age, exact, scale=1.0, format: Format | None = None):
@@ -255,7 +258,7 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
 
 
 def _accumulators(fragment, design: Design, number, one: float, one_squared: float):
-    """Sums of the methods that have them, and what is added to them."""
+    """Probes for the sums of methods with accumulators, and for their increments."""
     words = _registers(_part(fragment, f"{_CHORD_SPANS}.chord_accumulator"))
     if words:
         for name, title, exact in (

@@ -18,11 +18,12 @@ _BATCH = 1000
 _PERIOD = 1e-8
 
 _RECURSION = 20_000
-"""Depth of an expression for Python: the simulator writes a memory's enable as a term for every bit."""
+"""Python's recursion limit while the simulator compiles: a memory's enable becomes a nested expression with a
+term for every bit."""
 
 
 def _codes(words: np.ndarray) -> list[int]:
-    """One integer a beat; the engine's own integers have no width."""
+    """Beats as Python integers, one a beat, however wide."""
     return [int.from_bytes(row.tobytes(), "little") for row in words.astype("<u4")]
 
 
@@ -49,7 +50,7 @@ class Model:
     component : Component
         Component to be simulated.
     vcd : str, optional
-        File for the waveforms of each run.
+        VCD file for the waveforms; each run overwrites it.
     """
 
     def __init__(self, component: Component, vcd: str | None = None):

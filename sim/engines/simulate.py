@@ -25,7 +25,7 @@ from blysk.sim.engines.engine import (
 __all__ = ["Run", "simulate", "stimulus_of"]
 
 _PIECE = 1 << 15
-"""Beats unpacked at once."""
+"""Number of beats unpacked in one step."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,10 @@ class Run:
     cycles : int64 array, shape (count,)
         Clock at whose end each output beat was taken; clock 0 is the first after power-up.
     input_cycles : int64 array, shape (input beats,)
-        The same of each input beat.
+        Clock at whose end each input beat was taken.
     total_cycles : int
-        Clocks from clock 0 up to and with the last transfer (of an input, an output or a write).
+        Number of cycles from clock 0 up to and including the last transfer (of an input, an output or a
+        write).
     status : scalar of the status layout's type, or None
         The component's ``status`` at the end of the run.
     engine : str
@@ -119,12 +120,12 @@ def stimulus_of(
     idle_timeout: int = 10_000,
     settle: int = 64,
 ) -> Stimulus:
-    """Beats and stalls as an engine takes them; the arguments are those of `simulate`.
+    """Stimulus for an engine, packed and checked; the arguments are those of `simulate`.
 
     Raises
     ------
     ValueError, TypeError
-        If the component's members or an argument do not fit.
+        If a member of the component or an argument has a wrong type, shape or value.
     """
     ports = Ports(component)
     return Stimulus(
@@ -163,13 +164,13 @@ def simulate(
     Parameters
     ----------
     component : Component
-        Component with the members named in the text of `engine`.
+        Component with the members that the module `blysk.sim.engines.engine` describes.
     beats : structured array or mapping
         Input beats, as `beats.pack` takes them.
     count : int or None
-        Output beats expected: the run ends when they and all input beats have moved and ``settle`` more
-        cycles have passed. ``None`` takes as many as come, until all input is taken and nothing has moved
-        for ``idle_timeout`` cycles.
+        Number of output beats expected: the run ends when they, all writes and all input beats are
+        transferred and ``settle`` more cycles have passed. ``None`` takes as many as come, until all input is
+        taken and ``idle_timeout`` cycles have passed without a transfer.
     constants : scalar of the constants' type, or mapping of names to codes
         Driven for the whole run; needed when the component has ``constants``.
     write : structured array or mapping, optional
@@ -178,18 +179,21 @@ def simulate(
         ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine or, with a warning that says why, pysim
         where no compiler works.
     origin : optional
-        As of `cxxrtl.Model`: what the component is made from, so that a model in the cache is found sooner.
+        What the component is made from, as for `cxxrtl.Model`; with it a model in the cache is found faster.
     input_stalls, output_stalls : bool array, optional
-        Repeated for ever; ``True`` on a clock keeps the source from offering a new beat, or the sink from
-        being ready.
+        One value a cycle, repeated for ever; ``True`` keeps the source from offering a new beat, or the sink
+        from being ready. At least one value must be ``False``.
     idle_timeout : int
-        Clocks without a transfer after which the component counts as stuck.
+        Cycles without a transfer after which the component counts as stuck, or, where ``count`` is ``None``
+        and all input is taken, the run ends; at least 1.
     settle : int
-        Clocks to watch for a beat too many.
+        Cycles after the last transfer in which a surplus output beat is an error; at most ``idle_timeout``,
+        else the component counts as stuck.
     progress : callable, optional
-        Called with the number of output beats so far, between batches.
+        Called with the number of output beats so far, once a batch: a million cycles of ``cxxrtl``, 1000 of
+        ``pysim``.
     vcd : str, optional
-        File for the waveforms; ``pysim`` only.
+        VCD file for the waveforms; ``pysim`` only.
 
     Returns
     -------
@@ -198,12 +202,13 @@ def simulate(
     Raises
     ------
     SimulationError
-        If the component withdraws or changes a beat that waits, gives a beat too many, or gets stuck; the
-        clock is named. If the engines disagree on the first cycles of a newly built model.
+        If the component withdraws or changes a beat that waits for ready, gives a surplus output beat, or
+        gets stuck; the message names the clock. If the engines differ in the first cycles of a newly built
+        model, or the compiled engine cannot translate the component.
     CompilerMissing
         If there is no working C++ compiler for ``"cxxrtl"``.
     ValueError, TypeError
-        If the component's members or an argument do not fit.
+        If a member of the component or an argument has a wrong type, shape or value.
     """
     if engine not in ("cxxrtl", "pysim", "auto"):
         raise ValueError(f"engine must be 'cxxrtl', 'pysim' or 'auto', not {engine!r}")
@@ -246,7 +251,7 @@ def simulate(
 
 
 def _unpacked(shape, words: np.ndarray) -> np.ndarray:
-    """`beats.unpack`, in pieces whose intermediate words stay in the processor's cache."""
+    """`beats.unpack` in pieces so small that the intermediate words stay in the processor's cache."""
     beats = np.empty(len(words), dtype=dtype_of(shape))
     for start in range(0, len(words), _PIECE):
         piece = words[start : start + _PIECE]
@@ -255,7 +260,7 @@ def _unpacked(shape, words: np.ndarray) -> np.ndarray:
 
 
 def _judge(stimulus: Stimulus, trace: Trace) -> None:
-    """Raise `SimulationError` unless the run is complete."""
+    """Raise `SimulationError` if the run ended otherwise than complete or at its limit."""
     where = f"at clock {trace.clock}, output beat {len(trace.output)}"
     if trace.end == StopReason.DROPPED:
         raise SimulationError(f"{where}: valid went low while the beat waited for ready")

@@ -17,12 +17,12 @@ _WORD = 32
 
 
 class ToggleCounter(Component):
-    """A component with a counter beside each of its submodules: register bits that have changed since reset.
+    """A component with a counter for each of its submodules: toggles of register bits since reset.
 
-    Counted are registers and the words that memories give on a clock, each bit on each clock on which it
-    differs from the clock before; not the bits inside a memory, and no wires. A change is in the count two
-    cycles later. Counters have 48 bits: 2^48 toggles are more than 1000 registers of 18 bits make in
-    10^10 cycles.
+    A toggle is one bit that differs from its value in the cycle before. Counted are the bits of registers and
+    of the registered read data of memories; not those stored in a memory, nor those of combinational signals.
+    A register that changes at one clock edge is in the count after the next edge. Counters have 48 bits:
+    1000 registers of 18 bits make fewer than 2^48 toggles in 10^10 cycles.
 
     Parameters
     ----------
@@ -34,7 +34,8 @@ class ToggleCounter(Component):
     i, o, constants, write
         Those of the component.
     status : :py:`Out(StructLayout({path: 48, ...}))`
-        Counts, by the submodules' names with dots between; ``top`` for the component's own registers.
+        Counts, by the path of the submodule, names with dots between; ``top`` for the component's own
+        registers. Submodules without registers have none.
     """
 
     def __init__(self, component: Component):
@@ -45,9 +46,9 @@ class ToggleCounter(Component):
         super().__init__(members | {"status": Out(counts)})
 
     def elaborate(self, platform):
-        """The component, what its registers were, and sums."""
+        """The component, the previous values of its registers, and the counters."""
         m = Module()
-        # Elaborated here, so that it is known which signals are registers.
+        # Elaborated here, so that its registers can be found.
         m.submodules.component = fragment = Fragment.get(self._component, platform)
         for name in self.signature.members:
             inner, outer = getattr(self._component, name, None), getattr(self, name)
@@ -62,8 +63,8 @@ class ToggleCounter(Component):
                 ]
             else:
                 m.d.comb += Value.cast(inner).eq(Value.cast(outer))
-        # Registers that stay: with a constant, a conjunction is put together from single bits, and takes
-        # minutes to compile.
+        # Registers that never change: an AND with a constant would be written bit by bit, and take minutes
+        # to compile.
         masks = [Signal(_WORD, init=mask, name=f"mask_{step}") for step, mask in enumerate(_Ones.MASKS)]
         m.d.sync += [mask.eq(mask) for mask in masks]
         for number, (path, registers) in enumerate(_registers(fragment).items()):
@@ -79,7 +80,7 @@ class ToggleCounter(Component):
 def count_toggles(
     component: Component, beats: np.ndarray | Mapping, *, engine: str = "pysim", **options: Any
 ) -> tuple[Run, dict[str, int]]:
-    """Run a component, and count the toggled bits of its registers.
+    """Run a component, and count the toggles of its register bits.
 
     Parameters
     ----------
@@ -88,15 +89,16 @@ def count_toggles(
     beats, **options
         Those of `simulate`.
     engine : str
-        As for `simulate`. With the sums a component takes the compiled engine three times as long to build,
-        a pipeline half a minute; the interpreted one is done before with some hundred cycles.
+        As for `simulate`. The counters make a build of the compiled engine three times as long, half a minute
+        for a pipeline; for some hundred cycles ``pysim`` is faster.
 
     Returns
     -------
     run : Run
-        What `simulate` gives, but for the status.
+        What `simulate` gives, but with the counts as status.
     toggles : dict of str to int
-        Toggled bits of each submodule, without those inside it: "top", "datapath", "light_0.specular", ...
+        Toggles in each submodule by its path, without its own submodules: "top", "datapath",
+        "light_0.specular", ...
     """
     counter = ToggleCounter(component)
     run = simulate(counter, beats, engine=engine, **options)
@@ -104,7 +106,7 @@ def count_toggles(
 
 
 def _registers(fragment: Fragment, path: str = "top") -> dict[str, list[Value]]:
-    """What a fragment and those inside drive on a clock, by path."""
+    """Registers, and registered read data of memories, of a fragment and its submodules, by path."""
     registers: list[Value] = []
     for domain, statements in fragment.statements.items():
         if domain != "comb":
@@ -124,9 +126,9 @@ def _init(register: Value) -> int:
 
 
 def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
-    """Bits of the registers, 32 together, and what they are after reset.
+    """Words of 32 register bits, fewer in the last one, and their values after reset.
 
-    An engine computes with such words at once; a word of all bits would take minutes to compile.
+    An engine computes with such a word in one operation; one word of all bits would take minutes to compile.
     """
     parts, initial, width = [], 0, 0
     for register in registers:
@@ -144,12 +146,12 @@ def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
 
 
 class _Ones(Elaboratable):
-    """Bits of a word that are not what they were a clock before: how many of each byte, in that byte.
+    """Number of bits of a word that differ from the cycle before: for each byte of the word, in that byte.
 
-    A module of its own, of which an engine that looks for changes has little to do again.
+    A module of its own, so that an event-driven engine has little to evaluate again after a change.
     """
 
-    # Neighbours are added up in fields of 1, 2 and 4 bits.
+    # Neighbouring fields of 1, then 2, then 4 bits are added.
     MASKS = tuple(((1 << _WORD) - 1) // ((1 << 2 * field) - 1) * ((1 << field) - 1) for field in (1, 2, 4))
 
     def __init__(self, now: Value, init: int, masks: Sequence[Value]):
@@ -170,7 +172,7 @@ class _Ones(Elaboratable):
 
 
 def _total(counts: Sequence[_Ones]) -> Value:
-    """Sum of the bytes. One holds 8 at most: those of 31 words add up to less than 256."""
+    """Sum of all bytes. Each is at most 8, so that the sum of one byte over 31 words is less than 256."""
     total = Const(0)
     for start in range(0, len(counts), 31):
         bytes_ = sum((count.bytes for count in counts[start : start + 31]), Const(0, _WORD))[:_WORD]

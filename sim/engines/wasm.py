@@ -1,7 +1,7 @@
 """A component as a WebAssembly module: the compiled engine's model and driver, for a browser.
 
-The module imports nothing. Its exports are in `wasm_driver.cc`; the beats are words as `beats.pack` packs
-them, and `fields_of` tells where each field lies.
+The module imports nothing. Its exports are in `wasm_driver.cc`. Beats are words as `beats.pack` packs them;
+`fields_of` gives the place of each field.
 """
 
 import importlib.util
@@ -37,7 +37,7 @@ def build(component: Component) -> bytes:
     Parameters
     ----------
     component : Component
-        As for `simulate`; with a stream ``write`` and a status, and without ``constants``.
+        As for `simulate`; with a stream ``write`` and a ``status``, and without ``constants``.
 
     Raises
     ------
@@ -46,7 +46,8 @@ def build(component: Component) -> bytes:
     SimulationError
         If Yosys cannot translate the component, or the compiler refuses the result.
     ValueError
-        As `Model` raises it; or if the component has constants, or lacks the stream ``write`` or a status.
+        As `cxxrtl.Model` raises it; or if the component has constants, or lacks the stream ``write`` or a
+        status.
     """
     ports = Ports(component)
     if ports.constants is not None or ports.status is None or ports.write is None:
@@ -73,12 +74,12 @@ def build(component: Component) -> bytes:
 
 
 def format_of(format: Format) -> dict[str, Any]:
-    """A fixed-point format as JSON: ``width``, ``signed``, ``fraction``, the bits right of the point."""
+    """A fixed-point format as JSON: ``width``, ``signed``, and ``fraction``, the number of fraction bits."""
     return {"width": format.width, "signed": format.signed, "fraction": format.fraction_bits}
 
 
 def fields_of(layout: Any) -> dict[str, dict[str, Any]]:
-    """Where the fields of a beat lie in its words, as JSON.
+    """Place and format of each field of a beat, as JSON.
 
     Parameters
     ----------
@@ -88,8 +89,8 @@ def fields_of(layout: Any) -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict
-        By names and indices with dots between: ``offset``, the lowest bit, and `format_of` the field's
-        format; of a plain shape the fraction has no bits.
+        For each field, by its path of names and indices with dots between: ``offset``, its lowest bit in the
+        beat, and what `format_of` gives for its format; a plain shape has 0 fraction bits.
     """
     return dict(_fields(layout, (), 0))
 
@@ -107,7 +108,7 @@ def _fields(shape: Any, path: tuple, offset: int) -> Iterator[tuple[str, dict[st
 
 
 def ports_of(component: Component) -> dict[str, dict[str, Any]]:
-    """What a program must know to fill and to read a module's arrays, as JSON.
+    """Sizes and fields of the beats of a module's ports, as JSON.
 
     Parameters
     ----------
@@ -117,7 +118,8 @@ def ports_of(component: Component) -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict
-        By port (``i``, ``o``, ``write``, ``status``): ``words`` of 32 bits of a beat, and `fields_of` it.
+        By port (``i``, ``o``, ``write``, ``status``): ``words``, the number of 32-bit words of a beat, and
+        ``fields``, as `fields_of` gives them.
     """
     ports = Ports(component)
     shapes = {name: getattr(ports, name) for name in ("i", "o", "write", "status")}

@@ -1,9 +1,9 @@
-"""CXXRTL's C++ with expressions of at most 64 bits as expressions of one machine word.
+"""CXXRTL's C++ with expressions of at most 64 bits rewritten to expressions of one machine word.
 
 CXXRTL writes every expression with templates over the widths: ``add_uu<5>(a.curr, b.slice<7,4>().val())``.
 A compiler takes longer to instantiate and inline them than for all the rest. `plain_words` writes such an
-expression as ``((a.curr.data[0] + ((b.data[0] >> 4) & 0xf)) & 0x1f)``: the same machine, compiled in two
-fifths of the time.
+expression as ``((a.curr.data[0] + ((b.data[0] >> 4) & 0xf)) & 0x1f)``. The model behaves the same, and
+compiles in two fifths of the time.
 """
 
 import re
@@ -46,20 +46,27 @@ _SHIFTS = {
 
 
 LONG = 4096
-"""Characters of an expression whose operands get names."""
+"""Length of a long expression's text, in characters. In a longer assignment the operands get names; a longer
+condition or memory access stays as it is."""
 
 
 class _Left(Exception):
-    """Something that stays as it is."""
+    """Raised for a statement that is not understood, and so stays as it is."""
 
 
 class _Expression(NamedTuple):
-    """C++ of an expression: up to 64 bits a word below 2^width, above a ``value``; or any variable.
+    """C++ of an expression, and what is known of its value.
 
-    ``low`` is a word with the lowest 64 bits, where it is simpler. ``among`` is for one that is not 0 when a
-    word is one of some constants: the word, and a mask with their bits. ``bits`` are those of a
-    variable, by their last and first, that it is, or, of a narrower one, is not 0 with. ``zeros`` are such
-    bits, too, whose leading zeros it counts, and what is added.
+    ``code`` is a variable's name if ``variable``; else a word, below 2^width, for up to 64 bits, and a
+    ``value`` for more. The other fields are empty where they do not apply:
+
+    - ``low``: simpler C++ of a word with the lowest 64 bits.
+    - ``among``: a word and a mask. The expression is not 0 if, and only if, the word is a constant whose bit
+      is set in the mask.
+    - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits; or,
+      if it has 1 bit and they are more, it tells whether they are not all 0.
+    - ``zeros``: a variable, last and first bit, and a number. The expression is the count of leading zeros of
+      these bits plus the number.
     """
 
     code: str
@@ -108,10 +115,11 @@ def _literal(parts: str) -> int:
 
 
 class _Parser:
-    """Recursive descent over one expression.
+    """Recursive-descent parser of one expression.
 
-    Of a long one, operands that come again get a name: ``names`` by their code. CXXRTL writes them out each
-    time, the steps of a divider as often as there are steps behind them.
+    In a text of more than `LONG` characters, operands whose code has more than 64 characters get a name, and
+    equal ones the same: ``names``, by code. CXXRTL repeats the text of an operand at every use; in a divider
+    the text of a step is repeated for every step after it.
     """
 
     def __init__(self, text: str, variables: dict[str, tuple[str, int]]):
@@ -142,7 +150,7 @@ class _Parser:
         return int(token)
 
     def numbers(self) -> list[int]:
-        """Template arguments."""
+        """Numbers in a list of template arguments."""
         self.take("<")
         found = [self.number()]
         while self.peek() == ",":
@@ -267,7 +275,7 @@ def _slice(of: _Expression, last: int, first: int) -> _Expression:
 
 
 def _bits(of: _Expression) -> tuple[_Expression, int, int] | None:
-    """Bits that an expression is."""
+    """Variable, last and first bit that an expression equals; ``None`` if unknown."""
     if of.variable:
         return of, of.width - 1, 0
     return of.bits if of.bits and of.width == of.bits[1] - of.bits[2] + 1 else None
@@ -276,7 +284,11 @@ def _bits(of: _Expression) -> tuple[_Expression, int, int] | None:
 def _zeros(
     question: _Expression, yes: _Expression, no: _Expression
 ) -> tuple[_Expression, int, int, int] | None:
-    """Bits whose leading zeros a choice counts: those of an upper half that is not 0, or of both."""
+    """``zeros`` of ``(question ? yes : no)``, if it counts the leading zeros of adjacent bits; else ``None``.
+
+    The condition is that the upper part of the bits is not 0; then ``yes`` counts its leading zeros, else
+    ``no`` those of the lower part and adds the width of the upper one.
+    """
     if not (yes.zeros and no.zeros and question.bits):
         return None
     of, last, middle = question.bits
@@ -299,7 +311,7 @@ def _unary(name: str, width: int, a: _Expression) -> _Expression:
         code = f"word({a.word} == 0)" if a.width <= 64 else f"word(!bool({a.value}))"
         among = (a.word, 1) if a.width <= 6 else None
     elif name in ("reduce_or", "reduce_bool") and a.among and a.width > 1 and width == 1:
-        # A table, instead of a comparison with each.
+        # A look-up in the mask, instead of a comparison with each constant.
         code = f"(({a.among[1]:#x}ull >> {a.among[0]}) & 0x1ull)"
     elif name in ("reduce_or", "reduce_bool") and width <= 64:
         code = f"word({a.word} != 0)" if a.width <= 64 else f"word(bool({a.value}))"
@@ -329,7 +341,7 @@ def _binary(name: str, width: int, a: _Expression, b: _Expression) -> _Expressio
             code = _cut(f"{_SHIFTS[name]}({a.signed if signs == 'su' else a.word}, {b.word})", width)
         elif signs in ("uu", "ss") and operation in _ARITHMETIC:
             code = f"{left} {_ARITHMETIC[operation]} {right}"
-            # Nothing to cut off: bit by bit, of operands no wider than the result.
+            # A bitwise operation on operands no wider than the result needs no mask.
             fits = signs == "uu" and operation in ("and", "or", "xor") and max(a.width, b.width) <= width
             code = f"({code})" if fits else _cut(code, width)
             if operation == "add" and b.zeros and _NUMBER.fullmatch(left):
@@ -357,7 +369,7 @@ def _binary(name: str, width: int, a: _Expression, b: _Expression) -> _Expressio
 
 
 def _store(target: str, width: int, last: int, first: int, code: str) -> str:
-    """Put a word into bits of a variable."""
+    """C++ that stores a word in bits ``first`` to ``last`` of a variable of ``width`` bits."""
     if (first, last) == (0, width - 1) and width <= 64:
         return f"{target}.data[0] = {code};"
     word, shift = divmod(first, 64)
@@ -412,7 +424,7 @@ def _statement(line: str, variables: dict[str, tuple[str, int]]) -> str:
 
 
 def _table(match: re.Match) -> str:
-    """A memory's initial words, copied one by one."""
+    """C++ that copies a memory's initial words from an array of machine words in a loop."""
     width, name, depth, memory, start = int(match[1]), match[2], match[3], match[5], match[6]
     words = -(-width // 64)
     entries = []
@@ -444,7 +456,7 @@ def plain_words(text: str) -> str:
     """Rewrite the C++ of `write_cxxrtl`, statement by statement; one that is not understood stays as it is.
 
     The driver's ``value`` and ``wire`` keep their bits in ``data``, words of 64 bits with 0 above the width.
-    The text names CXXRTL's header only where it still needs CXXRTL's operations, those of wide operands.
+    The text includes CXXRTL's header only if it still needs CXXRTL's operations, those on wide operands.
 
     Parameters
     ----------
