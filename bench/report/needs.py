@@ -252,7 +252,7 @@ def _saved_drawing(found: dict[str, dict]) -> Drawing:
     axes[0].set(
         yticks=place,
         yticklabels=list(found),
-        xlim=(0, 1.22),
+        xlim=(0, 1.35),
     )
     axes[0].set_title("everything that is not needed, by scene", fontsize=9, loc="left")
     axes[1].set_title("each omission alone, at its best", fontsize=9, loc="left")
