@@ -103,8 +103,9 @@ RECORD = Record(
         "few": Stimulus(_few, 2000),
         "same": Stimulus(_same, 500),
         "far": Stimulus(_far, 300),
-        "again": Stimulus(_again, 900),
-        "nearer": Stimulus(_nearer, 2000),
+        # Odd: a bit that is inverted at each event is as it was after an even number of them.
+        "again": Stimulus(_again, 901),
+        "nearer": Stimulus(_nearer, 2001),
     },
     axis="",
     waivers={"status": "A counter of 32 bits counts more events than a run has."},
