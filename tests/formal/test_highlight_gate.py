@@ -143,7 +143,7 @@ BUGS = {
     "no margin of the ends": ("_lit_by", "dot.truncate(f) + step", "dot.truncate(f)"),
     "one end is not looked at": ("_lit_by", "Mux(minus[-1], b, a)", "a"),
     "the inside is not looked at": ("_lit_by", "(inside & (exceeded | reached))", "0"),
-    "a sign is dropped": ("_lit_by", "w[-1] | ~w", "~w"),
+    "a sign is dropped": ("_lit_by", "lambda w: w[-1]", "lambda w: ~w[f + 2 :].any()"),
 }
 
 
