@@ -295,7 +295,7 @@ def spans_at_limits(rng: np.random.Generator, count: int, exponent: int) -> dict
     middle = (left + right) >> 1
     edge = np.full(len(left[::3]), np.int64(limit.lit(exponent) / Chord.FORMAT.step))
     left[::3] = halfway + differences_about(rng, edge)
-    right[::3] = left[::3] + differences_about(rng, np.int64(narrow * 1.1) + 0 * edge)
+    right[::3] = left[::3] + differences_about(rng, np.full_like(edge, narrow * 1.1))
     middle[::3] = -halfway
     left, right = (np.clip(normal, COMPONENT.min_code, ONE) for normal in (left, right))
     vectors = {"direction": np.array([0, 0, ONE]), "halfway": halfway}
