@@ -1,13 +1,14 @@
 """Triangles to pixels: geometry, shading and depth test."""
 
-from amaranth.hdl import Const, Module, Shape, Signal, Value, unsigned
-from amaranth.lib import data, fifo, stream, wiring
+from amaranth.hdl import Const, Module, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.frame_constants import write_shape
@@ -68,8 +69,11 @@ _SHADING = ("out_of_range_spans", "wide_spans")
 STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", *_SHADING)
 """Counters of `RenderUnit`."""
 
-WAITING_SPANS = 33
-"""Spans between geometry and shading: a memory of 32 words, and a register behind it; not compact."""
+WAITING_SPANS = 513
+"""Spans between geometry and shading: a block RAM and a register behind it; not compact.
+
+Shading works on these while small triangles are set up; while it has large ones, the setup goes on.
+"""
 
 
 class RenderUnit(wiring.Component):
@@ -177,22 +181,21 @@ class RenderUnit(wiring.Component):
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(pipeline.i.valid & pipeline.i.ready):
             m.d.sync += count.eq(count + 1)
-        shape = data.StructLayout(deep)
         spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
         m.d.comb += [
             pixel_last.eq(depth.i.payload.pixel.last),
             self.idle.eq(geometry.idle & depth.idle & ~spans),
         ]
-        m.submodules.depths = depths = fifo.SyncFIFOBuffered(
-            width=Shape.cast(shape).width, depth=pipeline.spans_inside + 1
-        )
-        word = Signal(shape, name="depth_word")
-        waiting, pixel = data.View(shape, depths.r_data), pipeline.o
+        waits = stream.Signature(data.StructLayout(deep))
+        entering, waiting = waits.create(path=("entering",)), waits.create(path=("waiting",))
+        # There is room whenever the pipeline takes a span.
+        connect_late_fifo(m, "depths", entering, waiting, pipeline.spans_inside + 1 + UNCOUNTED)
+        pixel = pipeline.o
         if compact := self.parameters.design.build.style == "compact":
             pixel = stream.Signature(pipeline.o.payload.shape()).create(path=("pixel",))
             connect_register(m, "waiting_pixel", pipeline.o, pixel)
         moves = depth.i.valid & depth.i.ready
-        taken, there = moves & pixel.payload.last, depths.r_rdy
+        taken, there = moves & pixel.payload.last, waiting.valid
         if compact:
             # Pixels are some cycles apart: a span's depth goes on the cycle after its last.
             goes = Signal(name="depth_goes")
@@ -200,18 +203,17 @@ class RenderUnit(wiring.Component):
             taken, there = goes, there & ~goes
         m.d.comb += [
             pipeline.i.payload.eq(ready.payload.span),
-            *(word[name].eq(ready.payload[name]) for name in deep),
-            depths.w_data.eq(word),
+            *(entering.payload[name].eq(ready.payload[name]) for name in deep),
             given.eq(ready.valid & known),
             dropped.eq(given & drops),
-            depths.w_en.eq(given & ~drops & pipeline.i.ready),
-            pipeline.i.valid.eq(given & ~drops & depths.w_rdy),
-            ready.ready.eq(known & (drops | (pipeline.i.ready & depths.w_rdy))),
+            entering.valid.eq(given & ~drops & pipeline.i.ready),
+            pipeline.i.valid.eq(given & ~drops & entering.ready),
+            ready.ready.eq(known & (drops | (pipeline.i.ready & entering.ready))),
             depth.i.payload.pixel.eq(pixel.payload),
-            *(depth.i.payload[name].eq(waiting[name]) for name in deep),
+            *(depth.i.payload[name].eq(waiting.payload[name]) for name in deep),
             depth.i.valid.eq(pixel.valid & there),
             pixel.ready.eq(depth.i.ready & there),
-            depths.r_en.eq(taken),
+            waiting.ready.eq(taken),
             *(self.status[name].eq(geometry.status[name]) for name in COUNTERS),
             self.status.spans.eq(count),
             *(self.status[name].eq(depth.status[name]) for name in ("pixels", "hidden")),

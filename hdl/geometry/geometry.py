@@ -22,7 +22,7 @@ from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
-__all__ = ["PORT_DESCRIPTIONS", "GeometryUnit"]
+__all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
 
 PORT_DESCRIPTIONS = {
     "normal_left": "unit normal at the first pixel; of a true line its end, N/W",
@@ -41,8 +41,11 @@ PORT_DESCRIPTIONS = {
 }
 """Fields of a span, for the table in Verilog."""
 
-_SORTED = 17
-"""Triangles that the FIFO before the edge setup holds, while the sort drops others."""
+WAITING_TRIANGLES = 513
+"""Triangles between sort and setup: a block RAM and a register behind it; not compact.
+
+Dropped triangles come in runs of hundreds, as a mesh turns its back; meanwhile the setup works on these.
+"""
 
 _SCALES = 4
 """Triangles whose scales the FIFO before the gradient setup holds."""
@@ -249,7 +252,7 @@ class GeometryUnit(wiring.Component):
         if self.compact:
             connect(m, self._sort.o, drawn)
         else:
-            connect_fifo(m, "waiting_triangles", self._sort.o, drawn, depth=_SORTED)
+            connect_fifo(m, "waiting_triangles", self._sort.o, drawn, depth=WAITING_TRIANGLES)
         lanes = self._lanes
         if len(lanes) == 1:
             connect(m, drawn, lanes[0].i)

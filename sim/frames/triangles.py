@@ -11,14 +11,22 @@ from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, Frame, Triangles
+from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
-from blysk.hdl.render import STATUS, RenderUnit
+from blysk.hdl.geometry.geometry import WAITING_TRIANGLES
+from blysk.hdl.render import STATUS, WAITING_SPANS, RenderUnit
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import sample_constants
 
 __all__ = ["SimulatedTriangleFrame", "TriangleSimulator"]
+
+_IN_UNITS = 24
+"""Triangles inside the hardware, without those that wait in FIFOs of a throughput style, at most."""
+
+_PAUSE = 10_000
+"""Cycles without a beat at the end of a picture that shows everything."""
 
 
 @dataclass(frozen=True)
@@ -214,12 +222,16 @@ class TriangleSimulator:
             setups=self.setups,
         )
 
-    def _longest_silence(self, sent: SceneTriangles, inside: int = 24) -> int:
+    def _longest_silence(self, sent: SceneTriangles) -> int:
         """Upper bound of the cycles without a beat, as all triangles inside the hardware may be hidden.
 
-        It counts every pixel and scanline in the boxes of the ``inside`` largest triangles.
+        The pixels of a triangle are at most its area, half its perimeter and 1. The triangles inside follow
+        one another among those that are drawn.
         """
-        triangles, frame, steps = sent.triangles, sent.frame, self.renderer.geometry.grid.steps
+        geometry, frame, steps = self._unit.geometry, sent.frame, self.renderer.geometry.grid.steps
+        drawn, _ = VertexSort(geometry.grid).compute(sent.triangles, frame)
+        triangles = drawn.triangles
+        inside = _IN_UNITS if geometry.compact else _IN_UNITS + WAITING_TRIANGLES + WAITING_SPANS
         sides = []
         for values, first, end in (
             (triangles.x, frame.left, frame.right),
@@ -227,5 +239,9 @@ class TriangleSimulator:
         ):
             low, high = (f(values, axis=1) / steps for f in (np.min, np.max))
             sides.append(np.maximum(np.minimum(high, end) - np.maximum(low, first), 0) + 2)
-        largest = np.sort(sides[0] * sides[1] + np.ptp(triangles.y, axis=1) / steps)[-inside:]
-        return 10_000 + 80 * inside + (self._unit.pipeline.cycles_per_pixel + 1) * int(largest.sum())
+        width, height = sides
+        pixels = np.minimum(width * height, drawn.area / (2 * steps**2) + width + height + 1)
+        cycles = geometry.interval + np.ptp(triangles.y, axis=1) / steps
+        cycles += (self._unit.pipeline.cycles_per_pixel + 1) * pixels
+        total = np.append(np.cumsum(cycles), np.full(inside, cycles.sum()))
+        return _PAUSE + int((total[inside:] - total[:-inside]).max(initial=total[inside - 1]))

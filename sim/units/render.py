@@ -83,11 +83,12 @@ RECORD = Record(
     stimuli={
         "triangles": Stimulus(_triangles, 200),
         "tiny": Stimulus(_tiny, 200),
-        "wide": Stimulus(_wide, 60),
+        "wide": Stimulus(_wide, 120),
     },
     axis="",
     still={
-        "a counter counts more than a run has": "count_spans[9-31] spans_inside[7-9]",
+        "a counter counts more than a run has": "count_spans[10-31]",
+        "depths have room whenever the pipeline takes a span": "depths_room[0]",
         "a line of the picture has fewer than 64 pixels": "spans.storage.r_port__data[16-21]",
     },
     remembers=True,
