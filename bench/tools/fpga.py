@@ -19,7 +19,7 @@ refused.
 """
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
@@ -29,7 +29,8 @@ from amaranth.lib import wiring
 from tqdm import tqdm
 
 from blysk.bench.tools.blocks import ENTRIES
-from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F, Family
+from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F, Family, Parts
+from blysk.bench.tools.parts_by_unit import parts_by_unit, sum_parts
 from blysk.bench.tools.place_and_route import SEEDS, Layout, lay_out, versions_of
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.lighting.intensity import MAX_LIGHTS
@@ -46,6 +47,7 @@ __all__ = [
     "command",
     "rerouted",
     "table",
+    "table_by_unit",
     "untimed",
 ]
 
@@ -66,8 +68,19 @@ def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
                 f"{slowest.logic:.1f}+{slowest.routing:.1f} {slowest.start} -> {slowest.end}",
             )
         )
+    return _aligned(lines, {0, len(_HEAD) - 1})
+
+
+def table_by_unit(name: str, units: Mapping[str, Parts], family: Family = ECP5) -> str:
+    """Parts of each unit as aligned text, between those of the device and those of the whole design."""
+    rows = {family.device: family.capacity, **units, name: sum_parts(units)}
+    head = ("unit", *_HEAD[1:6])
+    return _aligned([head, *((unit, *map(str, asdict(parts).values())) for unit, parts in rows.items())], {0})
+
+
+def _aligned(lines: Sequence[Sequence[str]], left: Container[int]) -> str:
+    """Lines of words as columns; those of ``left`` begin at one place, the others end at one."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    left = {0, len(_HEAD) - 1}
     return "\n".join(
         " ".join(
             text.ljust(width) if k in left else text.rjust(width)
@@ -165,6 +178,9 @@ def _pipelines(
     help="Placements at once, of half a GB each.",
 )
 @click.option("--keep-registers", is_flag=True, help="ECP5: no registers inside multipliers.")
+@click.option(
+    "--by-unit", is_flag=True, help="Parts of each unit inside, as mapped; without placement and clock rate."
+)
 @click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
 @click.pass_context
 def command(
@@ -179,6 +195,7 @@ def command(
     seeds,
     jobs,
     keep_registers,
+    by_unit,
     figures,
     **_,
 ):
@@ -198,6 +215,7 @@ def command(
         blysk fpga --family nexus --unit specular
         blysk fpga --pipes 4 --seeds 1
         blysk fpga --top render --style compact --target 115 --seeds 1
+        blysk fpga --top render --style compact --by-unit
     """
     pipes = pipes or PIPES["pipes"].default
     family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
@@ -216,6 +234,18 @@ def command(
         check_writable(figures)
     designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes, top))
     tools = versions_of(family)
+    about = {"device": family.device, "capacity": asdict(family.capacity), "tools": tools}
+    if by_unit:
+        if placing := given_options(context, ["target", "seeds", "jobs"]):
+            raise InputError(f"--{next(iter(placing))}", "nothing is placed", "leave it out, or --by-unit")
+        found = {name: parts_by_unit(unit(), family, not keep_registers) for name, unit in designs}
+        if figures:
+            entries = {
+                name: {unit: asdict(parts) for unit, parts in of.items()} for name, of in found.items()
+            }
+            write_json(figures, {**about, "units": entries})
+        click.echo("\n\n".join(table_by_unit(name, of, family) for name, of in found.items()))
+        return
     layouts, too_large = [], {}
     with tqdm(total=len(designs) * seeds, unit=" placements", leave=False, disable=None) as bar:
         for name, unit in designs:
@@ -230,10 +260,8 @@ def command(
         write_json(
             figures,
             {
-                "device": family.device,
-                "capacity": asdict(family.capacity),
+                **about,
                 "target_mhz": target,
-                "tools": tools,
                 "designs": [layout.as_dict() for layout in layouts],
                 "too_large": too_large,
             },

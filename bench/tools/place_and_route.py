@@ -33,8 +33,11 @@ __all__ = [
     "YOSYS",
     "Layout",
     "Registered",
+    "at_port",
     "lay_out",
+    "map_cells",
     "parts_of",
+    "ports_of",
     "read_report",
     "tool_versions",
     "versions_of",
@@ -172,6 +175,18 @@ def versions_of(family: Family) -> dict[str, str]:
     return versions
 
 
+def ports_of(netlist: Mapping[str, Any]) -> set[int]:
+    """Nets of the ports of a netlist, Yosys's JSON."""
+    # Nets are numbers, constants are not.
+    ports = netlist["modules"]["top"]["ports"].values()
+    return {bit for port in ports for bit in port["bits"] if isinstance(bit, int)}
+
+
+def at_port(cell: Mapping[str, Any], ports: set[int]) -> bool:
+    """Whether a flip-flop is one of those at the ports: with it nothing else is there."""
+    return any(ports & {*cell["connections"].get(pin, ())} for pin in ("D", "DI", "Q"))
+
+
 def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Family = ECP5) -> Parts:
     """Parts of a mapped netlist; the number of look-up tables comes from nextpnr's report.
 
@@ -184,22 +199,16 @@ def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Fami
     family : Family
         Family to which it is mapped.
     """
-    top = netlist["modules"]["top"]
-    cells = top["cells"].values()
-    # Nets are numbers, constants are not.
-    ports = {bit for port in top["ports"].values() for bit in port["bits"] if isinstance(bit, int)}
-
-    def at_port(cell: Mapping[str, Any]) -> bool:
-        return any(ports & {*cell["connections"].get(pin, ())} for pin in ("D", "DI", "Q"))
+    cells = netlist["modules"]["top"]["cells"].values()
+    ports = ports_of(netlist)
 
     def count(pattern: str) -> int:
         return sum(bool(re.fullmatch(pattern, cell["type"])) for cell in cells)
 
     return Parts(
         luts=int(report["utilization"][family.look_up_tables]["used"]),
-        # With a register at a port nothing else is there.
         flip_flops=sum(
-            bool(re.fullmatch(family.flip_flop, cell["type"])) and not at_port(cell) for cell in cells
+            bool(re.fullmatch(family.flip_flop, cell["type"])) and not at_port(cell, ports) for cell in cells
         ),
         multipliers=count(family.multiplier),
         block_rams=count(family.block_ram),
@@ -376,6 +385,17 @@ def lay_out(
     return Layout(name, found[1][0], tuple(found[seed][1] for seed in range(1, seeds + 1)))
 
 
+def map_cells(
+    netlist: str, folder: Path, runner: ToolRunner, family: Family, absorb: bool
+) -> tuple[dict[str, Any], Absorbed]:
+    """Map a netlist, in RTLIL, to a family's cells: Yosys's JSON, and what `absorb_registers` moved."""
+    (folder / "top.il").write_text(netlist, encoding="utf-8")
+    runner.run("Yosys", YOSYS, [], folder, MAP_BEFORE + family.synthesis + MAP_AFTER)
+    mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
+    _refuse_untimed(mapped, family)
+    return absorb_registers(mapped) if absorb else (mapped, Absorbed())
+
+
 def _run(
     netlist: str, seeds: Sequence[int], jobs: int, family: Family, absorb: bool
 ) -> Iterator[tuple[int, tuple[Parts, Place]]]:
@@ -386,12 +406,7 @@ def _run(
     with tempfile.TemporaryDirectory(prefix="blysk-") as name, ThreadPoolExecutor(jobs) as pool:
         folder = Path(name)
         try:
-            (folder / "top.il").write_text(netlist, encoding="utf-8")
-            script = MAP_BEFORE + family.synthesis + MAP_AFTER
-            pool.submit(runner.run, "Yosys", YOSYS, [], folder, script).result()
-            mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
-            _refuse_untimed(mapped, family)
-            mapped, absorbed = absorb_registers(mapped) if absorb else (mapped, Absorbed())
+            mapped, absorbed = pool.submit(map_cells, netlist, folder, runner, family, absorb).result()
             _write_without_ports(folder / "top.json", mapped)
             kinds = Counter(cell["type"] for cell in mapped["modules"]["top"]["cells"].values())
             _refuse_too_large(kinds, family)
