@@ -95,8 +95,8 @@ _PART, _BATCH = 10**7, 250_000
 
 _IDLE_TIMEOUT = 10_000
 
-# Largest number of beats of a unit's task, and cycles of a simulation, both approximate.
-_UNIT_PART, _CLOCKS = 10**5, 500_000
+# Beats of a unit's task, cycles of a simulation, both about; and of how many tasks slow Verilator runs one.
+_UNIT_PART, _CLOCKS, _UNIT_BASELINE = 10**5, 500_000, 4
 # A geometry unit takes 4096 cycles for 4096 scanlines without pixels, a compact one 16384, and several such
 # triangles may follow each other: the longest pause in 800,000 triangles was 28,724 cycles.
 _UNIT_IDLE_TIMEOUT = 200_000
@@ -387,7 +387,7 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
 
 
 def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> list[Task]:
-    """Tasks of the run of a unit.
+    """Tasks of the run of a unit, with the baseline in one of `_UNIT_BASELINE`.
 
     Parameters
     ----------
@@ -398,8 +398,9 @@ def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> lis
     """
     parts = -(-beats // _UNIT_PART)
     each = -(-beats // parts)
+    common = {"unit": unit, "beats": each, "seed": seed}
     return [
-        Task(measure_unit, {"unit": unit, "beats": each, "seed": seed, "part": part, "baseline": baseline})
+        Task(measure_unit, common | {"part": part, "baseline": None if part % _UNIT_BASELINE else baseline})
         for part in range(parts)
     ]
 

@@ -104,6 +104,8 @@ def test_parts_of_a_unit():
     work = tasks_of_unit("geometry", 10**6 + 1, 5, None)
     assert sum(task.settings["beats"] for task in work) >= 10**6 + 1
     assert len({task.settings["part"] for task in work}) == len(work) == 11
+    with_baseline = [task for task in tasks_of_unit("geometry", 10**6, 5, "5.1") if task.settings["baseline"]]
+    assert len(with_baseline) == 3
     rows = table(work, [{"beats": 2}] * len(work))
     assert rows == [{"design": name, "beats": 22} for name in ("geometry", "all")]
 
