@@ -1,0 +1,99 @@
+"""The section on triangles: designs compared, and what becomes of stiff and extreme cases."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.bench.report import geometry
+from blysk.bench.report.geometry import CANDIDATES, measure, section, tasks
+from blysk.bench.report.geometry_cases import cases_of, frame_figures, measure_cases
+from blysk.bench.tools.families import DEVICE
+from blysk.golden.frames.triangle_frame import triangle_frame
+from blysk.golden.presets import preset
+from blysk.golden.render import Renderer
+
+
+@pytest.fixture(scope="module")
+def cases():
+    return {method: measure_cases(method, True) for method in ("chord", "renormalise")}
+
+
+@pytest.mark.parametrize("method", ["chord", "renormalise"])
+def test_cases(cases, method):
+    """Coverage is exact; only slivers are off, and only opposite normals come to 0."""
+    for case in cases[method]:
+        assert (case["coverage"], case["other"]) == (0, 0)
+        assert case["pixels"] > 0
+        assert case["sliver"] or case["error"] < 0.6
+        assert (case["zero"] > 0) == (case["name"] == "a normal and its opposite")
+    by_name = {case["name"]: case for case in cases[method]}
+    assert by_name["area of a step of the grid, squared"]["pixels"] == 400
+    assert by_name["10,000 triangles of half a pixel to one"]["triangles"] == 10_000
+    assert by_name["two triangles on each other"]["hidden"] == 13_050
+
+
+def test_differences_are_found():
+    """A colour, a pixel that is missing, and one of another triangle."""
+    drawn = next(scene for name, scene in cases_of(True) if "cross" in name)
+    renderer = Renderer(preset("chord", "blinn", x_bits=12, y_bits=12))
+    frame = triangle_frame(drawn, renderer)
+    y, x = np.argwhere(frame.owner >= 0)[[0, 500, 900]].T
+    image, owner = frame.image.copy(), frame.owner.copy()
+    image[y[0], x[0]] ^= 64
+    owner[y[1], x[1]] = -1
+    owner[y[2], x[2]] = 3 - owner[y[2], x[2]]
+    found = frame_figures(drawn, renderer, replace(frame, image=image, owner=owner))
+    assert (found["coverage"], found["other"]) == (1, 1)
+    assert 63 < found["error"] < 65
+
+
+def test_tasks():
+    assert [task.settings["design"] for task in tasks(False)[:-2]] == list(CANDIDATES)
+    assert {task.settings["quick"] for task in tasks(True)[-2:]} == {True}
+
+
+def _result(multipliers, *cycles):
+    frames = [
+        {"triangles": 10 * 100**k, "pixels": 1000, "cycles": n, "other": k, "errors": {"1": 0.5, "20": None}}
+        for k, n in enumerate(cycles)
+    ]
+    bits = {"register_bits": 7, "memory_bits": 8, "geometry_multipliers": 2}
+    return {"multipliers": multipliers, **bits, "frames": frames}
+
+
+def test_section(cases, monkeypatch):
+    """Which design takes less time follows from cycles and clock rates."""
+    store = [
+        {"design": f"render {method}, blinn, 1 light, compact", "device": DEVICE, "fmax_mhz": rates}
+        for method, rates in (("chord", [90, 100, 120]), ("renormalise", [80]))
+    ]
+    monkeypatch.setattr(geometry, "read_store", lambda: store)
+    chosen = tasks(True)
+    results = [_result(10, 4000, 8000), _result(15, 2000, 8000), *cases.values()]
+    made = section(chosen, results)
+    assert made.text[1] == (
+        "`renormalise, compact` takes, of `chord, compact`, 0.50 of the cycles, 0.62 of the time with 10 "
+        "triangles; 1.00 of the cycles, 1.25 of the time with 1,000 triangles (clock rates of 100 and 80 "
+        "MHz), and 5 multipliers more."
+    )
+    assert "0 pixels are covered" in made.text[2]
+    assert made.text[2].endswith("More than 1 LSB off: slivers of 0.00390625 pixel.")
+    designs, drawing, extreme = made.parts
+    assert [row[5] for row in designs.rows] == [100, 80]
+    assert "<svg" in drawing.svg
+    errors = extreme.columns.index("error, LSB")
+    assert {marks[errors] for marks in extreme.marks} == {"", "stated"}
+    wrong = {"chord": [{**case, "error": 2.0, "sliver": 0} for case in cases["chord"]]}
+    marks = geometry._case_table(wrong).marks
+    assert {row[errors] for row in marks} == {"silent"}
+
+
+@pytest.mark.long
+def test_measure():
+    """A frame of simulated hardware, and its errors for each exponent."""
+    found = measure("chord, compact", [64], [64, 48])
+    (frame,) = found["frames"]
+    assert (found["multipliers"], found["geometry_multipliers"], frame["triangles"]) == (10, 5, 52)
+    assert frame["cycles"] > frame["pixels"] > frame["spans"] > 0
+    assert max(frame["errors"].values()) < 1
