@@ -97,8 +97,8 @@ def measure_cases(method: str, quick: bool) -> list[dict[str, Any]]:
 def cases_of(quick: bool) -> Iterator[tuple[str, Scene]]:
     """Names and scenes; a unit of the world is a pixel, and (0, 0) is in the middle of the picture."""
     rng = np.random.default_rng(23)
-    for width in (1 / 256, 1 / 32, 1 / 2):
-        yield f"slivers of {width:g} pixel", _slivers(rng, width)
+    for parts in (256, 32, 2):
+        yield f"slivers of 1/{parts} pixel", _slivers(rng, 1 / parts)
     yield "area of a step of the grid, squared", _smallest(rng)
     yield "one triangle over the whole guard band", _scene(4095, 9, *_largest(np.full((3, 3), _UP)))
     yield "4095 columns, normals 60 degrees apart, exponent 1000", _scene(4095, 9, *_largest(_fan(60)), 1000)

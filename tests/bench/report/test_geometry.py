@@ -78,7 +78,7 @@ def test_section(cases, monkeypatch):
         "MHz), and 5 multipliers more."
     )
     assert "0 pixels are covered" in made.text[2]
-    assert made.text[2].endswith("More than 1 LSB off: slivers of 0.00390625 pixel.")
+    assert made.text[2].endswith("More than 1 LSB off: slivers of 1/256 pixel.")
     designs, drawing, extreme = made.parts
     assert [row[5] for row in designs.rows] == [100, 80]
     assert "<svg" in drawing.svg
