@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from blysk.bench.report import geometry
 from blysk.bench.report.geometry import CANDIDATES, measure, section, tasks
@@ -11,6 +12,10 @@ from blysk.bench.report.geometry_cases import cases_of, frame_figures, measure_c
 from blysk.bench.tools.families import DEVICE
 from blysk.golden.frames.triangle_frame import triangle_frame
 from blysk.golden.presets import preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
 
@@ -46,6 +51,33 @@ def test_differences_are_found():
     found = frame_figures(drawn, renderer, replace(frame, image=image, owner=owner))
     assert (found["coverage"], found["other"]) == (1, 1)
     assert 63 < found["error"] < 65
+
+
+@pytest.mark.parametrize("method", ["chord", "renormalise"])
+def test_random_coarse_meshes(method):
+    """Ten convex bodies of 8 to 39 corners, whose normals stray by some 30 degrees."""
+    rng = np.random.default_rng(10)
+    for count, exponent in zip(rng.integers(8, 40, 10), [1, 20, 100, 400, 1000] * 2, strict=True):
+        points = normalise(rng.normal(size=(count, 3))) * rng.uniform(0.7, 1, (count, 1))
+        hull = ConvexHull(points)
+        outward = np.einsum("fn,fn->f", hull.equations[:, :3], _normals_of(points, hull.simplices)) > 0
+        faces = np.where(outward[:, np.newaxis], hull.simplices, hull.simplices[:, ::-1])
+        mesh = Mesh(points, faces, normalise(normalise(points) + 0.5 * rng.normal(size=points.shape)))
+        camera = Camera.framing(points, tuple(rng.normal(size=3)), "perspective", 4 / 3)
+        light = Light(tuple(normalise(rng.normal(size=3))))
+        drawn = Scene(
+            mesh, camera, 160, 120, Material((0.05,) * 3, (0.4,) * 3, (0.55,) * 3, exponent), [light]
+        )
+        renderer = Renderer(preset(method, "blinn", x_bits=8, y_bits=7))
+        found = frame_figures(drawn, renderer, triangle_frame(drawn, renderer))
+        assert found["pixels"] > 2000
+        assert (found["coverage"], found["other"]) == (0, 0)
+        assert found["error"] < 0.6
+
+
+def _normals_of(points, faces):
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
 
 
 def test_tasks():
