@@ -40,6 +40,17 @@ def test_frame_is_the_model_s(simulator, triangles, back_faces):
 
 
 @pytest.mark.long
+def test_small_triangles_with_two_lanes():
+    """Every triangle of the teapot is sent: 1.1 cycles a shaded pixel at most."""
+    size = 640, 480
+    frame = TriangleSimulator(Renderer(design()), size, setups=2).render(
+        scene("teapot", size=size, triangles=10_000)
+    )
+    assert len(frame.sent.triangles) == 10_712
+    assert frame.pixels <= frame.cycles <= 1.1 * frame.pixels
+
+
+@pytest.mark.long
 def test_two_sided(simulator):
     """Back faces of a two-sided material are turned where others are left out."""
     drawn = scene("teapot", size=SIZE, triangles=200, back_faces="cull")
