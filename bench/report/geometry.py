@@ -146,9 +146,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             designs[task.settings["design"]], size = result, task.settings["size"]
         else:
             cases[task.settings["method"]] = result
-    rates = {
-        entry["design"]: median(entry["fmax_mhz"]) for entry in read_store() if entry["device"] == DEVICE
-    }
+    rates = {entry["design"]: entry["fmax_mhz"] for entry in read_store() if entry["device"] == DEVICE}
     text = [
         f"The teapot at {size[0]}x{size[1]}, one light, every triangle sent, back faces shaded, with a "
         "depth test. `chord` gets unit normals at the ends and in the middle of every span, and wide spans "
@@ -161,40 +159,47 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     return Section("geometry", "Triangles to pixels", text, parts)
 
 
-def _verdict(designs: Mapping[str, Any], rates: Mapping[str, float]) -> Iterator[str]:
+def _verdict(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> Iterator[str]:
     """Which of two designs of a style takes less time for large triangles and for small ones."""
     for style in ("", ", two lanes", ", compact"):
         pair = [designs.get(f"{method}{style}") for method in _METHODS]
         if None in pair:
             continue
         names = [f"{method}{style}" for method in _METHODS]
-        clocks = [rates.get(CANDIDATES[name].placed or "") for name in names]
-        known = None not in clocks
+        seeds = [rates.get(CANDIDATES[name].placed or "", ()) for name in names]
+        known = all(seeds)
+        clocks = [median(of) for of in seeds] if known else []
         words = []
         for chord, rival in zip(*(of["frames"] for of in pair), strict=True):
             ratio = rival["cycles"] / chord["cycles"]
             timed = f", {ratio * clocks[0] / clocks[1]:.2f} of the time" if known else ""
             words.append(f"{ratio:.2f} of the cycles{timed} with {chord['triangles']:,} triangles")
         more = pair[1]["multipliers"] - pair[0]["multipliers"]
-        rate = f" (clock rates of {clocks[0]:.0f} and {clocks[1]:.0f} MHz)" if known else ""
+        rate = (
+            f" (clock rates of {clocks[0]:.0f} and {clocks[1]:.0f} MHz, medians of {len(seeds[0])} and "
+            f"{len(seeds[1])} placements)"
+            if known
+            else ""
+        )
         yield (
             f"`{names[1]}` takes, of `{names[0]}`, {'; '.join(words)}{rate}, and {abs(more)} multipliers "
             f"{'more' if more >= 0 else 'fewer'}."
         )
 
 
-def _table(designs: Mapping[str, Any], rates: Mapping[str, float]) -> Table:
+def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> Table:
     counts = [frame["triangles"] for frame in next(iter(designs.values()))["frames"]]
     columns = ("design", "multipliers", "of geometry", "register bits", "memory bits", "clock rate, MHz")
     columns += tuple(f"cycles, {count:,} triangles" for count in counts)
     columns += ("pixels of another triangle", "largest error, LSB")
     rows: list[tuple[Cell, ...]] = []
     for name, of in designs.items():
+        placed = rates.get(CANDIDATES[name].placed or "")
         errors = [error for frame in of["frames"] for error in frame["errors"].values() if error is not None]
         rows.append(
             (
                 *(name, of["multipliers"], of["geometry_multipliers"], of["register_bits"]),
-                *(of["memory_bits"], rates.get(CANDIDATES[name].placed or "")),
+                *(of["memory_bits"], median(placed) if placed else None),
                 *(frame["cycles"] for frame in of["frames"]),
                 *(max(frame["other"] for frame in of["frames"]), max(errors)),
             )
@@ -203,10 +208,9 @@ def _table(designs: Mapping[str, Any], rates: Mapping[str, float]) -> Table:
         "Multipliers and bits before synthesis, without the memory of depths; clock rate: median of the "
         f"placements on an {DEVICE}, where there are some. Cycles from the first triangle to the last "
         "pixel that is written, simulated: hidden ones after it do not count. Error: over all frames and "
-        "exponents "
-        f"{', '.join(map(str, _EXPONENTS))}, of the bit-accurate model against exact normals at every pixel "
-        "in float64 with the same reflection model, where the same triangle shows. Where two triangles are "
-        "folded flat at a common edge another one may show than in float64."
+        f"exponents {', '.join(map(str, _EXPONENTS))}, of the bit-accurate model against exact normals "
+        "at every pixel in float64 with the same reflection model, where the same triangle shows. "
+        "Where two triangles are folded flat at a common edge another one may show than in float64."
     )
     return Table("geometry-designs", "Designs from triangles to pixels", columns, rows, note)
 

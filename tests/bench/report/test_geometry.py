@@ -107,7 +107,7 @@ def test_section(cases, monkeypatch):
     assert made.text[1] == (
         "`renormalise, compact` takes, of `chord, compact`, 0.50 of the cycles, 0.62 of the time with 10 "
         "triangles; 1.00 of the cycles, 1.25 of the time with 1,000 triangles (clock rates of 100 and 80 "
-        "MHz), and 5 multipliers more."
+        "MHz, medians of 3 and 1 placements), and 5 multipliers more."
     )
     assert "0 pixels are covered" in made.text[2]
     assert made.text[2].endswith("More than 1 LSB off: slivers of 1/256 pixel.")
