@@ -230,14 +230,14 @@ def command(
         raise InputError("--method", "is one of every method", "leave it out, or --every-method")
     if pipes > 1 and top != "shader":
         raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave it out, or --top")
+    if by_unit and (placing := given_options(context, ["target", "seeds", "jobs"])):
+        raise InputError(f"--{next(iter(placing))}", "nothing is placed", "leave it out, or --by-unit")
     if figures:
         check_writable(figures)
     designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes, top))
     tools = versions_of(family)
     about = {"device": family.device, "capacity": asdict(family.capacity), "tools": tools}
     if by_unit:
-        if placing := given_options(context, ["target", "seeds", "jobs"]):
-            raise InputError(f"--{next(iter(placing))}", "nothing is placed", "leave it out, or --by-unit")
         found = {name: parts_by_unit(unit(), family, not keep_registers) for name, unit in designs}
         if figures:
             entries = {
