@@ -44,7 +44,8 @@ PORT_DESCRIPTIONS = {
 WAITING_TRIANGLES = 513
 """Triangles between sort and setup: a block RAM and a register behind it; not compact.
 
-Dropped triangles come in runs of hundreds, as a mesh turns its back; meanwhile the setup works on these.
+Dropped triangles come in runs, of up to hundreds where a mesh turns its back; meanwhile the setup works on
+these.
 """
 
 _SCALES = 4

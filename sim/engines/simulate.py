@@ -128,6 +128,9 @@ def stimulus_of(
         If a member of the component or an argument has a wrong type, shape or value.
     """
     ports = Ports(component)
+    idle_timeout, settle = _whole("idle_timeout", idle_timeout, 1), _whole("settle", settle, 0)
+    if count is not None and settle > idle_timeout:
+        raise ValueError(f"settle must be at most idle_timeout, {idle_timeout}, not {settle}")
     return Stimulus(
         input=pack(ports.i, beats),
         write=_writes(ports.write, write),
@@ -135,8 +138,8 @@ def stimulus_of(
         input_stalls=_pattern("input_stalls", input_stalls),
         output_stalls=_pattern("output_stalls", output_stalls),
         count=None if count is None else _whole("count", count, 0),
-        idle_timeout=_whole("idle_timeout", idle_timeout, 1),
-        settle=_whole("settle", settle, 0),
+        idle_timeout=idle_timeout,
+        settle=settle,
     )
 
 
@@ -188,7 +191,7 @@ def simulate(
         and all input is taken, the run ends; at least 1.
     settle : int
         Cycles after the last transfer in which a surplus output beat is an error; at most ``idle_timeout``,
-        else the component counts as stuck.
+        unless ``count`` is ``None``.
     progress : callable, optional
         Called with the number of output beats so far, once a batch: a million cycles of ``cxxrtl``, 1000 of
         ``pysim``.

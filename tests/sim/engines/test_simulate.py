@@ -267,6 +267,7 @@ def test_arguments():
         ),
         ({"idle_timeout": 0}, "idle_timeout must be at least 1, not 0"),
         ({"settle": -1}, "settle must be at least 0, not -1"),
+        ({"idle_timeout": 9, "settle": 10}, "settle must be at most idle_timeout, 9, not 10"),
         ({"count": -1}, "count must be at least 0, not -1"),
         ({"constants": {}}, "the component has no constants"),
         ({"write": beats}, "the component has no stream write"),
