@@ -3,7 +3,7 @@
 import ctypes
 import json
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
@@ -139,7 +139,7 @@ def flags_of(unit: Component) -> list[str]:
 # as a wire would keep that of a register that `zinit` has inverted. `opt_dff` makes clock enables: a register
 # that held its word by a loop through a multiplexer would take in a fault at its output on every cycle. Then
 # an inversion would alternate from cycle to cycle, unseen where a word is held for an even number of cycles.
-_LIST = """\
+_FLATTEN = """\
 read_rtlil top.il
 hierarchy -auto-top
 proc
@@ -155,8 +155,9 @@ opt_clean
 opt_dff -nosdff
 opt_clean
 write_rtlil flat.il
-write_json flat.json
-mutate -list {count} -seed {seed} -ctrl mutant {width} 1 -o list.txt c:*unit.*"""
+write_json flat.json"""
+
+_LIST = "mutate -list {count} -seed {seed} -o list{round}.txt c:*unit.*"
 
 # Nets whose bits have several drivers are split: CXXRTL would evaluate a word whose bits depend on each other
 # several times.
@@ -178,20 +179,55 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     width = count.bit_length()
     netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
     (folder / "top.il").write_text(netlist)
-    yosys(_LIST.format(count=count, seed=seed, width=width), folder)
+    yosys(_FLATTEN, folder)
     top = json.loads((folder / "flat.json").read_text())["modules"]["top"]
     behind = _registers_behind(top)
+    listed = _listed(count, seed, _most_listed(top), folder)
     kept, known = [], {}
-    for number, text in enumerate((folder / "list.txt").read_text().splitlines(), 1):
+    for number, text in enumerate(listed, 1):
         mutant = _described(text, top["cells"], behind)
         # Left out are faults of clocks, which are not small; of memory contents, which must be constant; and
         # those where one output bit of a cell inverts another, as a bit might then depend on itself.
         if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant):
-            kept.append(text)
+            kept.append(text.replace("mutate", f"mutate -ctrl mutant {width} {number}", 1))
             known[number] = mutant
     (folder / "mutants.txt").write_text("\n".join(kept))
     yosys(_MUTATE, folder)
     return known
+
+
+def _listed(count: int, seed: int, most: int, folder: Path) -> list[str]:
+    """Commands for ``count`` different mutants, in lists of at most ``most``; fewer if there are no more."""
+    rounds = 1 if count <= most else 2 * -(-count // most)
+    lists = [_LIST.format(count=min(count, most), seed=seed + k, round=k) for k in range(rounds)]
+    # In one run with what is before: a netlist that is read again has another order.
+    yosys("\n".join([_FLATTEN, *lists]), folder)
+    found = [line for k in range(rounds) for line in (folder / f"list{k}.txt").read_text().splitlines()]
+    return list(dict.fromkeys(found))[:count]
+
+
+def _most_listed(module: Mapping[str, Any]) -> int:
+    """Number of mutants that Yosys can list at once: two of each cell, or of each bit with a name.
+
+    It takes about two of each cell, named wire and bit of one, and never ends if asked for more; a bit counts
+    where it is driven or has only one reader.
+    """
+    chosen = {name: cell for name, cell in module["cells"].items() if "unit." in name}
+    nets = module["netnames"].values()
+    named = {bit for net in nets if not net["hide_name"] for bit in net["bits"] if isinstance(bit, int)}
+    readers: Counter = Counter()
+    for cell in module["cells"].values():
+        for port, bits in cell["connections"].items():
+            if cell["port_directions"][port] == "input":
+                readers.update(bits)
+    found = {
+        bit
+        for cell in chosen.values()
+        for port, bits in cell["connections"].items()
+        for bit in bits
+        if bit in named and (cell["port_directions"][port] == "output" or readers[bit] == 1)
+    }
+    return 2 * max(len(chosen), len(found))
 
 
 def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], str]) -> str:
