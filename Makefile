@@ -10,7 +10,7 @@ COMMA := ,
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-long test-all prove mutants soak coverage bench pages site lint clean
+.PHONY: demo test test-all test-long prove mutants soak coverage bench pages site lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -18,14 +18,15 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed-test lint
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder
 
-# What `make test` leaves out: other structures of the units, costs, sweeps, proofs, browsers. With MINUTES
-# those tests, or proofs, that start within them, others every day.
-test-long: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m "long or prove" $(MINUTES:%=--minutes %)
-
 test-all:
 	$(MAKE) test
+	$(MAKE) prove
 	$(MAKE) test-long
+
+# What `make test` leaves out but for proofs: other structures of the units, costs, sweeps, browsers. With MINUTES
+# those tests, or proofs, that start within them, others every day.
+test-long: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m long $(MINUTES:%=--minutes %)
 
 prove: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m prove tests/formal $(MINUTES:%=--minutes %)

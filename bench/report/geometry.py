@@ -206,9 +206,9 @@ def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> 
         )
     note = (
         "Multipliers and bits before synthesis, without the memory of depths; clock rate: median of the "
-        f"placements on an {DEVICE}, where there are some. Cycles from the first triangle to the last "
-        "pixel that is written, simulated: hidden ones after it do not count. Error: over all frames and "
-        f"exponents {', '.join(map(str, _EXPONENTS))}, of the bit-accurate model against exact normals "
+        f"placements on an {DEVICE}, where there are some. Cycles from the first triangle until the "
+        "hardware is empty, simulated. Error: over all frames and exponents "
+        f"{', '.join(map(str, _EXPONENTS))}, of the bit-accurate model against exact normals "
         "at every pixel in float64 with the same reflection model, where the same triangle shows. "
         "Where two triangles are folded flat at a common edge another one may show than in float64."
     )
@@ -238,10 +238,7 @@ def _drawing(designs: Mapping[str, Any]) -> Drawing:
     panel.set_yticks((), minor=True)
     panel.grid(True, color="#dddddd", linewidth=0.5)
     figure.legend(*panel.get_legend_handles_labels(), loc="outside right center", frameon=False)
-    note = (
-        "Small triangles are on the left: there the setup of a triangle counts, and not its shading. Less "
-        "than one cycle: the last triangles are hidden, and their pixels count, but not their cycles."
-    )
+    note = "Small triangles are on the left: there the setup of a triangle counts, and not its shading."
     return Drawing("geometry-cycles", "Cycles a pixel against the size of triangles", svg(figure), note)
 
 

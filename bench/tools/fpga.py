@@ -116,7 +116,8 @@ def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Comp
     for name in names:
         found = [entry for entry in ENTRIES if name in (entry.title, entry.record.name)]
         if not found:
-            raise InputError(f"--unit {name}", "unknown unit", "use a name of the table of blysk blocks")
+            known = ", ".join(dict.fromkeys(entry.record.name for entry in ENTRIES))
+            raise InputError(f"--unit {name}", "unknown unit", f"use {known}, or one of their variants")
         yield from ((entry.title, entry.variant.unit) for entry in found)
 
 

@@ -19,7 +19,8 @@ from blysk.golden.render import Renderer
 from blysk.hdl.render import RenderUnit
 
 WIDTH, HEIGHT = 32, 24
-FRAME = Frame.centred(WIDTH, HEIGHT).codes
+# Spans of at most 10 degrees: the core's header has that for exponent 50.
+FRAME = Frame.centred(WIDTH, HEIGHT, limit=Frame.limit_of(10)).codes
 # Ambient 0.05, diffuse 0.4, specular 0.55, exponent 50, white light along the viewer.
 WRITES = {0: 50, 1: 816, 2: 816, 3: 816} | dict(
     enumerate([0, 0, 131071, 0, 0, 131071, 6528, 6528, 6528, 8976, 8976, 8976], 16)

@@ -18,7 +18,7 @@ module triangle (input clk, input rst, output done);
   wire [7:0] r, g, b;
   wire [23:0] o_depth, new_depth;
   wire write;
-  reg [9:0] quiet;   // clocks since the last pixel
+  reg [9:0] quiet;   // clocks since the last pixel: of one triangle none comes later than these
   assign done = &quiet;
   always @(posedge clk) begin
     if (o_valid) picture[{y[4:0], x[4:0]}] <= {r, g, b};
@@ -27,7 +27,8 @@ module triangle (input clk, input rst, output done);
     quiet <= rst || o_valid || n < 17 ? 0 : done ? quiet : quiet + 1;
   end
 
-  // Corners in 1/256 pixel about the middle of the picture; normals times 2^23.
+  // Corners in 1/256 pixel about the middle of the picture; normals times 2^23. Limit: 2048 sin(10 degrees / 2), as
+  // the core's header has 10 degrees for exponent 50.
   blysk core (.clk(clk), .rst(rst),
     .write_address(address), .write_data(data), .write_valid(n < 16), .write_ready(write_ready),
     .i_valid(n == 16), .i_ready(i_ready), .i_material(10'd0), .i_two_sided(1'd0),
@@ -37,7 +38,7 @@ module triangle (input clk, input rst, output done);
     .i_normal_1_0(-24'sd838861), .i_normal_1_1(-24'sd5033165), .i_normal_1_2(24'sd6658042),
     .i_normal_2_0(24'sd5872026), .i_normal_2_1(24'sd1677722), .i_normal_2_2(24'sd5751001),
     .constants_left(-13'sd16), .constants_top(-13'sd12), .constants_right(13'sd16), .constants_bottom(13'sd12),
-    .constants_back_faces(2'd0), .constants_limit(10'd267),
+    .constants_back_faces(2'd0), .constants_limit(10'd178),
     .o_valid(o_valid), .o_ready(1'b1), .o_x(x), .o_y(y), .o_r(r), .o_g(g), .o_b(b), .o_depth(o_depth),
     .memory_read_enable(read), .memory_read_place_x(rx), .memory_read_place_y(ry), .memory_read_data(depth),
     .memory_write_enable(write), .memory_write_place_x(wx), .memory_write_place_y(wy), .memory_write_data(new_depth));

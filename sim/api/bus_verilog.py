@@ -43,11 +43,15 @@ def unit_of_top(top: str, bus: str, parameters, **options):
 def geometry_descriptions(unit: GeometryUnit) -> dict[str, str]:
     """Descriptions of the ports of a core from triangles to spans."""
     made = set(unit.o.payload.shape().members)
-    counted = {f"status_{name}" for name in unit.status.shape().members}
+    words = {
+        f"{member}_{name}"
+        for member in ("constants", "status")
+        for name in getattr(unit, member).shape().members
+    }
     shared = {
         port: text
         for port, text in RENDER_PORT_DESCRIPTIONS.items()
-        if port in counted or port.startswith(("i_", "constants_"))
+        if port in words or port.startswith("i_")
     }
     return shared | {f"o_{name}": text for name, text in GEOMETRY_PORT_DESCRIPTIONS.items() if name in made}
 

@@ -44,6 +44,7 @@ __all__ = [
     "verilog_and_unit",
 ]
 
+_LIMIT = "2048 sin(a / 2), rounded down, for spans of at most the angle a"
 _FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
 
 ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
@@ -236,7 +237,11 @@ def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[st
 
 def _render_header(unit: RenderUnit) -> list[str]:
     """Description of a core from triangles to pixels: its pipeline without its input, and its geometry."""
-    first, *lines = (line for line in header_of(unit.pipeline) if not line.startswith("i_"))
+    first, *lines = (
+        line.replace("latency", "shading: latency") if line.startswith("latency") else line
+        for line in header_of(unit.pipeline)
+        if not line.startswith("i_")
+    )
     return [
         first.replace("shading pipeline", "triangles to pixels"),
         *lines,
@@ -266,9 +271,9 @@ def _geometry_lines(geometry: GeometryUnit) -> list[str]:
         "coordinates",
         "i_normal_*: vertex normal times 1/W over the largest 1/W of the triangle, "
         f"{ATTRIBUTE}; i_depth: linear on the screen",
-        f"constants_*: the picture's borders in pixels; back faces {', '.join(map(_numbered, BACK_FACES))}; "
-        "largest chord of a span in 1/1024",
-        "status_*: counters since reset",
+        f"constants_*: the picture's borders in pixels; back faces {', '.join(map(_numbered, BACK_FACES))}",
+        f"constants_limit: {'is not read' if geometry.lines else _LIMIT}",
+        "constants_* change only while no triangle, span or pixel is inside; status_*: counters since reset",
     ]
 
 
@@ -377,7 +382,7 @@ def verilog_and_unit(
     hardware = TOPS[top].takes_triangles
     checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
     if setups > 1 and not hardware:
-        raise OptionError("setups", str(setups), "spans need no triangle setup", "give top or geometry, too")
+        raise OptionError("setups", str(setups), "spans need no triangle setup", "use top geometry or render")
     if hardware and pipes > 1:
         raise OptionError("pipes", str(pipes), "triangles go to one pipeline", "leave it out, or use spans")
     if merged and pipes == 1:

@@ -361,7 +361,7 @@ GEOMETRY: dict[str, Option] = {
     "geometry": Option(
         Choice("geometry", GEOMETRIES),
         "software",
-        "Who turns triangles into spans: hardware simulates that, too, and the depth test.",
+        "Who turns triangles into spans: software, or hardware, which tests depths, too.",
         "pipeline.geometry",
     ),
 }
@@ -381,8 +381,8 @@ PORTS: dict[str, Option] = {
     "top": Option(
         Choice("core", PACKETS),
         None,
-        "What the core does: spans to pixels, triangles to spans, or triangles to pixels.  [default: shader; "
-        "with --geometry hardware: render]",
+        "What the core does: spans to pixels, triangles to spans, or triangles to pixels.  [default: shader, "
+        "of hardware geometry render]",
     ),
     "bus": Option(
         Choice("bus", ("native", *BUSES)),

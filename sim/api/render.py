@@ -97,7 +97,7 @@ class RenderedFrame:
 
     @property
     def cycles(self) -> int:
-        """Cycles from the first write of a constant, or the first triangle, to the last pixel."""
+        """Cycles from the first write of a constant to the last pixel; of triangles until all are drawn."""
         return self.simulated.cycles
 
     @property
@@ -282,7 +282,7 @@ def rendering_settings(
     settings = read_settings(source, options, {**SCENE, **DESIGN, **RENDERING}, **slow)
     with settings.located():
         if settings["short_words"] and not settings["specialise"]:
-            raise settings.refuse("short_words", "nothing is specialised", "give specialise, too", "")
+            raise settings.refuse("short_words", "nothing is specialised", "leave it out, or specialise", "")
     return settings
 
 
@@ -376,7 +376,7 @@ def _check_geometry(settings: Settings, design: Design) -> None:
         if settings["setups"] > 1:
             raise settings.refuse("setups", "spans need no triangle setup", remedy)
         if settings["coarse"]:
-            raise settings.refuse("coarse", "spans of software are not hidden", remedy, "")
+            raise settings.refuse("coarse", "software leaves hidden spans out", remedy, "")
         return
     reason = None
     if design.takes_values:
@@ -404,11 +404,11 @@ def _design(settings: Settings) -> Design:
     """The design of the settings, for the scene's lights and one material."""
     source, lights = settings.source, settings.lights
     viewer = source.viewer if isinstance(source, Scene) else settings["viewer"]
-    made = design_of(settings, max(1, len(lights)))
+    made, hardware = design_of(settings, max(1, len(lights))), settings["geometry"] == "hardware"
     local = viewer == "near" or any(light.position is not None for light in lights)
-    if local and not made.takes_values:
-        reason = "point lights and a near viewer need the values of a span"
-        raise settings.refuse("method", reason, "use chord-local")
+    if local and (hardware or not made.takes_values):
+        option, remedy = ("geometry", "use software") if hardware else ("method", "use chord-local")
+        raise settings.refuse(option, "point lights and a near viewer need the values of a span", remedy)
     return replace(made, factors=tuple(index for index, light in enumerate(lights) if light.fades))
 
 

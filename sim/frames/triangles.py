@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import Out
 
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import constants_of
@@ -14,7 +17,9 @@ from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, Frame, Triangles
 from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
+from blysk.hdl.core.stream import connect
 from blysk.hdl.geometry.geometry import WAITING_TRIANGLES
+from blysk.hdl.geometry.triangles import counters_shape
 from blysk.hdl.render import STATUS, WAITING_SPANS, RenderUnit
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
@@ -27,6 +32,28 @@ _IN_UNITS = 24
 
 _PAUSE = 10_000
 """Cycles without a beat at the end of a picture that shows everything."""
+
+
+class _Timed(wiring.Component):
+    """A `RenderUnit` with one counter more, ``busy``: the cycles in which something is inside it."""
+
+    def __init__(self, unit: RenderUnit):
+        self._unit = unit
+        super().__init__(dict(unit.signature.members) | {"status": Out(counters_shape(*STATUS, "busy"))})
+
+    def elaborate(self, platform):
+        """The unit, and the counter."""
+        m = Module()
+        m.submodules.render = unit = self._unit
+        connect(m, wiring.flipped(self.i), unit.i)
+        connect(m, wiring.flipped(self.write), unit.write)
+        connect(m, unit.o, wiring.flipped(self.o))
+        m.d.comb += [
+            unit.constants.eq(self.constants),
+            *(self.status[name].eq(unit.status[name]) for name in STATUS),
+        ]
+        m.d.sync += self.status.busy.eq(self.status.busy + ~unit.idle)
+        return m
 
 
 @dataclass(frozen=True)
@@ -46,7 +73,7 @@ class SimulatedTriangleFrame:
     visible : int
         Pixels of the picture that show the surface.
     cycles : int
-        Cycles from the first triangle to the last pixel.
+        Cycles from the first triangle until the hardware is empty.
     input_cycles : int
         Cycles until the last triangle was taken in.
     engine : {"cxxrtl", "pysim"}
@@ -55,6 +82,8 @@ class SimulatedTriangleFrame:
         Seconds of ``triangles`` (to transform and clip them) and of ``simulate``.
     setups : int
         Lanes of triangle setup.
+    coarse : bool
+        Whether hidden spans are dropped before they are shaded.
     """
 
     image: np.ndarray
@@ -67,6 +96,7 @@ class SimulatedTriangleFrame:
     engine: str
     seconds: dict[str, float]
     setups: int = 1
+    coarse: bool = False
 
     @property
     def spans(self) -> int:
@@ -114,7 +144,8 @@ class TriangleSimulator:
         self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
         self.setups = setups
         self._origin = renderer, size, setups
-        self._unit = RenderUnit(*self._origin)
+        self._render = RenderUnit(*self._origin)
+        self._unit = _Timed(self._render)
         self._check()
 
     def _check(self) -> None:
@@ -157,7 +188,6 @@ class TriangleSimulator:
         self,
         scene: Scene,
         progress: Callable[[int, int], object] | None = None,
-        count: int | None = None,
         vcd: str | None = None,
     ) -> SimulatedTriangleFrame:
         """Send a scene's triangles, and collect its pixels.
@@ -168,8 +198,6 @@ class TriangleSimulator:
             What to draw, of the simulator's size.
         progress : callable, optional
             Called at times; both numbers are the pixels written so far, as the total is unknown.
-        count : int, optional
-            Number of pixels that will be written, if known: it saves the idle timeout at the end.
         vcd : str, optional
             File for the waveforms; engine ``"pysim"`` only.
 
@@ -195,7 +223,7 @@ class TriangleSimulator:
         run = simulate(
             self._unit,
             sent.triangles.beats,
-            count=count,
+            count=None,
             constants=self._constants(sent.frame),
             write=writes_of(constants_of(scene, self.renderer.design)),
             engine=self.engine,
@@ -205,7 +233,7 @@ class TriangleSimulator:
             idle_timeout=self._longest_silence(sent),
         )
         counts = {name: int(run.status[name]) for name in STATUS}
-        if count is None and counts["pixels"] - counts["hidden"] != len(run.beats):
+        if counts["pixels"] - counts["hidden"] != len(run.beats):
             raise SimulationError("the hardware counted other pixels than it gave")
         beats = run.beats
         color = np.stack([beats[channel] for channel in "rgb"], axis=-1)
@@ -215,11 +243,12 @@ class TriangleSimulator:
             counts=counts,
             written=len(beats),
             visible=len(np.unique(beats["y"].astype(np.int64) * scene.width + beats["x"])),
-            cycles=int(max(run.cycles.max(initial=0), run.input_cycles[-1]) - run.input_cycles[0] + 1),
+            cycles=int(run.status["busy"]),
             input_cycles=int(run.input_cycles[-1] - run.input_cycles[0] + 1),
             engine=run.engine,
             seconds={"triangles": ready - start, "simulate": perf_counter() - ready},
             setups=self.setups,
+            coarse=self.renderer.coarse is not None,
         )
 
     def _longest_silence(self, sent: SceneTriangles) -> int:
@@ -228,7 +257,7 @@ class TriangleSimulator:
         The pixels of a triangle are at most its area, half its perimeter and 1. The triangles inside follow
         one another among those that are drawn.
         """
-        geometry, frame, steps = self._unit.geometry, sent.frame, self.renderer.geometry.grid.steps
+        geometry, frame, steps = self._render.geometry, sent.frame, self.renderer.geometry.grid.steps
         drawn, _ = VertexSort(geometry.grid).compute(sent.triangles, frame)
         triangles = drawn.triangles
         inside = _IN_UNITS if geometry.compact else _IN_UNITS + WAITING_TRIANGLES + WAITING_SPANS
@@ -242,6 +271,6 @@ class TriangleSimulator:
         width, height = sides
         pixels = np.minimum(width * height, drawn.area / (2 * steps**2) + width + height + 1)
         cycles = geometry.interval + np.ptp(triangles.y, axis=1) / steps
-        cycles += (self._unit.pipeline.cycles_per_pixel + 1) * pixels
+        cycles += (self._render.pipeline.cycles_per_pixel + 1) * pixels
         total = np.append(np.cumsum(cycles), np.full(inside, cycles.sum()))
         return _PAUSE + int((total[inside:] - total[:-inside]).max(initial=total[inside - 1]))

@@ -189,7 +189,7 @@ def test_designs():
         (["--jobs", "no"], "blysk: --jobs no: not a whole number; give"),
         (
             ["--unit", "fuse"],
-            "blysk: --unit fuse: unknown unit; use a name of the table of blysk blocks",
+            "blysk: --unit fuse: unknown unit; use gradient_setup, halfway_vector, ",
         ),
         (["--unit", "gpq", "--method", "chord"], "blysk: --method: is for the pipeline; leave it out, or"),
         (["--unit", "gpq", "--every-method"], "blysk: --every-method: is for the pipeline; leave it out"),

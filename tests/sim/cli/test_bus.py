@@ -28,6 +28,21 @@ def test_files_of_a_core_on_a_bus():
     assert sorted(path.name for path in Path().iterdir()) == ["core.h", "core.md", "core.svd", "core.v"]
 
 
+@pytest.mark.parametrize("method", ["linear", "renormalise"])
+def test_ports_of_geometry_alone(method):
+    """Its own ports, each with a description, and what the limit of spans is."""
+    assert main(["verilog", "--top", "geometry", "--method", method, "-o", "core.v"]) == 0
+    lines = Path("core.v").read_text().splitlines()
+    start = lines.index(next(line for line in lines if line.startswith("// port ")))
+    ports = [line.split(maxsplit=6) for line in lines[start + 1 : lines.index("//", start)]]
+    assert all(len(port) == 7 for port in ports)
+    names = [port[1] for port in ports]
+    assert {"i_two_sided", "constants_limit", "status_cut", "o_valid"} < set(names)
+    assert "constants_picture" not in names
+    read = {"linear": "2048 sin(a / 2)", "renormalise": "is not read"}[method]
+    assert f"// constants_limit: {read}" in "\n".join(lines)
+
+
 @pytest.mark.parametrize(
     ("options", "thing", "says"),
     [

@@ -95,9 +95,9 @@ def test_two_setups():
 
 def test_setups_need_triangles(refused):
     """Of both commands, and of a scene file."""
-    needs = "spans need no triangle setup; give "
-    refused("render", *SMALL, "--setups", "2", thing="--setups 2", says=needs + "geometry hardware, too")
-    refused("verilog", "--setups", "2", thing="--setups 2", says=needs + "top or geometry, too")
+    needs = "spans need no triangle setup; "
+    refused("render", *SMALL, "--setups", "2", thing="--setups 2", says=needs + "give geometry hardware, too")
+    refused("verilog", "--setups", "2", thing="--setups 2", says=needs + "use top geometry or render")
     refused("verilog", "--setups", "3", thing="--setups 3", says="give one of 1, 2")
     Path("a.toml").write_text('[mesh]\nfile = "teapot"\n[pipeline]\nsetups = 2\n')
     refused("render", "a.toml", thing="a.toml, pipeline.setups", says=needs)
@@ -167,3 +167,22 @@ def test_verilog_refuses(refused):
     """Values of spans; and a bench that would send spans."""
     refused("verilog", *HARDWARE, "--method", "chord-local", thing="--geometry hardware", says="takes values")
     refused("verilog", *HARDWARE, "--testbench", "a", thing="--testbench", says="takes triangles")
+
+
+@pytest.mark.parametrize("method", ["chord", "chord-local"])
+def test_local_light_needs_spans(refused, method):
+    """Another method does not help: of triangles none serves a point light."""
+    options = ["--method", method, "--point-light", "3,4,5"]
+    refused(
+        "render",
+        *SMALL,
+        *HARDWARE,
+        *options,
+        thing="--geometry hardware",
+        says="the values of a span; use software",
+    )
+
+
+def test_short_words_need_spans(refused):
+    """Their remedy is not one that is refused, too."""
+    refused("render", *SMALL, *HARDWARE, "--short-words", thing="--short-words", says="leave it out")
