@@ -8,9 +8,11 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+import blysk.__main__ as entry
 from blysk.sim.api.scene_file import read_scene_file
 from blysk.sim.cli.main import main
 
@@ -82,6 +84,18 @@ def test_interrupt():
         process.kill()
     assert (process.returncode, output, errors) == (130, "", "blysk: interrupted\n")
     assert files() == {}
+
+
+def test_interrupt_while_it_is_imported(monkeypatch, capsys):
+    """The first second of a command is its imports."""
+
+    class Slow(ModuleType):
+        def __getattr__(self, name):
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "blysk.sim.cli.main", Slow("blysk.sim.cli.main"))
+    assert entry.main() == 130
+    assert capsys.readouterr() == ("", "blysk: interrupted\n")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes")
