@@ -60,13 +60,12 @@ class Candidate:
         return Renderer(preset(self.method, "blinn", x_bits=10, y_bits=9, **options))
 
     @property
-    def placed(self) -> str | None:
-        """Its name in ``blysk fpga``; ``None`` with two lanes, for which that has no option."""
-        if self.setups > 1:
-            return None
+    def placed(self) -> str:
+        """Its name in ``blysk fpga``."""
         style = f", {self.style}" if self.style != "throughput" else ""
         interval = "" if self.setup_interval is None else f", interval {self.setup_interval}"
-        return f"render {self.method}, blinn, 1 light{style}{interval}"
+        lanes = f", {self.setups} lanes" if self.setups > 1 else ""
+        return f"render {self.method}, blinn, 1 light{style}{interval}{lanes}"
 
 
 CANDIDATES = {
@@ -166,7 +165,7 @@ def _verdict(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -
         if None in pair:
             continue
         names = [f"{method}{style}" for method in _METHODS]
-        seeds = [rates.get(CANDIDATES[name].placed or "", ()) for name in names]
+        seeds = [rates.get(CANDIDATES[name].placed, ()) for name in names]
         known = all(seeds)
         clocks = [median(of) for of in seeds] if known else []
         words = []
@@ -194,7 +193,7 @@ def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> 
     columns += ("pixels of another triangle", "largest error, LSB")
     rows: list[tuple[Cell, ...]] = []
     for name, of in designs.items():
-        placed = rates.get(CANDIDATES[name].placed or "")
+        placed = rates.get(CANDIDATES[name].placed)
         errors = [error for frame in of["frames"] for error in frame["errors"].values() if error is not None]
         rows.append(
             (

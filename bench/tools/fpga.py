@@ -37,7 +37,7 @@ from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.tops import TOPS
 from blysk.sim.api.design import design, pixel_pipelines, renderer_of
-from blysk.sim.api.options import DESIGN, PIPES, PORTS
+from blysk.sim.api.options import DESIGN, PIPES, PORTS, SETUPS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable, write_json
@@ -122,7 +122,7 @@ def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Comp
 
 
 def _pipelines(
-    given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1, top: str = "shader"
+    given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1, top: str = "shader", setups: int = 1
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
     """The pipeline or another core by the given options, with one method or with every method."""
     for method in METHODS if every else (given.get("method", DESIGN["method"].default),):
@@ -135,16 +135,18 @@ def _pipelines(
         name += [f"interval {chosen['setup_interval']}"] if "setup_interval" in chosen else []
         name += ["gate"] if made.gate else []
         name += [f"{pipes} pipelines"] if pipes > 1 else []
+        name += [f"{setups} lanes"] if setups > 1 else []
         if top == "shader":
             yield ", ".join(name), partial(pixel_pipelines, made, pipes)
         elif not made.takes_values or not every:
-            yield ", ".join(name), partial(TOPS[top].unit, renderer_of(made, "top", top))
+            yield ", ".join(name), partial(TOPS[top].unit, renderer_of(made, "top", top), setups=setups)
 
 
 @click.command(short_help="Place and route for an FPGA: parts, clock rate.")
 @options_of(DESIGN)
 @options_of(PIPES)
 @options_of({"top": PORTS["top"]})
+@options_of(SETUPS)
 @click.option(
     "--family",
     "family_name",
@@ -190,6 +192,7 @@ def command(
     lights,
     pipes,
     top,
+    setups,
     every_method,
     units,
     target,
@@ -223,7 +226,7 @@ def command(
     family = replace(family, target=target)
     chosen = given_options(context, list(DESIGN))
     top = top or "shader"
-    given = [*chosen, *given_options(context, ["lights", "pipes", "top", "every_method"])]
+    given = [*chosen, *given_options(context, ["lights", "pipes", "top", "setups", "every_method"])]
     if units and given:
         option = f"--{given[0].replace('_', '-')}"
         raise InputError(option, "is for the pipeline", "leave it out, or --unit")
@@ -231,11 +234,16 @@ def command(
         raise InputError("--method", "is one of every method", "leave it out, or --every-method")
     if pipes > 1 and top != "shader":
         raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave it out, or --top")
+    setups = setups or SETUPS["setups"].default
+    if setups > 1 and top == "shader":
+        raise InputError(
+            f"--setups {setups}", "spans need no triangle setup", "leave it out, or --top geometry or render"
+        )
     if by_unit and (placing := given_options(context, ["target", "seeds", "jobs"])):
         raise InputError(f"--{next(iter(placing))}", "nothing is placed", "leave it out, or --by-unit")
     if figures:
         check_writable(figures)
-    designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes, top))
+    designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes, top, setups))
     tools = versions_of(family)
     about = {"device": family.device, "capacity": asdict(family.capacity), "tools": tools}
     if by_unit:

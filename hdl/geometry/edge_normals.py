@@ -27,7 +27,7 @@ class EdgeNormalsUnit(wiring.Component):
     """Normalises the ends and the middle of a piece one after the other: `EdgeNormals` is the model.
 
     A piece of one pixel takes one cycle, of two pixels two, of more three: one for each normal. The span of
-    one pixel is offered `latency` cycles, 19, after its piece is taken in, and one cycle later for each
+    one pixel is offered `latency` cycles, 20, after its piece is taken in, and one cycle later for each
     further normal. Six multipliers, those of `VectorNormaliserUnit`.
 
     In the *compact* style a normal takes `COMPACT_INTERVAL` cycles and the latency is 32; three multipliers,

@@ -14,7 +14,7 @@ __all__ = ["HalfwayVectorUnit"]
 class HalfwayVectorUnit(wiring.Component):
     """Half-way vectors by a sum and a normaliser: `HalfwayVector` is the bit-accurate model.
 
-    Latency, `latency`, and initiation interval are those of `VectorNormaliserUnit`, 17 cycles and 1. It has
+    Latency, `latency`, and initiation interval are those of `VectorNormaliserUnit`, 18 cycles and 1. It has
     the only multipliers, six.
 
     Parameters

@@ -32,10 +32,10 @@ def vectors_shape(parameters: VectorNormaliser) -> tuple[data.StructLayout, data
 class VectorNormaliserUnit(PipelinedUnit):
     """Unit vector along a vector of any length: `VectorNormaliser` is the bit-accurate model.
 
-    The latency is 17 cycles, 3 in `DotProductUnit` and 14 others: four for shift and rounding; one each for
-    segment and table, three for ``c0 - c1 u``, one for e; four for ``v + e v``. The initiation interval is 1.
-    Six multipliers of 18x18 bits: three squares and three scalings; ``c1 u`` is a sum of Booth digits. The
-    table holds 512 words of 32 bits.
+    The latency is 18 cycles, 3 in `DotProductUnit` and 15 others: four for shift and rounding; one for the
+    segment, two for the table, three for ``c0 - c1 u``, one for e; four for ``v + e v``. The initiation
+    interval is 1. Six multipliers of 18x18 bits: three squares and three scalings; ``c1 u`` is a sum of Booth
+    digits. The table holds 512 words of 32 bits.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class VectorNormaliserUnit(PipelinedUnit):
     def __init__(self, parameters: VectorNormaliser | None = None):
         self.parameters = parameters or VectorNormaliser()
         self._dot, self.multipliers = DotProductUnit(), 6
-        super().__init__(*vectors_shape(self.parameters), latency=self._dot.latency + 14)
+        super().__init__(*vectors_shape(self.parameters), latency=self._dot.latency + 15)
 
     def datapath(self, m, operands):
         """Shifted, squared, its factor from the table, scaled."""
@@ -73,7 +73,7 @@ class VectorNormaliserUnit(PipelinedUnit):
         m.d.comb += [dot.i.valid.eq(1), dot.o.ready.eq(1)]
         for side in (dot.i.payload.a, dot.i.payload.b):
             m.d.comb += [to.eq(word) for to, word in zip(side, words, strict=True)]
-        at_factor = dot.latency + 10
+        at_factor = dot.latency + 11
         e = self._factor(m, dot.o.payload)
         late = [self._delay(m, word, f"v_{k}", at_factor - 4) for k, word in enumerate(words)]
         flip = self._delay(m, operands.flip, "flip", at_factor + 3)
@@ -117,16 +117,16 @@ class VectorNormaliserUnit(PipelinedUnit):
         return words, lost
 
     def _factor(self, m: Module, square: FixedValue) -> FixedValue:
-        """``e`` of a squared length, 6 cycles later."""
+        """``e`` of a squared length, 7 cycles later."""
         p, register = self.parameters, self.register
         s, large = _root_place(square)
         bits = p.OFFSET_FORMAT.width - 1
         segment = register(m, s[bits:], "segment")
         rest = register(m, s[:bits], "rest")
-        large = self._delay(m, large, "large", 5)
+        large = self._delay(m, large, "large", 6)
         c0, c1 = self._coefficients(m, segment)
         # In half steps, always odd: half a step for the bits that were cut.
-        u = register(m, _offset(rest), "u")
+        u = self._delay(m, _offset(rest), "u", 2)
         # c1 is unsigned: a zero above it completes its last Booth digit.
         digits = Cat(Const(0, 1), Value.cast(c1), Const(0, 2))
         count = (len(Value.cast(c1)) + 2) // 2
@@ -138,14 +138,15 @@ class VectorNormaliserUnit(PipelinedUnit):
         return register(m, _excess(p, f, large), "e")
 
     def _coefficients(self, m: Module, segment: Value) -> tuple[FixedValue, FixedValue]:
-        """``c0`` and ``c1`` of the segment, a cycle later."""
+        """``c0`` and ``c1`` of the segment, two cycles later: a block RAM's output is late in its cycle."""
         layout = _row_shape(self.parameters)
         rows = zip(*(column.values.tolist() for column in self.parameters.coefficients), strict=True)
         rows = [dict(zip(("c0", "c1"), row, strict=True)) for row in rows]
         m.submodules.roots = table = Memory(shape=layout, depth=len(rows), init=rows)
         port = table.read_port()
         m.d.comb += port.addr.eq(segment)
-        return port.data.c0, port.data.c1
+        row = self.register(m, port.data, "row")
+        return row.c0, row.c1
 
 
 class SharedVectorNormaliserUnit(PipelinedUnit):

@@ -397,11 +397,11 @@ SETUPS: dict[str, Option] = {
     "setups": Option(
         Few(1, 2),
         1,
-        "With --geometry hardware: lanes of triangle setup; two take twice as many small triangles.",
+        "Of hardware geometry: lanes of triangle setup; two take twice as many small triangles.",
         "pipeline.setups",
     ),
 }
-"""Option of a rendering and of Verilog, for hardware that takes triangles."""
+"""Option of a rendering, of Verilog and of place and route, for hardware that takes triangles."""
 
 COARSE: dict[str, Option] = {
     "coarse": Option(

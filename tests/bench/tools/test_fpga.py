@@ -185,6 +185,10 @@ def test_designs():
     [
         (["--pipes", "3"], "blysk: --pipes 3: no such number; give one of 1, 2, 4, 8"),
         (["--unit", "gpq", "--pipes", "2"], "blysk: --pipes: is for the pipeline; leave it out, or --unit"),
+        (
+            ["--setups", "2"],
+            "blysk: --setups 2: spans need no triangle setup; leave it out, or --top geometry",
+        ),
         (["--seeds", "0"], "blysk: --seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "blysk: --jobs no: not a whole number; give"),
         (
