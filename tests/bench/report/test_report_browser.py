@@ -74,7 +74,7 @@ def panel(page, key):
 
 def test_a_point_opens_its_figures(open_page, figures):
     page = open_page()
-    points = drawn(figures, "total_max_lsb", "cycles_per_pixel")
+    points = drawn(figures, "total_max_lsb", page.locator("#time-axis").input_value())
     places = dots(page)
     assert set(places) == set(points)
     # One that stands apart.
@@ -146,7 +146,7 @@ def test_axes_and_front(open_page, figures):
 def test_groups(open_page, figures):
     page = open_page()
     page.locator("#groups input[value=baseline]").uncheck()
-    points = drawn(figures, "total_max_lsb", "cycles_per_pixel")
+    points = drawn(figures, "total_max_lsb", page.locator("#time-axis").input_value())
     assert set(dots(page)) == {name for name, point in points.items() if point["group"] != "baseline"}
     rows = page.locator("#every-point tbody tr:visible")
     groups = set(rows.locator("td:nth-child(2)").all_inner_texts())
@@ -191,6 +191,8 @@ def column(page, table, title):
 
 def test_table_of_points_sorts(open_page, figures):
     page = open_page()
+    # The table has the columns of the drawing's axes.
+    page.locator("#time-axis").select_option("cycles_per_pixel")
     heading, cells = column(page, "#part-points", "hardware, cycles, cycles a pixel")
     points = [point for point in figures["points"] if point["settings"]["exponent"] == 100]
     expected = sorted(p["times"]["cycles_per_pixel"] for p in points if p["times"]["cycles_per_pixel"])
