@@ -60,6 +60,13 @@ COUNTED = [
 ]
 
 
+@pytest.fixture(autouse=True)
+def short_fifos(monkeypatch):
+    """FIFOs of geometry hold 5 words in place of 513: every bit of theirs is a register of the proof."""
+    monkeypatch.setattr("blysk.hdl.geometry.geometry.WAITING_TRIANGLES", 5)
+    monkeypatch.setattr("blysk.hdl.render.WAITING_SPANS", 5)
+
+
 @pytest.mark.parametrize("name", UNITS)
 def test_beats_that_wait_stay(prove, name):
     """Inductive: a valid beat stays, with its payload, until it is accepted."""
