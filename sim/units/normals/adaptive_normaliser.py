@@ -151,11 +151,11 @@ RECORD = Record(
     still={
         "ends that are bisected are two of 32 segments apart at least": "top.index[0]",
         "half of 32 segments is the most that ends are apart or written last": "half[5] write_index[5]",
-        "the unit has 16 spans inside at most": "ready_spans[4-6]",
+        "the unit has 16 spans inside at most": "ready_spans[5-6]",
         "a reciprocal is normalised and not negative, so that its first bits are 01": (
             "reciprocal[16-17] reciprocals.table_port__data[16]"
         ),
-        "a segment has at most 4095 pixels, and they take 4094 steps and 31": "available[13] advance[13-23]",
+        "the pixels of a segment take at most the steps in `available`, 14 bits": "advance[14-23]",
         "a segment of 4096 steps is divided": "top.count[12]",
         "a fraction is not negative": "phi[17]",
     },
