@@ -40,6 +40,14 @@ def test_waivers_are_of_a_signal_and_its_copies(monkeypatch):
     assert row.open == ("inv -> unit.other",)
 
 
+@pytest.mark.parametrize(("survivors", "status"), [(10, 0), (11, 1)])
+def test_status_tells_whether_the_score_is_reached(monkeypatch, capsys, survivors, status):
+    row = Score("diffuse", 200, (), tuple(f"inv -> unit.o{k}" for k in range(survivors)))
+    monkeypatch.setattr(mutants, "scores", lambda *_: [row])
+    assert main(["diffuse"]) == status
+    assert capsys.readouterr().err.count("survived without a waiver: diffuse: inv -> unit.o") == survivors
+
+
 @pytest.mark.long
 def test_proofs_tell_faults_from_the_unit(tmp_path):
     """No killed mutant is equivalent, and the unit is equivalent to itself."""
