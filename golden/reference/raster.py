@@ -303,33 +303,9 @@ def rasterise(scene: Scene) -> Raster:
     present[0, left_over] = True
     present[1, pieces.triangle] = True
 
-    owner = np.full(width * height, -1, dtype=np.int32)
-    buffer = np.full(width * height, -np.inf)
-    columns = []
-    count = 0
-    for piece, left, line, length, nearness, step in _spans(pieces, width, height):
-        present[2, pieces.triangle[piece]] = True
-        columns.append([part.astype(np.int32) for part in (piece, left, line, length)])
-        first_pixel = line * width + left
-        for run in runs_of(length, _CHUNK):
-            lengths = length[run]
-            offset = _counting(lengths)
-            pixel = np.repeat(first_pixel[run], lengths) + offset
-            value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
-            before = buffer[pixel]
-            np.maximum.at(buffer, pixel, value)
-            # Strictly nearer than the stored depth: at equal depth the lower triangle, drawn before, stays.
-            winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
-            # The last of several assignments counts; reversed, that is the first span of the chunk.
-            index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
-            owner[pixel[winner]] = index[winner]
-        count += len(piece)
-    del buffer
-
-    if columns:
-        piece, left, line, length = (np.concatenate(column) for column in zip(*columns, strict=True))
-    else:
-        piece, left, line, length = np.zeros((4, 0), dtype=np.int32)
+    (piece, left, line, length), owner = _drawn(pieces, width, height)
+    count = len(piece)
+    present[2, pieces.triangle[piece]] = True
     seen = np.zeros(count, dtype=bool)
     seen[owner[owner >= 0]] = True
     kept = np.flatnonzero(seen)
@@ -378,6 +354,31 @@ def rasterise(scene: Scene) -> Raster:
         hidden_spans=count - len(kept),
         repaired_normals=sum(int(end.lost.sum()) for end in ends),
     )
+
+
+def _drawn(pieces: _Pieces, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Piece, first x, y and length of every span, shape (4, spans); the span that a pixel shows, or -1."""
+    owner = np.full(width * height, -1, dtype=np.int32)
+    buffer = np.full(width * height, -np.inf)
+    columns = []
+    count = 0
+    for piece, left, line, length, nearness, step in _spans(pieces, width, height):
+        columns.append(np.stack([piece, left, line, length]).astype(np.int32))
+        first_pixel = line * width + left
+        for run in runs_of(length, _CHUNK):
+            lengths = length[run]
+            offset = _counting(lengths)
+            pixel = np.repeat(first_pixel[run], lengths) + offset
+            value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
+            before = buffer[pixel]
+            np.maximum.at(buffer, pixel, value)
+            # Strictly nearer than the stored depth: at equal depth the lower triangle, drawn before, stays.
+            winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
+            # The last of several assignments counts; reversed, that is the first span of the chunk.
+            index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
+            owner[pixel[winner]] = index[winner]
+        count += len(piece)
+    return np.concatenate([np.zeros((4, 0), dtype=np.int32), *columns], axis=1), owner
 
 
 class _End(NamedTuple):

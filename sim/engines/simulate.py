@@ -229,18 +229,7 @@ def simulate(
         idle_timeout=idle_timeout,
         settle=settle,
     )
-    model: Model
-    if engine == "pysim":
-        model = _interpreted(component, vcd)
-    else:
-        try:
-            model = _compiled(component, origin)
-            engine = "cxxrtl"
-        except CompilerMissing as error:
-            if engine == "cxxrtl":
-                raise
-            warn(f"{error}; using pysim, some hundred times slower", RuntimeWarning, stacklevel=2)
-            model, engine = _interpreted(component, vcd), "pysim"
+    model, engine = _model_of(component, engine, origin, vcd)
     trace = model.run(stimulus, progress)
     _judge(stimulus, trace)
     return Run(
@@ -251,6 +240,18 @@ def simulate(
         status=None if ports.status is None else unpack(ports.status, trace.status)[0],
         engine=engine,
     )
+
+
+def _model_of(component: Component, engine: str, origin: Any, vcd: str | None) -> tuple[Model, str]:
+    """A component's model in an engine, and the engine's name; pysim for ``auto`` without a compiler."""
+    if engine != "pysim":
+        try:
+            return _compiled(component, origin), "cxxrtl"
+        except CompilerMissing as error:
+            if engine == "cxxrtl":
+                raise
+            warn(f"{error}; using pysim, some hundred times slower", RuntimeWarning, stacklevel=3)
+    return _interpreted(component, vcd), "pysim"
 
 
 def _unpacked(shape, words: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from blysk.sim.output import atomic_writer, check_writable
 __all__ = ["check_image_path", "write_comparison", "write_image"]
 
 _COMMON = ".png, .jpg, .bmp, .ppm, .tiff or .webp"
+_COLOR_MAP = "inferno"
 
 
 def check_image_path(path: str | os.PathLike) -> None:
@@ -101,30 +102,13 @@ def write_comparison(
         raise ValueError("golden must be in [0, 1]")
     check_image_path(path)
 
-    import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
     height, width, _ = simulated.shape
-    error = np.zeros((height, width))
-    rounded = np.empty_like(simulated)
-    for channel in range(3):  # one channel at a time: a third of the memory
-        exact = 255 * golden[..., channel]
-        rounded[..., channel] = np.rint(exact)
-        np.maximum(error, np.abs(simulated[..., channel] - exact), out=error)
-    largest = max(1.0, error.max())
-    color_map = matplotlib.colormaps["inferno"]
-    colors = (color_map(np.arange(256))[:, :3] * 255).round().astype(np.uint8)
-    panels = {
-        "simulated": simulated,
-        "golden": rounded,
-        f"error: largest {error.max():.2f}, mean {error.mean():.3f} LSB": colors[
-            np.rint(error * (255 / largest)).astype(np.uint8)
-        ],
-    }
-
+    panels, largest = _panels(simulated, golden)
     text = int(np.clip(width / 40, 14, 96))
     column = max(width, 22 * text)
     total_width = max(3 * column + 4 * text, int(0.65 * 1.3 * text * max(len(title), len(subtitle))))
@@ -148,7 +132,7 @@ def write_comparison(
         [left[2] / total_width, 3.4 * text / (above + below), column / total_width, text / (above + below)]
     )
     scale = figure.colorbar(
-        ScalarMappable(Normalize(0, largest), color_map), cax=bar, orientation="horizontal"
+        ScalarMappable(Normalize(0, largest), _COLOR_MAP), cax=bar, orientation="horizontal"
     )
     scale.ax.tick_params(labelsize=text, length=text / 3, width=text / 14, pad=text / 5)
     scale.set_label("largest channel error, LSB of 8 bits", fontsize=text)
@@ -162,6 +146,27 @@ def write_comparison(
         x += (column - width) // 2
         picture[above : above + height, x : x + width] = panel
     write_image(path, picture)
+
+
+def _panels(simulated: np.ndarray, golden: np.ndarray) -> tuple[dict[str, np.ndarray], float]:
+    """Panels of a comparison by their labels, and the end of the error map's scale in LSB."""
+    import matplotlib
+
+    error = np.zeros(simulated.shape[:2])
+    rounded = np.empty_like(simulated)
+    for channel in range(3):  # one channel at a time: a third of the memory
+        exact = 255 * golden[..., channel]
+        rounded[..., channel] = np.rint(exact)
+        np.maximum(error, np.abs(simulated[..., channel] - exact), out=error)
+    largest = max(1.0, error.max())
+    colors = (matplotlib.colormaps[_COLOR_MAP](np.arange(256))[:, :3] * 255).round().astype(np.uint8)
+    return {
+        "simulated": simulated,
+        "golden": rounded,
+        f"error: largest {error.max():.2f}, mean {error.mean():.3f} LSB": colors[
+            np.rint(error * (255 / largest)).astype(np.uint8)
+        ],
+    }, largest
 
 
 def _check_frame(image: np.ndarray) -> None:
