@@ -70,9 +70,12 @@ def assert_equals_model(unit, run, engine="auto"):
     if isinstance(unit, PipelinedUnit) and not run.stalls:
         # Writes come before the first beat, one a cycle.
         start = 0 if case.write is None else found.input_cycles[0]
-        expected = start + np.arange(run.count) * unit.initiation_interval
-        np.testing.assert_array_equal(found.input_cycles, expected)
-        np.testing.assert_array_equal(found.cycles, found.input_cycles + unit.latency)
+        latency, interval, number = unit.latency, unit.initiation_interval, np.arange(run.count)
+        # Without a skid buffer each result stops the unit for a cycle, and the inputs that come after it.
+        stops = np.zeros(run.count, dtype=int) if unit.skid else number
+        before = np.minimum(stops, np.maximum(0, number + 1 - -(-latency // interval)))
+        np.testing.assert_array_equal(found.input_cycles, start + number * interval + before)
+        np.testing.assert_array_equal(found.cycles, start + number * interval + latency + stops)
     return found
 
 

@@ -356,7 +356,8 @@ class PipelinedUnit(wiring.Component):
         Further members, by name.
     skid : bool
         Whether a spare register holds a beat that is not accepted (`skid_buffer`); without it the unit is
-        disabled while a beat is on the output, for one cycle at least (`stop_output`).
+        disabled while a beat is on the output, for one cycle at least (`stop_output`), so that without stalls
+        a beat comes every ``initiation_interval + 1`` cycles.
 
     Members
     -------
@@ -371,6 +372,8 @@ class PipelinedUnit(wiring.Component):
     ----------
     advance : Signal
         The common enable, from `elaborate` on: for logic of the unit outside its data path.
+    latency, initiation_interval, skid
+        As given.
     """
 
     def __init__(
@@ -389,7 +392,7 @@ class PipelinedUnit(wiring.Component):
             raise ValueError("latency and initiation_interval must be at least 1")
         self.latency = latency
         self.initiation_interval = initiation_interval
-        self._spaced, self._skid = spaced, skid
+        self._spaced, self.skid = spaced, skid
         if spaced and not skid:
             raise ValueError("a spaced unit needs its skid buffer")
         members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
@@ -442,7 +445,7 @@ class PipelinedUnit(wiring.Component):
             operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
-        if self._skid:
+        if self.skid:
             m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result))
         else:
             before = self._stages[-2] if self.latency > 1 else accept
@@ -487,7 +490,7 @@ class PipelinedUnit(wiring.Component):
                 stays.eq(inside.any()),
                 turn.eq(Mux(opens, 0, turn + 1)),
             ]
-        if not self._skid:
+        if not self.skid:
             with m.If(advance):
                 m.d.sync += ready.eq(opens)
             return ready & advance
