@@ -18,9 +18,9 @@ from blysk.golden.methods import (
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
 from blysk.golden.pipeline import Build, Design
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
-from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS, ReflectionModel
+from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS, ReflectionModel
 
-__all__ = ["LOBES", "METHODS", "MODELS", "PUBLISHED", "preset"]
+__all__ = ["LOBES", "METHODS", "METHOD_LINES", "MODELS", "MODEL_LINES", "PUBLISHED", "preset"]
 
 _MODULES = (
     linear_interpolator,
@@ -32,16 +32,24 @@ _MODULES = (
     chord_interpolator,
     local_chord_interpolator,
 )
-"""Modules with lists ``METHODS``, and some with ``PUBLISHED``; in the order in which tables show methods."""
+"""Modules with ``METHODS``, and some with ``PUBLISHED``, a line about each; in the order of tables."""
 
 METHODS: dict[str, Interpolator] = {method.name: method for module in _MODULES for method in module.METHODS}
 """Interpolation methods by name."""
 
 PUBLISHED: dict[str, Interpolator] = {
-    method.name: method for module in _MODULES for method in getattr(module, "PUBLISHED", ())
+    method.name: method for module in _MODULES for method in getattr(module, "PUBLISHED", {})
 }
 """Methods as published, by name: with the coefficients or in the form of the documents, for comparison.
 They have no error bound for a highlight gate."""
+
+METHOD_LINES: dict[str, str] = {
+    method.name: line
+    for name in ("METHODS", "PUBLISHED")
+    for module in _MODULES
+    for method, line in getattr(module, name, {}).items()
+}
+"""A line about each method and each as published, for the help of the command line."""
 
 MODELS: dict[str, Specular | Power] = {
     model.name: Specular(model) for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED)
@@ -61,6 +69,14 @@ LOBES: dict[str, Lobe] = {
 """Specular units with a table that is written for each frame, by name; every method serves each. At their
 size (704 words for ``phong_coplanar``, 336 for the others) tables are within 0.06 LSB of their model at every
 exponent; for roughness see `Lobe`."""
+
+MODEL_LINES: dict[str, str] = {
+    **{lobe.name: f"{lobe.model.summary}, from a table" for lobe in LOBES.values()},
+    **{name: unit.model.summary for name, unit in MODELS.items()},
+    "blinn_product": f"{BLINN.summary}, by repeated squaring",
+    PHONG.name: f"{PHONG.summary}; not every method serves it",
+}
+"""A line about each reflection model, for the help of the command line."""
 
 
 def preset(
@@ -106,7 +122,7 @@ def preset(
         If a name is unknown, the method lacks an option, or `Design` refuses a value.
     """
     if method not in METHODS | PUBLISHED:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
+        raise ValueError(f"method must be one of {', '.join(METHODS | PUBLISHED)}, not {method!r}")
     specular = _specular(model)
     interpolator = (METHODS | PUBLISHED)[method]
     if operand not in (None, interpolator.operand):

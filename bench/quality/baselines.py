@@ -3,7 +3,8 @@
 The figures are in ``bench/quality/baselines.json``, and a test fails if one changes by more than 2 % either
 way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints the changes; the exit status
 is 1 if a figure changed by more than that, or an entry is missing or not measured any more. ``--update``
-writes the file.
+writes the file. With words only the entries that have one of them in their names are measured, and the others
+stay as they are: ``python -m blysk.bench.quality.baselines --update halfway_vector`` after a unit was added.
 
 Cycles do not depend on the engine; here they are Amaranth's own simulator's, which compiles nothing.
 """
@@ -198,20 +199,29 @@ def differences(old: Figures, new: Figures, tolerance: float = 0.0) -> list[str]
 
 
 @click.command()
+@click.argument("words", nargs=-1, metavar="[WORD ...]")
 @click.option("--update", is_flag=True, help="Write the baselines.")
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
-def _command(update: bool, jobs: int) -> int:
-    """Measure every figure, and print the changes since the baselines were written."""
+def _command(words: Sequence[str], update: bool, jobs: int) -> int:
+    """Measure every figure, and print the changes since the baselines were written.
+
+    With WORDs only entries with one of them in their names are measured, compared and written.
+    """
+    chosen = [name for name in ENTRIES if not words or any(word in name for word in words)]
+    if not chosen:
+        raise InputError(" ".join(words), "is in the name of no entry", "name a unit, method or model")
     if update:
         check_writable(FILE)
     old = {} if update and not FILE.exists() else read(FILE)
-    tasks = [Task(measure, {"name": name}) for name in ENTRIES]
+    kept = {name: old[name] for name in old if words and name not in chosen}
+    old = {name: old[name] for name in old if name not in kept}
+    tasks = [Task(measure, {"name": name}) for name in chosen]
     try:
         with (
             tqdm(total=len(tasks), unit=" entries", leave=False, disable=None) as bar,
             local_executor(jobs) as executor,
         ):
-            new = dict(zip(ENTRIES, results_of(tasks, executor, bar.update), strict=True))
+            new = dict(zip(chosen, results_of(tasks, executor, bar.update), strict=True))
     except KeyboardInterrupt:
         print("blysk.bench.quality.baselines: interrupted; run it again to go on", file=sys.stderr)
         return 130
@@ -220,7 +230,8 @@ def _command(update: bool, jobs: int) -> int:
         print(line + f" (over {TOLERANCE:.0%})" * (line in far))
     print(f"{len(new)} entries, {len(moved)} differences, {len(far)} of more than {TOLERANCE:.0%}")
     if update:
-        write_json(FILE, new)
+        whole = new | kept
+        write_json(FILE, {name: whole[name] for name in dict.fromkeys([*ENTRIES, *whole])})
         print(f"written: {FILE}")
     elif far:
         print(f"if that is meant: {UPDATE}")

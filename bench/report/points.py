@@ -146,11 +146,7 @@ def _design_of(settings: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _group(method: str) -> str:
-    if method in PUBLISHED:
-        return "published"
-    if method.startswith("chord"):
-        return "own"
-    return "baseline" if method in ("linear", "renormalise") else "documents"
+    return "published" if method in PUBLISHED else METHODS[method].ORIGIN
 
 
 def _command(settings: Mapping[str, Any]) -> str:

@@ -195,7 +195,8 @@ class Specular(HighlightOperand):
     Raises
     ------
     ValueError
-        If the model is not one of `SERVED`, has no form as published, or the operand is unknown.
+        If the model is not one of `SERVED`, a polynomial's a or b does not fit into its word, or its slope at
+        exponent 1023 not into that of the slope; if it has no form as published, or the operand is unknown.
 
     Source: docs/theory/units.md#specular-unit; [T] 3.1 and 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin``
     and ``cosquad_q``; [Lyon93].
@@ -208,6 +209,8 @@ class Specular(HighlightOperand):
     SERVED: ClassVar = (PolynomialModel, AngleCosine, Exponential)
     """Families of reflection models that the unit serves."""
 
+    A_FORMAT = UQ(0, 19)
+    B_FORMAT = UQ(0, 18)
     SLOPE_FORMAT = UQ(9, 18)
     SCALE_FORMAT = UQ(0, 17)
     SHIFTED_FORMAT = UQ(1, 16)
@@ -224,7 +227,20 @@ class Specular(HighlightOperand):
             raise ValueError(
                 f"as_published is of polynomials that are squared once, not of {self.model.name}"
             )
+        if isinstance(self.model, PolynomialModel):
+            self._check_slope()
         super().__post_init__()
+
+    def _check_slope(self) -> None:
+        last = (1 << self.EXPONENT_BITS) - 1
+        for name, value, format in (
+            ("a", self.model.a, self.A_FORMAT),
+            ("b", self.model.b, self.B_FORMAT),
+            (f"slope at exponent {last}", self.model.slope(last), self.SLOPE_FORMAT),
+        ):
+            most = format.max_code * format.step
+            if not 0 <= value <= most:
+                raise ValueError(f"{self.model.name}: {name} must be from 0 to {most:.6f}, not {value}")
 
     @property
     def name(self) -> str:
@@ -273,7 +289,7 @@ class Specular(HighlightOperand):
             return None
         else:
             a, b = self.model.a, self.model.b
-        return Fixed.round(UQ(0, 19), a), Fixed.round(UQ(0, 18), b)
+        return Fixed.round(self.A_FORMAT, a), Fixed.round(self.B_FORMAT, b)
 
     @cached_property
     def slopes(self) -> Fixed:

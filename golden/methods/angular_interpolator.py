@@ -38,6 +38,7 @@ class AngularInterpolator(Interpolator):
     COSINE_OF_ZERO = 1.0
     MAX_ANGLE = AngularSetup.MAX_ANGLE
     CURVE = "slerp"
+    ORIGIN = "documents"
 
     @property
     def name(self):
@@ -85,11 +86,11 @@ class AngularInterpolator(Interpolator):
         return Operands(one - cosine, highlight, results[0][0][1])
 
 
-METHODS = (AngularInterpolator(),)
-"""The method of this module."""
+METHODS = {AngularInterpolator(): "equal angles on the great circle, from sines"}
+"""The method of this module, and a line about it."""
 
-PUBLISHED = (
-    AngularInterpolator(AngularSetup("arccos", Arccos("as_published"))),
-    AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))),
-)
+PUBLISHED = {
+    AngularInterpolator(AngularSetup("arccos", Arccos("as_published"))): "as the thesis prints it",
+    AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))): "as printed, the arccosine corrected",
+}
 """The method with the arccosine of table 3.1, as printed and with its misprint corrected."""

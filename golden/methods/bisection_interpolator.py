@@ -41,6 +41,7 @@ class BisectionInterpolator(NormalInterpolator):
     threshold: float = 2.0**-14
     bisection: Bisection = field(default_factory=Bisection)
 
+    ORIGIN = "documents"
     MAX_ANGLE = 90.0
     # None of these is an end of a straight line, which lie at multiples of 1/2^k.
     CHECKED_AT = (0.09, 0.31, 0.45, 0.64, 0.82)
@@ -111,8 +112,12 @@ def _operand_error(normaliser: AdaptiveNormaliser, beyond_45_degrees: bool) -> f
     return float(np.sqrt(3) * error + threshold + 2.0**-19 + 0.017 * (8.1 * threshold) ** 1.5)
 
 
-METHODS = (BisectionInterpolator(),)
-"""The method of this module."""
+METHODS = {BisectionInterpolator(): "spans halved until straight lines will do"}
+"""The method of this module, and a line about it."""
 
-PUBLISHED = (BisectionInterpolator(bisection=Bisection(as_published=True)),)
+PUBLISHED = {
+    BisectionInterpolator(
+        bisection=Bisection(as_published=True)
+    ): "with the polynomials that the thesis prints"
+}
 """The method with the polynomials of [T] 2.1."""

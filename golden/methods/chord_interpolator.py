@@ -268,5 +268,7 @@ class ChordInterpolator(Interpolator):
         return self.DIFFUSE_BUDGET / 255
 
 
-METHODS = (ChordInterpolator(),)
-"""The method of this module."""
+METHODS = {
+    ChordInterpolator(): "no normals: 1 - N.H is nearly a quadratic along a span; exact, a pixel a cycle"
+}
+"""The method of this module, and a line about it."""

@@ -74,6 +74,8 @@ class Interpolator:
         half of the spans at 75.
     CURVE : str
         The curve of `CURVES` on which the method's normals lie in exact arithmetic.
+    ORIGIN : str
+        ``"documents"``, ``"own"``, or ``"baseline"``: where the method comes from, for tables.
     TAKES_VALUES : bool
         Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
         differ from pixel to pixel.
@@ -94,6 +96,7 @@ class Interpolator:
     COSINE_OF_ZERO: ClassVar[float] = float(ONE_SQUARED.values)
     MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
     CURVE: ClassVar[str] = "normalised"
+    ORIGIN: ClassVar[Literal["documents", "own", "baseline"]] = "own"
     TAKES_VALUES: ClassVar[bool] = False
     END_FORMAT: ClassVar[Format] = COMPONENT
     TAKES_MIDDLE: ClassVar[bool] = False

@@ -41,6 +41,7 @@ class LinearInterpolator(NormalInterpolator):
         return "linear"
 
     CURVE = "linear"
+    ORIGIN = "baseline"
     CUT_BY_ERROR = False
 
     @property
@@ -70,5 +71,5 @@ class LinearInterpolator(NormalInterpolator):
         return DifferenceAccumulator().compute(normal_left, first, second, span, step), out_of_range
 
 
-METHODS = (LinearInterpolator(),)
-"""The method of this module."""
+METHODS = {LinearInterpolator(): "a straight line between the ends, not normalised: highlights go dull"}
+"""The method of this module, and a line about it."""

@@ -49,5 +49,5 @@ class LocalChordInterpolator(ChordInterpolator):
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
 
 
-METHODS = (LocalChordInterpolator(),)
-"""The method of this module."""
+METHODS = {LocalChordInterpolator(): "the same for point lights and a near viewer"}
+"""The method of this module, and a line about it."""

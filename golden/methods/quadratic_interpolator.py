@@ -47,6 +47,7 @@ class QuadraticInterpolator(NormalInterpolator):
     middle_normal: MiddleNormal = field(default_factory=MiddleNormal)
 
     CURVE = "quadratic"
+    ORIGIN = "documents"
     LARGEST_G = 0.305
     LARGEST_P = 0.83
 
@@ -111,12 +112,12 @@ class QuadraticInterpolator(NormalInterpolator):
         return QuadraticEvaluator(self.form).compute(g, p, q, length, span, step), out_of_range
 
 
-METHODS = (
-    QuadraticInterpolator(),
-    QuadraticInterpolator(form="direct"),
-    QuadraticInterpolator(form="horner"),
-)
-"""The methods of this module."""
+METHODS = {
+    QuadraticInterpolator(): "a quadratic through three normals, by differences",
+    QuadraticInterpolator(form="direct"): "the same quadratic, evaluated at every pixel",
+    QuadraticInterpolator(form="horner"): "the same quadratic by Horner's rule",
+}
+"""The methods of this module, and a line about each."""
 
-PUBLISHED = (QuadraticInterpolator(middle_normal=MiddleNormal("as_published")),)
+PUBLISHED = {QuadraticInterpolator(middle_normal=MiddleNormal("as_published")): "as the thesis prints it"}
 """The method with the polynomial of [T] 2.2."""

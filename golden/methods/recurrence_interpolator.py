@@ -43,6 +43,7 @@ class RecurrenceInterpolator(Interpolator):
     COSINE_OF_ZERO = 1.0
     MAX_ANGLE = 90.0
     CURVE = "slerp"
+    ORIGIN = "documents"
 
     def __post_init__(self):
         _ = self.setup
@@ -99,8 +100,8 @@ class RecurrenceInterpolator(Interpolator):
         return Operands(cosine, (one - highlight).saturate(Specular.ARGUMENT_FORMAT), out_of_range)
 
 
-METHODS = (RecurrenceInterpolator(),)
-"""The method of this module."""
+METHODS = {RecurrenceInterpolator(): "equal angles on the great circle, each normal from the two before"}
+"""The method of this module, and a line about it."""
 
-PUBLISHED = (RecurrenceInterpolator("direct"),)
+PUBLISHED = {RecurrenceInterpolator("direct"): "the recurrence as drawn, which is unstable"}
 """The method with formula 3.3 as published."""

@@ -44,6 +44,7 @@ class RenormaliseInterpolator(NormalInterpolator):
     END_FORMAT = Renormaliser.VECTOR_FORMAT
     MAX_ANGLE = 180.0
     CURVE = "normalised"
+    ORIGIN = "baseline"
     CUT_BY_ERROR = False
 
     @property
@@ -79,5 +80,7 @@ class RenormaliseInterpolator(NormalInterpolator):
         return normals, np.bincount(span, too_short, len(length)) > 0
 
 
-METHODS = (RenormaliseInterpolator(),)
-"""The method of this module."""
+METHODS = {
+    RenormaliseInterpolator(): "the true line between normals, each divided by its length; exact, never cut"
+}
+"""The method of this module, and a line about it."""

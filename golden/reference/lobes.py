@@ -347,13 +347,15 @@ def _energy_of_beckmann(roughness: float) -> float:
     return BECKMANN.peak(roughness) * alpha * alpha / (4 * integral)
 
 
-COPLANAR_PHONG = CoplanarPhong("phong_coplanar", "[T] 6, [P]")
+COPLANAR_PHONG = CoplanarPhong(
+    "phong_coplanar", "[T] 6, [P]", "Phong's (R.V)^n where all vectors lie in a plane"
+)
 """Phong's model where N, L and V are coplanar."""
 
-BECKMANN = Beckmann("beckmann", "Beckmann 1963", _energy_of_beckmann)
+BECKMANN = Beckmann("beckmann", "Beckmann 1963", "Beckmann's lobe, by roughness", _energy_of_beckmann)
 """Beckmann's distribution."""
 
-GGX = TrowbridgeReitz("ggx", "Trowbridge 1975, Walter 2007", _energy_of_ggx)
+GGX = TrowbridgeReitz("ggx", "Trowbridge 1975, Walter 2007", "the lobe of glTF, by roughness", _energy_of_ggx)
 """The distribution of Trowbridge and Reitz."""
 
 TABLE_MODELS: dict[str, ReflectionModel] = {

@@ -43,6 +43,8 @@ class ReflectionModel:
         Name on the command line and in tables.
     source : str
         Source of the formula; see docs/theory/models.md.
+    summary : str
+        The model in a few words, for the help of the command line.
     energy : callable, optional
         Function from the parameter to the factor that normalises the reflected energy; see `energy_factor`.
 
@@ -56,6 +58,7 @@ class ReflectionModel:
 
     name: str
     source: str = ""
+    summary: str = ""
     energy: Callable[[float], float] | None = None
 
     MIRROR: ClassVar[bool] = False
@@ -171,15 +174,24 @@ class PolynomialModel(ReflectionModel):
     a, b : float
         Coefficients of the slope ``k = a n + b``.
     squarings : int
-        How often the base is squared, 1 to 3.
+        How often the base is squared, 1 to 3: the power is 2, 4 or 8.
     curve : callable, optional
         Slope by exponent, where it is no line: hardware then holds it in a table.
+
+    Raises
+    ------
+    ValueError
+        If there are other squarings.
     """
 
     a: float = 0.0
     b: float = 0.0
     squarings: int = 1
     curve: Callable[[float], float] | None = None
+
+    def __post_init__(self):
+        if self.squarings not in (1, 2, 3):
+            raise ValueError(f"{self.name}: squarings must be 1, 2 or 3, not {self.squarings!r}")
 
     def slope(self, exponent: float) -> float:
         """Slope k at an exponent.
@@ -295,13 +307,19 @@ def _level_slope(exponent: float, level: float = 0.64) -> float:
     return (math.sqrt(level) - 1) / math.expm1(math.log(level) / exponent)
 
 
-PHONG = _MirrorPowerModel("phong", "[T] 6, [B] 2", lambda n: (n + 2) / (2 * math.pi))
+PHONG = _MirrorPowerModel(
+    "phong", "[T] 6, [B] 2", "(R.V)^n with the mirrored ray", lambda n: (n + 2) / (2 * math.pi)
+)
 """Phong's model."""
 
-BLINN = PowerModel("blinn", "[B] 3", lambda n: (n + 2) * (n + 4) / (8 * math.pi * (2 ** (-n / 2) + n)))
+BLINN = PowerModel(
+    "blinn", "[B] 3", "(N.H)^n, exact", lambda n: (n + 2) * (n + 4) / (8 * math.pi * (2 ** (-n / 2) + n))
+)
 """Blinn's model, which other models approximate."""
 
-COSQUAD = PolynomialModel("cosquad", "[T] 3.4, figure 3.6", a=1 / 2)
+COSQUAD = PolynomialModel(
+    "cosquad", "[T] 3.4, figure 3.6", "the thesis's cosine-quadratic: (1 - n/2 (1 - N.H))^2, or 0", a=1 / 2
+)
 """The cosine-quadratic model f2."""
 
 REFLECTION_MODELS: dict[str, ReflectionModel] = {
@@ -310,22 +328,61 @@ REFLECTION_MODELS: dict[str, ReflectionModel] = {
         PHONG,
         BLINN,
         COSQUAD,
-        PolynomialModel("cosquad7", "[T] figure 3.7", a=7 / 16),
-        PolynomialModel("cosquad_q", "[C]", curve=_level_slope),
-        PolynomialModel("cosquad_lin", "[C]", lambda n: 0.214 * (0.807 + n), a=0.448, b=0.099),
+        PolynomialModel("cosquad7", "[T] figure 3.7", "the same with the slope 7/16 n", a=7 / 16),
+        PolynomialModel(
+            "cosquad_q",
+            "[C]",
+            "the same with the slope that meets Blinn's power exactly at a level",
+            curve=_level_slope,
+        ),
+        PolynomialModel(
+            "cosquad_lin",
+            "[C]",
+            "the same with a slope that is a line in n, as printed",
+            lambda n: 0.214 * (0.807 + n),
+            a=0.448,
+            b=0.099,
+        ),
         # A line through the slope of cosquad_q, in place of the one that [C] prints.
-        PolynomialModel("cosquad_lin_refitted", "own fit", a=0.44813, b=0.10235),
-        PolynomialModel("lyon2", "Lyon 1993", a=1 / 4, squarings=2),
-        PolynomialModel("lyon3", "Lyon 1993", a=1 / 8, squarings=3),
+        PolynomialModel(
+            "cosquad_lin_refitted",
+            "own fit",
+            "the same with a line fitted to that of cosquad_q",
+            a=0.44813,
+            b=0.10235,
+        ),
+        PolynomialModel("lyon2", "Lyon 1993", "Lyon's fourth power of a line in N.H", a=1 / 4, squarings=2),
+        PolynomialModel("lyon3", "Lyon 1993", "Lyon's eighth power of a line in N.H", a=1 / 8, squarings=3),
         # Minimax over the whole range.
-        PolynomialModel("lyon1_refitted", "own fit", a=0.3557, b=0.2457),
-        PolynomialModel("lyon2_refitted", "own fit", a=0.2113, b=0.1468, squarings=2),
-        PolynomialModel("lyon3_refitted", "own fit", a=0.1150, b=0.0799, squarings=3),
-        AngleCosine("coscos2", "[T] 3.1"),
-        AngleCosine("coscos4", "[T] 3.1", power=4),
-        AngleCosine("coscos2_integral", "[T] 3.1", rule="integral"),
-        AngleCosine("coscos4_integral", "[T] 3.1", power=4, rule="integral"),
-        Exponential("exp", "own"),
+        PolynomialModel(
+            "lyon1_refitted",
+            "own fit",
+            "a square of a line in N.H, fitted over all exponents",
+            a=0.3557,
+            b=0.2457,
+        ),
+        PolynomialModel(
+            "lyon2_refitted", "own fit", "a fourth power, fitted", a=0.2113, b=0.1468, squarings=2
+        ),
+        PolynomialModel(
+            "lyon3_refitted", "own fit", "an eighth power, fitted", a=0.1150, b=0.0799, squarings=3
+        ),
+        AngleCosine("coscos2", "[T] 3.1", "a squared cosine of a multiple of the angle"),
+        AngleCosine("coscos4", "[T] 3.1", "a fourth power of a cosine of a multiple of the angle", power=4),
+        AngleCosine(
+            "coscos2_integral",
+            "[T] 3.1",
+            "coscos2 with the same integral as Blinn's power",
+            rule="integral",
+        ),
+        AngleCosine(
+            "coscos4_integral",
+            "[T] 3.1",
+            "coscos4 with the same integral as Blinn's power",
+            power=4,
+            rule="integral",
+        ),
+        Exponential("exp", "own", "exp(-n (1 - N.H)), to which Blinn's power tends"),
     )
 }
 """Every reflection model, by name; the only place of their coefficients."""

@@ -20,5 +20,16 @@ def unit_of(parameters: Interpolator) -> type[InterpolatorUnit]:
     ----------
     parameters : Interpolator
         Bit-accurate model of the method.
+
+    Raises
+    ------
+    TypeError
+        If the method has no unit.
     """
-    return InterpolatorUnit.UNITS[type(parameters)]
+    method = type(parameters)
+    if method not in InterpolatorUnit.UNITS:
+        raise TypeError(
+            f"{method.__name__} has no unit: {methods.__name__} needs a file *_interpolator.py with a class "
+            f"of parameters={method.__name__}"
+        )
+    return InterpolatorUnit.UNITS[method]

@@ -10,7 +10,7 @@ from typing import Any, get_args
 import click
 from tqdm import tqdm
 
-from blysk.sim.api.descriptions import METHOD_LINES, MODEL_LINES, described
+from blysk.golden.presets import METHOD_LINES, MODEL_LINES
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE
 from blysk.sim.api.render import (
     BUILDING,
@@ -43,6 +43,12 @@ _SPECIALISE = (
     "about half a minute the first time"
 )
 
+
+def _described(lines: dict[str, str]) -> str:
+    width = max(map(len, lines)) + 2
+    return "\n".join(f"    {name:<{width}}{text}" for name, text in lines.items())
+
+
 _KEYS = "\n".join(f"    {line}" for line in key_lines())
 _HELP = f"""Render MESH through the simulated pipeline.
 
@@ -61,11 +67,11 @@ Examples:
 
 \b
 Methods:
-{described(METHOD_LINES)}
+{_described(METHOD_LINES)}
 
 \b
 Models:
-{described(MODEL_LINES)}
+{_described(MODEL_LINES)}
 
 \b
 Keys of a scene file, all but mesh.file optional:

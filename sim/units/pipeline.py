@@ -93,12 +93,14 @@ def _measure(rng, count, design):
             t = pixel / np.maximum(length - 1, 1)[span]
             ends = [normalise(end / ONE)[span] for end in (left, right)]
             shades = []
-            for normal, reflect in (
-                (interpolate("normalised", *ends, t), REFLECTION_MODELS["blinn"].reflect),
-                (interpolator.exact_normals(*ends, t), model.reflect),
+            for normal, reflect, by_chord in (
+                (interpolate("normalised", *ends, t), REFLECTION_MODELS["blinn"].reflect, False),
+                (interpolator.exact_normals(*ends, t), model.reflect, interpolator.uses_chord),
             ):
-                cosine = normal @ light[0] / ONE
-                highlight = reflect(normal @ halfway[0] / ONE, exponent) * (cosine > 0)
+                cosine, highlight = normal @ light[0] / ONE, normal @ halfway[0] / ONE
+                if by_chord:
+                    highlight = 1 - np.square(normal - halfway[0] / ONE).sum(axis=-1) / 2
+                highlight = reflect(highlight, exponent) * (cosine > 0)
                 shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
             # The highlight is cut off where N.L changes its sign, and rounding decides where that is.
             kept = cosine > 1 / 16

@@ -16,7 +16,7 @@ RECORD = Record(
             BisectionInterpolator("one_minus_cosine"), 2, length_bits=9, product_interval=3
         ),
         "bisection, coarse": options(BisectionInterpolator(threshold=2.0**-8), highlights=False),
-        "bisection-published": options(PUBLISHED[0], as_published=True),
+        **{method.name: options(method, as_published=True) for method in PUBLISHED},
     },
     expect=expect,
     status=status,

@@ -72,13 +72,13 @@ def _measure(rng, count, method):
             span, pixel = pixels_of(length)
             t = pixel / np.maximum(length - 1, 1)[span]
             left, right, light, halfway = (normalise(v / ONE) for v in (left, right, light, halfway))
+            curve = method.exact_normals(left[span], right[span], t)
             exact, formula = (
                 np.stack([normals @ light[0], 1 - normals @ halfway[0]])
-                for normals in (
-                    interpolate("normalised", left[span], right[span], t),
-                    method.exact_normals(left[span], right[span], t),
-                )
+                for normals in (interpolate("normalised", left[span], right[span], t), curve)
             )
+            if method.uses_chord:
+                formula[1] = np.square(curve - halfway[0]).sum(axis=-1) / 2
             kept = ~operands.out_of_range[span]
             angle = degrees_between(left * ONE, right * ONE)[span[kept], 0]
             yield Sample(found[:, kept], exact[:, kept], formula[:, kept], angle)

@@ -23,9 +23,9 @@ def _variants():
     yield "quadratic, interval 1, of a chord", options(_OF_CHORD, 2, setup_interval=1, length_bits=9)
     yield "quadratic, interval 3, no highlights", options(_CURVE, setup_interval=3, highlights=False)
     yield "quadratic, interval 7, compact", options(_CURVE, setup_interval=7, product_interval=3)
-    for method in METHODS[1:]:
+    for method in (method for method in METHODS if method.form in figures):
         yield f"{method.name}, of a chord", options(replace(method, operand="one_minus_cosine"), 2)
-    yield "quadratic-published", options(PUBLISHED[0], as_published=True)
+    yield from ((method.name, options(method, as_published=True)) for method in PUBLISHED)
 
 
 RECORD = Record(

@@ -37,7 +37,7 @@ RECORD = Record(
         "recurrence": measured(_RECURRENCE),
         "recurrence, interval 1": options(_RECURRENCE, 2, setup_interval=1),
         "recurrence, interval 46, no highlights": options(_RECURRENCE, setup_interval=46, highlights=False),
-        "recurrence-direct": options(PUBLISHED[0], as_published=True),
+        **{method.name: options(method, as_published=True) for method in PUBLISHED},
     },
     expect=expect,
     status=status,

@@ -221,6 +221,17 @@ def test_command_tells_of_missing_entries(small, capsys):
     assert "gone is not measured any more (over 2%)" in capsys.readouterr().out
 
 
+def test_words_choose_entries(small, capsys):
+    figures, path = small
+    path.write_text(json.dumps({"two": {"cells": 5}, "gone": {"cells": 1}}))
+    assert main(["one", "--update"]) == 0
+    assert "1 entries, 1 differences" in capsys.readouterr().out
+    assert json.loads(path.read_text()) == {"one": figures["one"], "two": {"cells": 5}, "gone": {"cells": 1}}
+    assert main(["ne", "--jobs", "1"]) == 0
+    assert main(["nothing"]) == 2
+    assert "nothing: is in the name of no entry; " in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["", "{", "[1"])
 def test_command_refuses_a_broken_file(small, capsys, text):
     _, path = small

@@ -212,7 +212,7 @@ def test_ranges(method):
     """Where the docstrings say that spans are flagged, and every range is good or fair to its end."""
     found = measure_ranges(method)
     interpolator = METHODS[method]
-    if method == "linear":
+    if interpolator.CURVE == "linear":
         # A component of N_r - N_l over 1.
         assert found["none_flagged"] >= 60
         assert found["all_flagged"] > interpolator.MAX_ANGLE

@@ -10,7 +10,7 @@ from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import MAX_EXPONENT, Chords, Specular
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
-from blysk.golden.reference.reflection import REFLECTION_MODELS, coscos_scale
+from blysk.golden.reference.reflection import REFLECTION_MODELS, PolynomialModel, coscos_scale
 
 from ...lists import COSCOS_MODELS, FURTHER_MODELS, LINE_MODELS, SPECULAR_MODELS
 
@@ -441,6 +441,16 @@ def test_bad_arguments_are_refused():
         Specular(REFLECTION_MODELS["exp"], as_published=True)
     with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
         Specular(operand="sine")
+    # Each of these wrapped, or ended in an error without a name.
+    for options, message in (
+        ({"a": 1.5}, r"a must be from 0 to 0\.999998, not 1\.5"),
+        ({"a": 0.4, "b": -0.1}, r"b must be from 0 to 0\.999996, not -0\.1"),
+        ({"a": 0.75}, r"slope at exponent 1023 must be from 0 to 511\.999996, not 767\.25"),
+        ({"a": 0.25, "squarings": 4}, r"squarings must be 1, 2 or 3, not 4"),
+        ({"a": 0.25, "squarings": 0}, r"squarings must be 1, 2 or 3, not 0"),
+    ):
+        with pytest.raises(ValueError, match=rf"^own: {message}$"):
+            Specular(PolynomialModel("own", **options))
     with pytest.raises(ValueError, match=r"^operand must be SQ\(4, 34\), not SQ\(1, 17\)$"):
         Specular().compute(Fixed(SQ(1, 17), [0]), [False], 10)
     for exponent in (0, 1001, -1):
