@@ -121,9 +121,20 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
     if settings["setup_interval"] not in (None, *intervals):
         remedy = f"give {spelled(intervals)}" if intervals else "leave it out"
         raise settings.refuse("setup_interval", f"method {method} is not built for it", remedy)
+    _check_parameter(settings, made)
     if isinstance(made.specular, Lobe):
         made = replace(made, specular=replace(made.specular, banks=min(materials, Lobe.MAX_BANKS)))
     return replace(made, materials=materials)
+
+
+def _check_parameter(settings: Settings, design: Design) -> None:
+    """Refuse a caller's roughness or exponent that the reflection model does not take."""
+    parameter = design.specular.model.PARAMETER if design.specular else None
+    for name, used in (("roughness", parameter == "roughness"), ("exponent", parameter is not None)):
+        # A scene file's material may have both: it serves several models.
+        if name in settings.given and name not in settings.origins and not used:
+            remedy = f"leave it out, or give {parameter}" if parameter else "leave it out"
+            raise settings.refuse(name, f"the model {design.model} has none", remedy)
 
 
 def renderer_of(design: Design, option: str = "geometry", value: str = "hardware") -> Renderer:

@@ -117,10 +117,14 @@ def _figures(
     scene: Scene, design: Design, frame: SimulatedFrame | SimulatedTriangleFrame, triangles: int, visible: int
 ) -> dict[str, Any]:
     """Figures that every frame has."""
+    material, model = scene.materials[0], design.specular and design.specular.model
     return {
         "method": design.method,
         "model": design.model,
-        "exponent": scene.materials[0].exponent,
+        **{
+            name: material.parameter(model) if model and name == model.PARAMETER else None
+            for name in ("exponent", "roughness")
+        },
         "lights": design.lights,
         "materials": design.materials,
         "style": design.build.style,
@@ -156,7 +160,7 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         Figures of `frame_figures` or `triangle_figures`, all of one scene and pipeline. ``triangles`` of the
         result is the largest of the frames.
     """
-    same = ("method", "model", "exponent", "lights", "materials", "style", "gate", "engine")
+    same = ("method", "model", "exponent", "roughness", "lights", "materials", "style", "gate", "engine")
     same += ("width", "height")
     same += tuple(key for key in ("pipes", "geometry", "setups", "coarse") if key in frames[0])
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))

@@ -35,12 +35,21 @@ def _line(name: str, text: str) -> str:
     return f"{name:<12}{text}"
 
 
+def _model(figures: Mapping[str, Any]) -> str:
+    """Reflection model, with its exponent or roughness if it has one."""
+    parameters = ((name, figures[name]) for name in ("exponent", "roughness"))
+    return ", ".join([figures["model"], *(f"{name} {value:.4g}" for name, value in parameters if value)])
+
+
+def _triangles(figures: Mapping[str, Any]) -> str:
+    return f"{figures['triangles']:,} triangle{'s' * (figures['triangles'] != 1)}"
+
+
 def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     """Lines of a frame's figures: those of `frame_figures`, with the mesh's name and its own counts."""
     materials = f", materials {figures['materials']}" if figures["materials"] > 1 else ""
     yield _line("mesh", f"{figures['mesh']}, {figures['width']}x{figures['height']}")
-    model = f"{figures['model']}, exponent {figures['exponent']}, lights {figures['lights']}{materials}"
-    yield _line("model", model)
+    yield _line("model", f"{_model(figures)}, lights {figures['lights']}{materials}")
     yield _line("method", figures["method"])
     yield _line("engine", figures["engine"])
     if "geometry" in figures:
@@ -66,11 +75,11 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     """A frame's main figures in at most seven lines; `frame_lines` has all of them."""
     yield _line(
         "mesh",
-        f"{figures['mesh']}, {figures['triangles']:,} triangles, {figures['width']}x{figures['height']}",
+        f"{figures['mesh']}, {_triangles(figures)}, {figures['width']}x{figures['height']}",
     )
     lights = f"{figures['lights']} light{'s' * (figures['lights'] != 1)}"
     pipes = f", {figures['pipes']} pipelines" if figures.get("pipes", 1) > 1 else ""
-    model = f"{figures['method']}, {figures['model']}, exponent {figures['exponent']}, {lights}{pipes}"
+    model = f"{figures['method']}, {_model(figures)}, {lights}{pipes}"
     geometry = "geometry, " if "geometry" in figures else ""
     yield _line("hardware", f"{geometry}{model}; {figures['engine']}")
     rate = f", {figures['cycles_per_pixel']:.3f} a pixel" if figures["pixels"] else ""
@@ -92,8 +101,8 @@ def animation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     """Lines of an animation's figures: those of `animation_figures`, with the mesh's name and counts."""
     size = f"{figures['width']}x{figures['height']}"
     rate = figures["frame_count"] / figures["seconds"]["frames"]
-    yield _line("mesh", f"{figures['mesh']}, {size}, {figures['triangles']:,} triangles")
-    yield _line("model", f"{figures['model']}, exponent {figures['exponent']}, lights {figures['lights']}")
+    yield _line("mesh", f"{figures['mesh']}, {size}, {_triangles(figures)}")
+    yield _line("model", f"{_model(figures)}, lights {figures['lights']}")
     yield _line("method", figures["method"])
     yield _line("engine", f"{figures['engine']}, {figures['workers']}")
     yield _line("turntable", f"{figures['frame_count']:,} frames, {rate:.2f} a second")

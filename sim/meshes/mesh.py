@@ -160,7 +160,11 @@ def _fault(error: Exception) -> str:
         return damaged
     text = str(error).strip().split("\n")[0]
     text = re.sub(r"^(\w+\.)*\w*(Error|Exception)\b:? *", "", text)
-    what = damaged if isinstance(error, IndexError) else "cannot be read"
+    if isinstance(error, IndexError):
+        found = re.match(r"index (-?\d+) is out of bounds .* with size (\d+)", text)
+        where = f"entry {int(found[1]) + 1} of a list of {found[2]}" if found else text
+        return f"refers to what is not there ({where})" if text else damaged
+    what = "cannot be read"
     return f"{what} ({text})" if text else what
 
 

@@ -27,7 +27,7 @@ BAD_MESHES = {
     "empty.glb": (b"", "the file is empty"),
     "truncated.ply": (box("ply")[:-20], "cut short"),
     "truncated.glb": (box("glb")[:-20], "cut short"),
-    "index.obj": (CORNERS + b"f 1 2 4\n", "out of bounds"),
+    "index.obj": (CORNERS + b"f 1 2 4\n", "entry 4 of a list of 3"),
     "lines.obj": (CORNERS + b"l 1 2\n", "it has no faces"),
     "faceless.obj": (CORNERS, "it has no faces"),
     "nan.obj": (CORNERS + b"v nan 0 0\nf 1 2 4\n", "NaN or infinite"),
@@ -112,7 +112,8 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
         (["--point-light", "1,2,3,1,1,1,1,-1,0"], "--point-light 1,2,3,1,1,1,1,-1,0", "coefficients of 0 or"),
         (["--spot-light", "1,2,3,0,0,0,10,20"], "--spot-light 1,2,3,0,0,0,10,20", "spot must not be 0, 0, 0"),
         (["--spot-light", "1,2,3,0,1,0,20,10"], "--spot-light 1,2,3,0,1,0,20,10", "give an axis other than"),
-        (["--spot-light", "1,2,3,0,1,0,10,20"], "--method chord", "use chord-local"),
+        (["--spot-light", "1,2,3,0,1,0,10,20"], "--method chord", "use method chord-local"),
+        (["--roughness", "0.3"], "--roughness 0.3", "leave it out, or give exponent"),
     ],
 )
 def test_bad_option(refused, options, thing, says):

@@ -83,7 +83,7 @@ def test_relative_indices_count_from_their_face(tmp_path):
 def test_what_trimesh_makes_of_bad_obj_files(tmp_path):
     """The facts behind two refusals: an `IndexError`, and points in place of lines."""
     path = tmp_path / "a.obj"
-    check_refused(path, "out of bounds", content=CORNERS + "f 1 2 4\n")
+    check_refused(path, "entry 4 of a list of 3", content=CORNERS + "f 1 2 4\n")
     with pytest.raises(IndexError):
         trimesh.load_scene(str(path))
     check_refused(path, "it has no faces", content="v 0 0 0\nv 1 0 0\nl 1 2\n")
