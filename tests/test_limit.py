@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from .conftest import Limit
+
 pytest_plugins = "pytester"
 
 LATE = """
@@ -56,3 +58,14 @@ def test_the_order_of_files_is_that_of_the_day(run, workers):
         orders.append([line.split("::")[0][-9:] for line in result.outlines if "PASSED" in line])
     if not workers:
         assert orders[0] == orders[2] != orders[1]
+
+
+def test_some_files_come_first_on_every_day(run, pytester):
+    for file in Limit.EVERY_DAY:
+        assert (Path(__file__).parents[1] / file).exists()
+    pytester.mkdir("tests")
+    Path("tests/test_supply.py").write_text("def test_one(): pass")
+    others = {f"test_{k}": "def test_one(): pass" for k in range(4)}
+    for day in ("2026-01-01", "2026-01-02", "2026-01-03"):
+        lines = run("--minutes", "60", day=day, **others).outlines
+        assert next(line for line in lines if "PASSED" in line).startswith("tests/test_supply.py::")
