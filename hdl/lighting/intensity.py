@@ -136,7 +136,7 @@ class CompactIntensityUnit(wiring.Component):
     diffuse and specular terms that are not 0 (`Intensity.cycles`): with one light 3 cycles without and 6 with
     a highlight, 3 in the dark. The next pixel is taken c cycles after it, and the pixel leaves after
     ``c + 5`` (input, operands, product, sum, rounding, saturation), cycles of stall not counted. With one
-    light the unit has 231 register bits, against 652 of `IntensityUnit`; with 16 lights 809, against 9008.
+    light the unit has 233 register bits, against 652 of `IntensityUnit`; with 16 lights 811, against 9008.
 
     Parameters
     ----------
