@@ -240,11 +240,11 @@ class GeometryUnit(wiring.Component):
         walks, planes = self._set_up(m)
         connect(m, walks, self._walk.i)
         connect(m, self._walk.o, self._clip.i)
-        self._walk_planes(m, planes)
+        rows = self._walk_planes(m, planes)
         connect(m, self._attributes.o, self._normals.i)
         connect(m, self._normals.o, wiring.flipped(self.o))
         self._count(m)
-        self._watch(m)
+        self._watch(m, rows)
         return m
 
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
@@ -276,8 +276,11 @@ class GeometryUnit(wiring.Component):
             merged.append(joined)
         return tuple(merged)
 
-    def _walk_planes(self, m: Module, planes: stream.Interface) -> None:
-        """Scanlines and planes to the span attributes: a triangle's first scanline waits for its planes."""
+    def _walk_planes(self, m: Module, planes: stream.Interface) -> stream.Interface:
+        """Scanlines and planes to the span attributes: a triangle's first scanline waits for its planes.
+
+        Returns the scanlines as the attributes take them.
+        """
         rows, to = self._clip.o, self._attributes.i
         first, ends = Signal(name="first", init=1), 1
         if self.compact:
@@ -301,10 +304,11 @@ class GeometryUnit(wiring.Component):
             rows.ready.eq(to.ready & (planes.valid | ~first) & ends),
             planes.ready.eq(to.ready & rows.valid & first),
         ]
+        return rows
 
-    def _watch(self, m: Module) -> None:
+    def _watch(self, m: Module, rows: stream.Interface) -> None:
         """Whether anything is inside: triangles up to their last scanline, and pieces of their spans."""
-        rows, sort = self._clip.o, self._sort
+        sort = self._sort
         dropped = sum(sort.status[name] for name in ("empty", "zero_area", "culled"))[:_INSIDE_BITS]
         taken, walked = (Signal(_INSIDE_BITS, name=name) for name in ("taken", "walked"))
         with m.If(self.i.valid & self.i.ready):

@@ -31,7 +31,7 @@ def test_terms_at_the_terminator():
     ],
 )
 def test_dark_beats_bypass_the_specular_unit(name):
-    """A run of dark beats takes two cycles each, or the interval if that is one; after it a lit beat waits for the unit's slot."""
+    """Dark beats take two cycles each, or an interval of one; after them a lit beat waits for its slot."""
     unit = RECORD.variants[name].unit()
     run = next(RECORD.runs(unit, "operands"))
     case, interval = run.case, unit.initiation_interval

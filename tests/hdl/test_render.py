@@ -1,0 +1,82 @@
+"""Geometry and renderer say that they are empty only when they are: who draws in bands relies on it."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from amaranth.hdl import Signal, unsigned
+from amaranth.lib import data
+from amaranth.lib.wiring import Out
+
+from blysk.bench.quality.mutation import Wrapped
+from blysk.golden.presets import preset
+from blysk.golden.render import Renderer
+from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.hdl.render import RenderUnit
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.record import length_of
+from blysk.sim.units.registry import RECORDS
+
+from ..checks import assert_beats_equal
+
+DESIGN = preset("chord", "cosquad", x_bits=5, y_bits=5)
+UNITS = {
+    "geometry": ("geometry", GeometryUnit),
+    "geometry, two lanes": ("geometry", partial(GeometryUnit, setups=2)),
+    "geometry, compact": ("geometry", partial(GeometryUnit, compact=True)),
+    "render": ("render", partial(RenderUnit, Renderer(DESIGN), (32, 24))),
+    "render, compact": ("render", partial(RenderUnit, Renderer(DESIGN), (32, 24), compact=True)),
+}
+
+
+class OneByOne(Wrapped):
+    """A unit that gets a triangle only while it says that it is empty.
+
+    ``status.wrong`` counts the cycles on which a beat waits at the output of an empty unit, or on which it is
+    no longer empty without having taken a triangle.
+    """
+
+    def __init__(self, unit):
+        super().__init__(unit, status=Out(data.StructLayout({"taken": unsigned(32), "wrong": unsigned(32)})))
+
+    def elaborate(self, platform):
+        m = super().elaborate(platform)
+        m.submodules.unit = unit = self.unit
+        was_empty, took, goes = Signal(), Signal(), Signal()
+        takes = unit.i.valid & unit.i.ready
+        # Four cycles in which a triangle that is still inside shows.
+        rests = Signal(4)
+        m.d.sync += [was_empty.eq(unit.idle), took.eq(takes), rests.eq((rests << 1) | unit.idle)]
+        m.d.comb += [
+            goes.eq(unit.idle & rests.all() & ~took),
+            unit.i.valid.eq(self.i.valid & goes),
+            self.i.ready.eq(unit.i.ready & goes),
+        ]
+        wrong = unit.idle & unit.o.valid | was_empty & ~unit.idle & ~took
+        m.d.sync += [
+            self.status.wrong.eq(self.status.wrong + wrong),
+            self.status.taken.eq(self.status.taken + takes),
+        ]
+        return m
+
+
+@pytest.mark.parametrize("stalled", [0.0, 0.6])
+@pytest.mark.parametrize("name", UNITS)
+def test_empty_is_empty(name, stalled):
+    record, make = RECORDS[UNITS[name][0]], UNITS[name][1]
+    unit, rng = make(), np.random.default_rng(2026)
+    case = next(iter(record.stimuli.values())).make(unit, rng, 100)
+    expected = record.expect(unit, case)
+    found = simulate(
+        OneByOne(unit),
+        case.beats,
+        count=length_of(expected),
+        constants=case.constants,
+        write=case.write,
+        output_stalls=rng.random(1009) < stalled,
+        idle_timeout=50_000,
+        engine="auto",
+    )
+    assert_beats_equal(found.beats, expected)
+    assert found.status["taken"] == 100
+    assert found.status["wrong"] == 0
