@@ -130,7 +130,7 @@ def test_no_word_of_a_half_chord_wraps(wraps):
 )
 def test_slopes_of_the_specular_unit_do_not_wrap(wraps, model):
     """Every exponent; other models read a table."""
-    of_specular_slopes(model)
+    of_specular_slopes(Specular(REFLECTION_MODELS[model]))
     assert wraps == [Specular.SLOPE_FORMAT]
 
 
@@ -280,7 +280,7 @@ SHORTER_FORMATS = {
     # It stays between the ends of the segment, so that of its two integer bits one is to spare.
     "sum of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "ACCUMULATOR_FORMAT", SQ(0, 32)),
     "step of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "STEP_FORMAT", SQ(0, 32)),
-    "slope": (partial(of_specular_slopes, "cosquad"), Specular, "SLOPE_FORMAT", UQ(8, 18)),
+    "slope": (partial(of_specular_slopes, Specular()), Specular, "SLOPE_FORMAT", UQ(8, 18)),
 }
 
 

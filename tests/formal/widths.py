@@ -10,7 +10,6 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
-from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
@@ -28,7 +27,6 @@ from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.reciprocal import reciprocal_address
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 from .bounds import Bounds, unknown, word
 
@@ -210,8 +208,8 @@ def of_half_chord():
             HalfChord().compute(Fixed(UQ(2, 34), chord), np.zeros(chord.shape, bool))
 
 
-def of_specular_slopes(model):
-    assert len(Specular(REFLECTION_MODELS[model]).slopes.codes) == 1 << Specular.EXPONENT_BITS
+def of_specular_slopes(parameters):
+    assert len(parameters.slopes.codes) == 1 << parameters.EXPONENT_BITS
 
 
 def sectors(degrees, one, like):
