@@ -6,7 +6,9 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from importlib import resources
+from operator import xor
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +96,8 @@ class _Observed(Wrapped):
     """A unit with an input that selects a mutant, and outputs that are 0 while their value does not matter.
 
     ``ready`` and payload matter only while ``valid`` is high. ``status`` has a counter of 32 bits for each of
-    `flags_of` the unit: the cycles in which the flag is high, as in a pipeline.
+    `flags_of` the unit: the cycles in which the flag is high, as in a pipeline. For each further output it
+    has a checksum of 32 bits over the cycles, of an output with a member ``valid`` over those with it high.
 
     Parameters
     ----------
@@ -106,9 +109,9 @@ class _Observed(Wrapped):
 
     def __init__(self, unit: Component, width: int):
         members = {"mutant": In(width)}
-        self.flags = flags_of(unit)
-        if self.flags:
-            members["status"] = Out(32 * len(self.flags))
+        self.flags, self.others = flags_of(unit), _others_of(unit)
+        if self.flags or self.others:
+            members["status"] = Out(32 * len(self.flags + self.others))
         super().__init__(unit, **members)
 
     def elaborate(self, platform):
@@ -118,6 +121,13 @@ class _Observed(Wrapped):
         for index, name in enumerate(self.flags):
             count = self.status.word_select(index, 32)
             m.d.sync += count.eq(count + getattr(self.unit, name))
+        for index, name in enumerate(self.others, len(self.flags)):
+            output, seen = getattr(self.unit, name), self.status.word_select(index, 32)
+            word = Value.cast(output)
+            if "valid" in getattr(output.shape(), "members", {}):
+                word = Mux(output.valid, word, 0)
+            parts = [word[start : start + 32] for start in range(0, len(word), 32)]
+            m.d.sync += seen.eq(reduce(xor, parts, seen.rotate_left(1)))
         payload = Value.cast(self.o.payload)
         m.d.comb += payload.eq(Mux(self.o.valid, Value.cast(self.unit.o.payload).as_unsigned(), 0))
         for name in ("i", "write"):
@@ -133,6 +143,14 @@ def flags_of(unit: Component) -> list[str]:
     if "status" in unit.signature.members:
         return []
     return [name for name in ("out_of_range", "wide") if name in unit.signature.members]
+
+
+def _others_of(unit: Component) -> list[str]:
+    """Names of a unit's outputs that are no stream and no flag; none if it has a ``status``."""
+    members, known = unit.signature.members, {"o", *flags_of(unit)}
+    if "status" in members:
+        return []
+    return [name for name, member in members.items() if member.flow is Out and name not in known]
 
 
 # The reset is undriven and set to 0, so that its logic is removed. `setattr` removes initial values of wires,
@@ -274,8 +292,8 @@ class Mutants(cxxrtl.Model):
 
     def __init__(self, unit: Component, folder: Path):
         self.ports = Ports(unit)
-        if flags := flags_of(unit):
-            self.ports.status = unsigned(32 * len(flags))
+        if counted := flags_of(unit) + _others_of(unit):
+            self.ports.status = unsigned(32 * len(counted))
         source = resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
         driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
         compiler = next(find_compilers(), None)

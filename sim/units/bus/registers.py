@@ -112,5 +112,4 @@ RECORD = Record(
         "decoding": Stimulus(_decoding, stalled=False),
     },
     axis="",
-    waivers={"load": "No stream: the test of the unit and those of the buses watch it."},
 )
