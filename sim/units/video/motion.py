@@ -56,6 +56,6 @@ RECORD = Record(
     source="docs/theory/video.md#vertices",
     variants={"two slots": Variant(partial(MotionUnit, _motion()), _measure, "all angles")},
     expect=_expect,
-    stimuli={"angles": Stimulus(_angles, 40)},
+    stimuli={"angles": Stimulus(_angles, 400)},
     axis="angle, turns",
 )

@@ -84,9 +84,9 @@ RECORD = Record(
     },
     expect=_expect,
     stimuli={
-        "inside": Stimulus(_inside, 200),
-        "around": Stimulus(_around, 100, repeats=3),
-        "any": Stimulus(_any, 100, repeats=3),
+        "inside": Stimulus(_inside, 2000),
+        "around": Stimulus(_around, 1000, repeats=3),
+        "any": Stimulus(_any, 1000, repeats=3),
     },
     axis="W, near planes",
     still={
