@@ -1,12 +1,16 @@
-// Behind `sim/engines/cxxrtl_driver.cc`: which mutant the next models are.
+// Behind `sim/engines/cxxrtl_driver.cc`: which mutant the next models are, and at which number their counters begin.
+// In front of it, BLYSK_COUNTERS has BLYSK_COUNTER(register) for each of these.
 
 extern "C" {
 
-uint64_t blysk_mutant = 0;
+uint64_t blysk_mutant = 0, blysk_start = 0;
 
 void *blysk_open_mutant() {
 	Simulation *simulation = static_cast<Simulation *>(blysk_open());
 	simulation->model.p_mutant.data[0] = blysk_mutant;
+#define BLYSK_COUNTER(name) \
+	simulation->model.name.curr.data[0] = simulation->model.name.next.data[0] = blysk_start & simulation->model.name.curr.top;
+	BLYSK_COUNTERS
 	return simulation;
 }
 

@@ -4,9 +4,10 @@
 stuck, inverted, or inverted by a neighbour: Yosys' pass ``mutate``), and gives each the runs of the unit's
 record, which `tests/test_units.py` compares with the bit-accurate model. A mutant is killed if an output
 beat, its cycle or another output differs from the unit's; in a run without stalls the cycles of the inputs
-count, too. A mutant that is not killed is equivalent if Yosys and ABC (package pyosys) prove that no stimulus
-distinguishes it from the unit; equivalent ones do not count. The *score* is the share of the others that is
-killed. Clocks are not mutated, and reset stays low: other tests and proofs check them.
+count, too. Counters of events also begin at high numbers. A mutant that is not killed is equivalent if Yosys
+and ABC (package pyosys) prove that no stimulus distinguishes it from the unit; equivalent ones do not count.
+The *score* is the share of the others that is killed. Clocks are not mutated, and reset
+stays low: other tests and proofs check them.
 
 All mutants of a unit are one compiled model, with an input that chooses one. Survivors at signals that the
 record does not waive are listed: stimuli for them are missing, or a proof, or a waiver. Each change of a unit

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from importlib import resources
+from itertools import product
 from operator import xor
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from amaranth.lib.wiring import Component, In, Member, Out
 
 from blysk.bench.quality.equivalence import yosys
 from blysk.bench.tools.tool_runner import ToolError
+from blysk.hdl.geometry.triangles import COUNTER_BITS
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace
@@ -175,6 +177,9 @@ opt_clean
 write_rtlil flat.il
 write_json flat.json"""
 
+# Registers of counters of events: those of `count_events`, and of the status of a pipeline; not its flag.
+_COUNTER = re.compile(r"wire<(?:16|32)> (p_\w*_(?:count__\w+|status_5b_\w+));")
+
 _LIST = "mutate -list {count} -seed {seed} -o list{round}.txt c:*unit.*"
 
 # Nets whose bits have several drivers are split: CXXRTL would evaluate a word whose bits depend on each other
@@ -294,23 +299,36 @@ class Mutants(cxxrtl.Model):
         self.ports = Ports(unit)
         if counted := flags_of(unit) + _others_of(unit):
             self.ports.status = unsigned(32 * len(counted))
-        source = resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
+        netlist = (folder / "mutated.il").read_text()
+        self.counters = _COUNTER.findall(cxxrtl._generate(netlist))
+        counters = " ".join(f"BLYSK_COUNTER({name})" for name in self.counters)
+        source = f"#define BLYSK_COUNTERS {counters}\n"
+        source += resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
         driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
         compiler = next(find_compilers(), None)
         if compiler is None:
             raise CompilerMissing("no C++ compiler")
         # -O1, as compiling takes longer than running.
         compiler = replace(compiler, compile=(*compiler.compile, "-O1"))
-        failure = cxxrtl._build((folder / "mutated.il").read_text(), driver, compiler, "mutants", folder)
+        failure = cxxrtl._build(netlist, driver, compiler, "mutants", folder)
         if failure:
             raise ToolError(failure)
         self._library = library = cxxrtl._load(folder / "model", "mutants")
         library.blysk_open_mutant.restype = ctypes.c_void_p
         library.blysk_open = library.blysk_open_mutant
 
-    def choose(self, mutant: int) -> None:
-        """Select the mutant for the runs that follow; 0 for the unit."""
+    def choose(self, mutant: int, start: int = 0) -> None:
+        """Select the mutant for the runs that follow, and at which number its counters begin.
+
+        Parameters
+        ----------
+        mutant : int
+            Number of the mutant; 0 for the unit.
+        start : int
+            Number at which the counters of events begin; of a narrower counter its low bits.
+        """
         ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
+        ctypes.c_uint64.in_dll(self._library, "blysk_start").value = start
 
     def trace(self, stimulus: Stimulus) -> Trace:
         """Trace of a run of the stimulus, which ends at its limit of cycles at the latest."""
@@ -318,19 +336,36 @@ class Mutants(cxxrtl.Model):
 
 
 def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: Iterable[int]) -> set[int]:
-    """Numbers of the mutants whose trace differs from the unit's for one of the vectors."""
+    """Numbers of the mutants whose trace differs from the unit's for one of the vectors.
+
+    A counter of events has more bits than a run has events. Of each word of the status the shortest run that
+    changes it is therefore made again, with counters that begin at each power of 2 less 1, as after so many
+    events: the next event changes one more bit.
+    """
     alive = set(mutants)
-    for stimulus, trace in vectors:
+
+    def run(start: int, stimulus: Stimulus, trace: Trace) -> None:
+        limited = replace(stimulus, limit=trace.clock)
+        model.choose(0, start)
+        expected = _seen(limited, model.trace(limited))
+        for mutant in sorted(alive):
+            model.choose(mutant, start)
+            if not all(map(np.array_equal, _seen(limited, model.trace(limited)), expected)):
+                alive.remove(mutant)
+
+    counting = {}
+    for number, (stimulus, trace) in enumerate(vectors):
         model.choose(0)
         found = model.trace(stimulus)
         if difference := found.differs(trace if trace.status.size else replace(trace, status=found.status)):
             raise ToolError(f"the unit among its mutants is not the unit: {difference} differs")
-        limited = replace(stimulus, limit=trace.clock)
-        expected = _seen(limited, model.trace(limited))
-        for mutant in sorted(alive):
-            model.choose(mutant)
-            if not all(map(np.array_equal, _seen(limited, model.trace(limited)), expected)):
-                alive.remove(mutant)
+        for word in np.flatnonzero(found.status):
+            if word not in counting or trace.clock < vectors[counting[word]][1].clock:
+                counting[word] = number
+        run(0, stimulus, trace)
+    if model.counters:
+        for bits, number in product(range(1, COUNTER_BITS + 1), sorted(set(counting.values()))):
+            run((1 << bits) - 1, *vectors[number])
     return set(mutants) - alive
 
 

@@ -94,7 +94,7 @@ Keys of a scene file, all but mesh.file optional:
     "-o",
     "--output",
     type=OutputFile(),
-    help="Picture of the simulated frame.  [default: MESH's name, -blysk.png]",
+    help="Picture of the simulated frame.  [default: MESH's name, -blysk.png; none with --compare]",
 )
 @click.option("--compare", "comparison", type=OutputFile(), help="Picture: simulated, golden, error map.")
 @click.option("--json", "figures", type=OutputFile(), help="Every printed figure.")

@@ -124,6 +124,7 @@ RECORD = Record(
     stimuli={
         "frames": Stimulus(_frames, 200),
         "short": Stimulus(_short, 60),
+        "other colours": Stimulus(_short, 40),
         "misfits": Stimulus(_misfits, 100),
     },
     axis="",

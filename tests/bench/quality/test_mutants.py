@@ -82,6 +82,20 @@ def test_a_register_that_starts_at_1_and_stays_may_be_left_out(tmp_path):
 
 
 @pytest.mark.long
+def test_faults_of_high_bits_of_counters_are_killed(tmp_path):
+    """Bits that no run reaches from 0: it has fewer than 2^9 events."""
+    record = RECORDS["triangle_assembly"]
+    unit = record.variants[record.default].unit()
+    known = mutate(unit, 200, 7, tmp_path)
+    high = {k for k, name in known.items() if re.match(r"const0 \$add A\[(9|[1-3]\d)\] -> status", name)}
+    model, vectors = Mutants(unit, tmp_path), vectors_of(record)
+    assert len(high) >= 4
+    assert killed(model, vectors, high) == high
+    model.counters = []
+    assert not killed(model, vectors, high)
+
+
+@pytest.mark.long
 def test_mutants_are_killed():
     """Of a small unit; ``make mutants`` takes all."""
     with local_executor(1) as executor:
