@@ -469,9 +469,9 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
     if figures:
         write_json(figures, {"seed": seed, "verilator": baseline, "rows": rows})
     columns = [name for name in rows[0] if name != "design"]
-    click.echo(f"{'unit' if unit else 'pipeline':<34}" + "".join(f"{_spaced(name):>15}" for name in columns))
+    click.echo(f"{'unit' if unit else 'pipeline':<34}" + "".join(f"{_spaced(name):>17}" for name in columns))
     for row in rows[: 1 if unit else None]:
-        click.echo(f"{row['design']:<34}" + "".join(f"{row[name]:>15,}" for name in columns))
+        click.echo(f"{row['design']:<34}" + "".join(f"{row[name]:>17,}" for name in columns))
     other = (
         f", Verilator {baseline} too"
         if baseline

@@ -53,6 +53,10 @@ DESIGNS += [
 """The default design, and one of every method."""
 
 
+PROVED = ("angular", "recurrence")
+"""Methods whose netlists are too large for Icarus: it reads one for minutes."""
+
+
 @pytest.fixture(scope="module")
 def mapped(tmp_path_factory):
     """A unit's netlist before the step, made once."""
@@ -170,15 +174,19 @@ def test_faults_injected_in_a_memory_are_found(check, inject):
 def test_a_frame_of_a_pipeline(design, tmp_path):
     """Pixel by pixel under stalls; and the netlist before the step does the same, by proof."""
     unit = ShadingPipelineUnit(design)
-    # Icarus simulates some ten cycles a second of such a netlist; the proof below is of every cycle.
-    smaller = {} if design is DESIGNS[0] else {"size": (16, 12), "triangles": 64}
-    spans, constants, pixels = teapot_frame(design, **smaller)
     before = map_component(unit, tmp_path)
     netlist, absorbed = absorb_registers(before)
     assert absorbed.closed
     assert absorbed.words
     assert absorbed.removed
     assert same(before, netlist, tmp_path) == ""
+    if design.method in PROVED:
+        return
+    spans, constants, pixels = teapot_frame(design)
+    if design is not DESIGNS[0]:
+        # Icarus simulates some ten cycles a second of such a netlist; the proof is of every cycle.
+        spans = spans[:: len(spans) // 20]
+        pixels = design.compute(spans, constants)
     rng = np.random.default_rng(2026)
     found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path))).run(
         "icarus",

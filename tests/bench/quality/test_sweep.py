@@ -194,7 +194,7 @@ def test_bad_mesh_is_one_line(capsys):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("mesh", ["teapot", STRESS])
+@pytest.mark.parametrize("mesh", ["teapot", STRESS], ids=["teapot", "stress"])
 def test_chord_method_is_within_an_lsb(mesh, capsys):
     """Part of what the command sweeps by itself: every model, and an exponent in thirteen."""
     exponents = map(str, sorted({*FEW_EXPONENTS[::3], *range(1, 1001, 13)}))
