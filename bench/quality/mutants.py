@@ -7,7 +7,8 @@ beat, its cycle or another output differs from the unit's; in a run without stal
 count, too. Counters of events also begin at high numbers. A mutant that is not killed is equivalent if Yosys
 and ABC (package pyosys) prove that no stimulus distinguishes it from the unit; equivalent ones do not count.
 The *score* is the share of the others that is killed. Clocks are not mutated, and reset
-stays low: other tests and proofs check them.
+stays low: other tests and proofs check them. The faults are in the unit's own cells: parts that have a record
+are mutated for that record.
 
 All mutants of a unit are one compiled model, with an input that chooses one. Survivors at signals that the
 record does not waive are listed: stimuli for them are missing, or a proof, or a waiver. Each change of a unit

@@ -4,8 +4,9 @@ import ctypes
 import json
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import reduce
 from importlib import resources
 from itertools import product
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from amaranth.back import rtlil
-from amaranth.hdl import Module, Mux, Value, unsigned
+from amaranth.hdl import Fragment, Module, Mux, Value, unsigned
 from amaranth.lib.wiring import Component, In, Member, Out
 
 from blysk.bench.quality.equivalence import yosys
@@ -26,8 +27,28 @@ from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace
 from blysk.sim.engines.simulate import stimulus_of
 from blysk.sim.units.record import Record
+from blysk.sim.units.registry import RECORDS
 
-__all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "vectors_of"]
+__all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "units_inside", "vectors_of"]
+
+_KINDS = {record.kind for record in RECORDS.values()}
+
+
+def units_inside(fragment: Fragment, path: str = "") -> Iterator[str]:
+    """Paths of the parts of a unit that have a record of their own, but for parts of these.
+
+    Parameters
+    ----------
+    fragment : Fragment
+        The elaborated unit.
+    path : str
+        Its own path, with a dot at the end.
+    """
+    for inner, name, *_ in fragment.subfragments:
+        if any(type(origin) in _KINDS for origin in inner.origins or ()):
+            yield f"{path}{name}"
+        else:
+            yield from units_inside(inner, f"{path}{name}.")
 
 
 def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
@@ -180,7 +201,9 @@ write_json flat.json"""
 # Registers of counters of events: those of `count_events`, and of the status of a pipeline; not its flag.
 _COUNTER = re.compile(r"wire<(?:16|32)> (p_\w*_(?:count__\w+|status_5b_\w+));")
 
-_LIST = "mutate -list {count} -seed {seed} -o list{round}.txt c:*unit.*"
+_LIST = """\
+select -set own -read own.txt
+mutate -list {count} -seed {seed} -o list{round}.txt @own"""
 
 # Nets whose bits have several drivers are split: CXXRTL would evaluate a word whose bits depend on each other
 # several times.
@@ -205,7 +228,14 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     yosys(_FLATTEN, folder)
     top = json.loads((folder / "flat.json").read_text())["modules"]["top"]
     behind = _registers_behind(top)
-    listed = _listed(count, seed, _most_listed(top), folder)
+    inside = [f"*unit.?{path.replace('.', '.?')}.*" for path in units_inside(Fragment.get(unit, None))]
+    own = [
+        name
+        for name in top["cells"]
+        if "unit." in name and not any(fnmatchcase(name, pattern) for pattern in inside)
+    ]
+    (folder / "own.txt").write_text("".join(f"top/{name}\n" for name in own))
+    listed = _listed(count, seed, _most_listed(top, own), folder) if own else []
     kept, known = [], {}
     for number, text in enumerate(listed, 1):
         mutant = _described(text, top["cells"], behind)
@@ -229,13 +259,13 @@ def _listed(count: int, seed: int, most: int, folder: Path) -> list[str]:
     return list(dict.fromkeys(found))[:count]
 
 
-def _most_listed(module: Mapping[str, Any]) -> int:
+def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
     """Number of mutants that Yosys can list at once: two of each cell, or of each bit with a name.
 
     It takes about two of each cell, named wire and bit of one, and never ends if asked for more; a bit counts
     where it is driven or has only one reader.
     """
-    chosen = {name: cell for name, cell in module["cells"].items() if "unit." in name}
+    chosen = {name: module["cells"][name] for name in own}
     nets = module["netnames"].values()
     named = {bit for net in nets if not net["hide_name"] for bit in net["bits"] if isinstance(bit, int)}
     readers: Counter = Counter()

@@ -13,21 +13,10 @@ from amaranth.hdl import Fragment, Signal
 from amaranth.lib import data
 from amaranth.lib.wiring import Out
 
-from blysk.bench.quality.mutation import Wrapped, vectors_of
+from blysk.bench.quality.mutation import Wrapped, units_inside, vectors_of
 from blysk.sim.engines.cxxrtl import Model
 from blysk.sim.engines.toggles import _registers, _words
 from blysk.sim.units.registry import RECORDS
-
-KINDS = {record.kind for record in RECORDS.values()}
-
-
-def units_inside(fragment, path=""):
-    """Paths of the parts that have a record."""
-    for inner, name, *_ in fragment.subfragments:
-        if any(type(origin) in KINDS for origin in inner.origins or ()):
-            yield f"{path}{name}"
-        else:
-            yield from units_inside(inner, f"{path}{name}.")
 
 
 class Edges(Wrapped):
