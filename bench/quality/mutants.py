@@ -6,14 +6,15 @@ record, which `tests/test_units.py` compares with the bit-accurate model. A muta
 beat, its cycle or another output differs from the unit's; in a run without stalls the cycles of the inputs
 count, too. Counters of events also begin at high numbers. A mutant that is not killed is equivalent if Yosys
 and ABC (package pyosys) prove that no stimulus distinguishes it from the unit; equivalent ones do not count.
-The *score* is the share of the others that is killed. Clocks are not mutated, and reset
-stays low: other tests and proofs check them. The faults are in the unit's own cells: parts that have a record
-are mutated for that record.
+Survivors at signals that the record waives, with the reason or the other test that finds them, do not count
+either. The *score* is the share of the others that is killed. Clocks are not mutated, and reset stays low:
+other tests and proofs check them. The faults are in the unit's own cells: parts that have a record are
+mutated for that record.
 
-All mutants of a unit are one compiled model, with an input that chooses one. Survivors at signals that the
-record does not waive are listed: stimuli for them are missing, or a proof, or a waiver. Each change of a unit
-has Yosys choose other faults; therefore they do not change the exit status, which is 1 if a unit's score is
-less than `LEAST`, 2 for bad input.
+All mutants of a unit are one compiled model, with an input that chooses one. Survivors that count are listed:
+stimuli for them are missing, or a proof, or a waiver. Each change of a unit has Yosys choose other faults;
+therefore they do not change the exit status, which is 1 if a unit's score is less than `LEAST`, 2 for bad
+input.
 """
 
 import re
@@ -100,14 +101,19 @@ class Score:
         return self.mutants - len(self.equivalent) - len(self.survived)
 
     @property
-    def score(self) -> float:
-        """Share of killed mutants among those that are not equivalent; 1 if there are none."""
-        return self.killed / max(1, self.mutants - len(self.equivalent)) if self.survived else 1.0
-
-    @property
     def open(self) -> tuple[str, ...]:
         """Survivors that the record does not waive."""
         return tuple(mutant for mutant in self.survived if not waived(self.unit, mutant))
+
+    @property
+    def waived(self) -> int:
+        """Number of survivors that the record waives."""
+        return len(self.survived) - len(self.open)
+
+    @property
+    def score(self) -> float:
+        """Share of killed mutants among those neither equivalent nor waived; 1 if there are none."""
+        return self.killed / (self.killed + len(self.open)) if self.open else 1.0
 
 
 def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
@@ -183,12 +189,12 @@ def scores(
 def table(rows: Sequence[Score]) -> str:
     """Table in Markdown."""
     lines = [
-        "| unit | mutants | equivalent | killed | survived | score |",
-        "|---|---:|---:|---:|---:|---:|",
+        "| unit | mutants | equivalent | killed | waived | survived | score |",
+        "|---|---:|---:|---:|---:|---:|---:|",
     ]
     lines += [
-        f"| {row.unit} | {row.mutants} | {len(row.equivalent)} | {row.killed} | {len(row.survived)} "
-        f"| {row.score:.1%} |"
+        f"| {row.unit} | {row.mutants} | {len(row.equivalent)} | {row.killed} | {row.waived} "
+        f"| {len(row.open)} | {row.score:.1%} |"
         for row in rows
     ]
     return "\n".join(lines)
@@ -218,7 +224,10 @@ def _command(units, count, seed, jobs, figures) -> int:
     ):
         rows = scores(names, count, seed, executor, bar.update)
     if figures:
-        write_json(figures, [asdict(row) | {"killed": row.killed, "score": row.score} for row in rows])
+        write_json(
+            figures,
+            [asdict(row) | {"killed": row.killed, "waived": row.waived, "score": row.score} for row in rows],
+        )
     click.echo(table(rows))
     for row in rows:
         for mutant in row.open:

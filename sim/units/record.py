@@ -274,7 +274,7 @@ class Record:
     logarithmic : bool
         That axis is logarithmic.
     waivers : dict
-        Signals of the default variant, reason by name: a fault there may survive.
+        Signals of the default variant; by name why a fault there may survive, or which test finds it.
     still : dict
         Register bits of the default variant that cannot toggle: signals with their bits by reason.
     remembers : bool

@@ -108,7 +108,6 @@ RECORD = Record(
         "nearer": Stimulus(_nearer, 2001),
     },
     axis="",
-    waivers={"status": "A counter of 32 bits counts more events than a run has."},
     still={
         "the depth of a pixel is found a stage later": "pixel_0[31-54]",
         "a counter counts more events than a run has": "count_{pixels,hidden}[10-31]",

@@ -139,7 +139,6 @@ RECORD = Record(
         "any": Stimulus(_any, 100),
     },
     axis="",
-    waivers={"status": "A counter of 32 bits counts more events than a run has."},
     still={
         "a counter counts more events than a run has": "count_empty[8-31] count_cut[9-31]",
         "of attributes side by side each is the last": "found[456]",

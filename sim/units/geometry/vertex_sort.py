@@ -93,7 +93,6 @@ RECORD = Record(
         "borders": Stimulus(_borders, 300, repeats=8, stalled=False),
     },
     axis="",
-    waivers={"status": "A counter of 32 bits counts more events than a run has."},
     still={
         "the first digit looks back to nothing": "rest_{0,1}[0]",
         "a counter counts more events than a run has": "count_empty[8-31] "

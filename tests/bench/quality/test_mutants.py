@@ -13,9 +13,9 @@ from blysk.sim.frames.workers import local_executor
 from blysk.sim.units.registry import RECORDS
 
 ROWS = [
-    Score("one", 10, ("a", "b"), ("c", "d")),
-    Score("two", 5, ("a",), ()),
-    Score("three", 3, ("a", "b", "c"), ()),
+    Score("diffuse", 10, ("a", "b"), ("c", "d")),
+    Score("factor", 5, ("a",), ()),
+    Score("serialiser", 3, ("a", "b", "c"), ()),
 ]
 
 
@@ -23,9 +23,9 @@ def test_score_leaves_the_equivalent_out():
     assert [row.killed for row in ROWS] == [6, 4, 0]
     assert [row.score for row in ROWS] == [6 / 8, 1, 1]
     assert table(ROWS).splitlines()[2:] == [
-        "| one | 10 | 2 | 6 | 2 | 75.0% |",
-        "| two | 5 | 1 | 4 | 0 | 100.0% |",
-        "| three | 3 | 3 | 0 | 0 | 100.0% |",
+        "| diffuse | 10 | 2 | 6 | 0 | 2 | 75.0% |",
+        "| factor | 5 | 1 | 4 | 0 | 0 | 100.0% |",
+        "| serialiser | 3 | 3 | 0 | 0 | 0 | 100.0% |",
     ]
 
 
@@ -38,6 +38,7 @@ def test_waivers_are_of_a_signal_and_its_copies(monkeypatch):
         assert not waived("diffuse", f"stuck-at-0 -> {signal}")
     row = Score("diffuse", 3, (), ("inv -> unit.last_1", "inv -> unit.other"))
     assert row.open == ("inv -> unit.other",)
+    assert (row.waived, row.score) == (1, 1 / 2)
 
 
 @pytest.mark.parametrize(("survivors", "status"), [(10, 0), (11, 1)])
