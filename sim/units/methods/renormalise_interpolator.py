@@ -114,7 +114,7 @@ RECORD = Record(
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 2000),
-        "long spans": Stimulus(_long_spans, 60_000, stalled=False),
+        "long spans": Stimulus(_long_spans, 240_000, stalled=False),
         "last bits": Stimulus(_last_bits, 4000, stalled=False),
     },
     still={"a straight line has no second difference": "vector_{0-2}_second_difference[0-41]"},
