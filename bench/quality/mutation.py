@@ -219,6 +219,7 @@ write_rtlil mutated.il"""
 def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, str]:
     """Write ``flat.il``, the unit, and ``whole.il``, the unit with all its mutants, to a folder.
 
+    Mutated are the unit's own cells, not those of `units_inside` it.
     ``mutated.il`` is ``whole.il`` with nets split by their drivers. Yosys chooses ``count`` mutants by
     ``seed``; some of its choices are left out. Returns the name of each mutant, by its number.
     """
@@ -260,7 +261,7 @@ def _listed(count: int, seed: int, most: int, folder: Path) -> list[str]:
 
 
 def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
-    """Number of mutants that Yosys can list at once: two of each cell, or of each bit with a name.
+    """Number of mutants of its ``own`` cells that Yosys can list at once: two of each, or of each named bit.
 
     It takes about two of each cell, named wire and bit of one, and never ends if asked for more; a bit counts
     where it is driven or has only one reader.

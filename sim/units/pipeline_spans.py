@@ -65,7 +65,7 @@ def any_constants(
         colors = [Intensity.color(rng.uniform(0, brightness, (lights, 3))) | 1 for _ in range(2)]
         if design.specular is None:
             colors[1][:] = 0
-        # Without lights the colour is all there is.
+        # Without lights it is the whole colour.
         ambient = Intensity.color(rng.uniform(0, 0.2 if lights else 1, 3))
         found.append(FrameConstants(exponent, ambient, direction, halfway, *colors))
     if design.loads_tables:

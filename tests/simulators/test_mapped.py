@@ -1,7 +1,7 @@
 """Mapped ECP5 netlists with registers inside multipliers and memories, against the bit-accurate models.
 
 Cells are Yosys's models and ours. Quick: a unit, and faults that are injected into its netlist. Long: more
-units, and a frame through pipelines, whose netlists are also proved to do what they did before the step.
+units, and pipelines, whose netlists are proved to do what they did before the step; most shade spans, too.
 """
 
 import copy
@@ -52,9 +52,8 @@ DESIGNS += [
 ]
 """The default design, and one of every method."""
 
-
 PROVED = ("angular", "recurrence")
-"""Methods whose netlists are too large for Icarus: it reads one for minutes."""
+"""Methods whose netlists are proved but not simulated: Icarus takes minutes to read one."""
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +171,7 @@ def test_faults_injected_in_a_memory_are_found(check, inject):
     "design", [pytest.param(of, id=f"{of.interpolator.name}-{of.specular.model.name}") for of in DESIGNS]
 )
 def test_a_frame_of_a_pipeline(design, tmp_path):
-    """Pixel by pixel under stalls; and the netlist before the step does the same, by proof."""
+    """The netlist before the step does the same, by proof; and spans pixel by pixel, but for `PROVED`."""
     unit = ShadingPipelineUnit(design)
     before = map_component(unit, tmp_path)
     netlist, absorbed = absorb_registers(before)

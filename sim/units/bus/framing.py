@@ -123,8 +123,7 @@ RECORD = Record(
     status=_status,
     stimuli={
         "frames": Stimulus(_frames, 200),
-        "short": Stimulus(_short, 60),
-        "other colours": Stimulus(_short, 40),
+        "short": Stimulus(_short, 60, repeats=2),
         "misfits": Stimulus(_misfits, 100),
     },
     axis="",
