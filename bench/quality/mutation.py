@@ -306,12 +306,6 @@ def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
         bit for port in module["ports"].values() if port["direction"] == "output" for bit in port["bits"]
     }
 
-    def named(bit: int) -> str:
-        # A register that starts at 1 is kept inverted under a name of Yosys's; what follows has the unit's.
-        inverted = (cells[name] for name in readers[bit] if cells[name]["type"] == "$not")
-        bits = [bit, *(cell["connections"]["Y"][0] for cell in inverted)]
-        return min((names[bit] for bit in bits), key=lambda name: name.startswith("$"))
-
     def behind(start: str) -> str:
         seen, open_ = {start}, [start]
         for name in open_:
@@ -320,7 +314,7 @@ def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
             bits = [bit for port in outputs for bit in cell["connections"][port]]
             shown = bits if cell["type"] in ("$dff", "$dffe") else [bit for bit in bits if bit in ports]
             if shown:
-                return named(shown[0])
+                return names[shown[0]]
             following = [reader for bit in bits for reader in readers[bit] if reader not in seen]
             seen.update(following)
             open_ += dict.fromkeys(following)
