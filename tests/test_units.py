@@ -14,7 +14,7 @@ import pytest
 
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import STALLS, Case, UnitRun, first
+from blysk.sim.units.record import STALLS, UnitRun, first
 from blysk.sim.units.registry import RECORDS
 
 from .checks import assert_equals_model, known, resets
@@ -86,7 +86,7 @@ def few_of(record, variant, unit):
     """Some beats of a variant's first stimulus."""
     make = next(iter(record.stimuli_of(variant).values())).make
     case = make(unit, np.random.default_rng(2026), 200)
-    return Case(first(case.beats, FEW), case.constants, case.write)
+    return case.first(FEW)
 
 
 @pytest.mark.parametrize("name", [name for name, record in RECORDS.items() if not record.remembers])
@@ -101,8 +101,7 @@ def test_reset_leaves_nothing_behind(name):
         expected = [unit.latency + interval * k for k in range(6)]
     else:
         beats = first(case.beats, count)
-        options = {"constants": case.constants, "write": case.write, "idle_timeout": 2000}
-        run = simulate(known(unit), beats, count=None, engine="auto", **options)
+        run = simulate(known(unit), beats, count=None, engine="auto", idle_timeout=2000, **case.sent)
         cycles = run.total_cycles - int(run.input_cycles[0]) + 5
         befores = 1, cycles // 3, 2 * cycles // 3
         expected = [cycle - run.input_cycles[0] for cycle in run.cycles.tolist()]

@@ -73,8 +73,7 @@ def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
                 unit,
                 case.beats,
                 count=run.count,
-                constants=case.constants,
-                write=case.write,
+                **case.sent,
                 **run.stalls,
             )
             found.append((sent, model.run(sent)))

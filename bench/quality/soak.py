@@ -284,8 +284,7 @@ def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | No
                 component,
                 case.beats,
                 count=count,
-                constants=case.constants,
-                write=case.write,
+                **case.sent,
                 input_stalls=rng.random(997) < shares[0],
                 output_stalls=rng.random(1009) < shares[1],
                 idle_timeout=_UNIT_IDLE_TIMEOUT,
@@ -297,8 +296,7 @@ def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | No
                     component,
                     case.beats,
                     count=count,
-                    constants=case.constants,
-                    write=case.write,
+                    **case.sent,
                     idle_timeout=_UNIT_IDLE_TIMEOUT,
                 )
                 output = unpack(verilated.ports.o, verilated.run(free)[0])
@@ -326,8 +324,7 @@ def _beats_of_runs(unit: str) -> dict[str, int]:
             component,
             case.beats,
             count=length_of(record.expect(component, case)),
-            constants=case.constants,
-            write=case.write,
+            **case.sent,
             idle_timeout=_UNIT_IDLE_TIMEOUT,
         )
         beats[name] = max(stimulus.count, _CLOCKS * stimulus.count // max(1, found.total_cycles))

@@ -49,7 +49,8 @@ static inline void place(uint32_t *words, int offset, int width, uint64_t value)
 // Cycles up to the last beat out, or -1.
 extern "C" int64_t run(
 		const uint32_t *constants,
-		const uint32_t *write, int64_t writes, const uint32_t *input, int64_t inputs,
+		const uint32_t *write, const int64_t *write_after, int64_t writes,
+		const uint32_t *input, int64_t inputs,
 		uint32_t *output, int64_t *cycles, int64_t outputs, int64_t idle_timeout) {{
 	VerilatedContext context;
 	Vcore *const core = new Vcore(&context);
@@ -63,9 +64,12 @@ extern "C" int64_t run(
 	}}
 	int64_t written = 0, taken = 0, given = 0, clock = 0, last = 0;
 	for (; given < outputs && clock - last <= idle_timeout; clock++) {{
-		if (written < writes) {{
+		const int64_t after = write_after && written < writes ? write_after[written] : 0;
+		const bool writing = written < writes && taken >= after;
+		if (writing) {{
 {write}
-		}} else if (taken < inputs) {{
+		}}
+		if (!(writing && after == 0) && taken < inputs) {{
 			const uint32_t *const words = input + taken * {input_words};
 			core->i_valid = 1;
 {input}
@@ -120,7 +124,7 @@ def _driver(ports: Ports) -> str:
     if ports.write is not None:
         words = f"\t\t\tconst uint32_t *const words = write + written * {word_count(ports.write)};"
         write = f"{words}\n\t\t\tcore->write_valid = 1;\n{assign(ports.write, 'write')}"
-        moves = "\t\tif (written < writes && core->write_ready && ++written == writes) finished = true;"
+        moves = "\t\tconst bool write_moves = writing && core->write_ready;"
     output = "\n".join(
         f"\t\t\tplace(words, {offset}, {width}, core->{port});"
         for port, offset, width in _fields(ports.o, "o")
@@ -135,13 +139,9 @@ def _driver(ports: Ports) -> str:
         output_words=word_count(ports.o),
     )
     if moves:
-        # The last write must stay on its port until the edge.
-        text = text.replace(
-            "\t\tconst bool input_moves", "\t\tbool finished = false;\n\t\tconst bool input_moves"
-        )
-        text = text.replace(
-            "\t\tif (input_moves) {", "\t\tif (finished) core->write_valid = 0;\n\t\tif (input_moves) {"
-        )
+        # A write must stay on its port until the edge.
+        end = "\t\tif (write_moves) {\n\t\t\twritten++;\n\t\t\tcore->write_valid = 0;\n\t\t}\n"
+        text = text.replace("\t\tif (input_moves) {", f"{end}\t\tif (input_moves) {{")
     return text
 
 
@@ -232,8 +232,8 @@ class Verilated:
         )
         self._run = ctypes.CDLL(str(folder / "core.so")).run
         self._run.argtypes = (
-            [ctypes.c_void_p]
-            + [ctypes.c_void_p, ctypes.c_int64] * 2
+            [ctypes.c_void_p] * 3
+            + [ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64]
             + [ctypes.c_void_p] * 2
             + [ctypes.c_int64] * 2
         )
@@ -261,10 +261,12 @@ class Verilated:
         constants, write, beats = (
             np.ascontiguousarray(words) for words in (stimulus.constants, stimulus.write, stimulus.input)
         )
+        places = stimulus.write_after
+        after = None if places is None else places.ctypes.data
         output = np.empty((stimulus.count, word_count(self.ports.o)), dtype=np.uint32)
         cycles = np.empty(stimulus.count, dtype=np.int64)
         end = self._run(
-            *(constants.ctypes.data, write.ctypes.data, len(write), beats.ctypes.data, len(beats)),
+            *(constants.ctypes.data, write.ctypes.data, after, len(write), beats.ctypes.data, len(beats)),
             *(output.ctypes.data, cycles.ctypes.data, stimulus.count, stimulus.idle_timeout),
         )
         if end < 0:

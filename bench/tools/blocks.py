@@ -168,8 +168,7 @@ def _times(entry: Entry, unit: Component) -> tuple[int, int]:
     else:
         given = entry.record.example(entry.name, unit)
         case = given.case
-        options = {"constants": case.constants, "write": case.write, "engine": "pysim"}
-        run = simulate(unit, case.beats, count=given.count, **options)
+        run = simulate(unit, case.beats, count=given.count, engine="pysim", **case.sent)
     return int(run.cycles[0] - run.input_cycles[0]), int(np.median(np.diff(run.cycles)))
 
 

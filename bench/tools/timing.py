@@ -80,7 +80,7 @@ def waves_of(unit: Component, beat: dict | None = None, example: UnitRun | None 
         If results are missing.
     """
     case, results = _case_of(unit, beat or {}) if example is None else (example.case, example.count)
-    sent = stimulus_of(unit, case.beats, count=None, constants=case.constants, write=case.write)
+    sent = stimulus_of(unit, case.beats, count=None, **case.sent)
     codes, constants, writes = (_codes(words) for words in (sent.input, sent.constants, sent.write))
     several, shown = results > len(codes), min(results, _MOST_RESULTS if example else results)
     input_payload = Value.cast(unit.i.payload).as_unsigned()

@@ -67,7 +67,7 @@ class _Job(ctypes.Structure):
     _fields_ = (
         *(
             (name, ctypes.c_void_p)
-            for name in ("constants", "write", "input", "input_stalls", "output_stalls")
+            for name in ("constants", "write", "input", "input_stalls", "output_stalls", "write_after")
         ),
         *((name, ctypes.c_int64) for name in ("write_count", "input_count", "input_period", "output_period")),
         *((name, ctypes.c_int64) for name in ("count", "idle_timeout", "settle")),
@@ -410,14 +410,16 @@ class Model:
 
     def _check(self, stimulus: Stimulus) -> None:
         component, target, entry = self._unchecked
-        write = stimulus.write
+        write, after = stimulus.write, stimulus.write_after
         # The writes of 1024 materials take pysim half of the time of a build.
         if len(write) > 2 * _CHECK_WRITES:
-            write = np.concatenate([write[:_CHECK_WRITES], write[-_CHECK_WRITES:]])
+            kept = np.r_[:_CHECK_WRITES, len(write) - _CHECK_WRITES : len(write)]
+            write, after = write[kept], None if after is None else after[kept]
         limit = len(write) + _CHECK_CYCLES
         first = replace(
             stimulus,
             write=write,
+            write_after=after,
             input=stimulus.input[:_CHECK_BEATS],
             count=None,
             idle_timeout=limit,
@@ -443,7 +445,8 @@ class Model:
         )
         arrays = {
             name: np.ascontiguousarray(getattr(stimulus, name))
-            for name in ("constants", "write", "input", "input_stalls", "output_stalls")
+            for name in ("constants", "write", "input", "input_stalls", "output_stalls", "write_after")
+            if getattr(stimulus, name) is not None
         }
         arrays |= {"input_cycles": input_cycles, "status": status}
         job = _Job(

@@ -448,6 +448,7 @@ struct Simulation {
 struct Job {
 	const uint32_t *constants, *write, *input;
 	const uint8_t *input_stalls, *output_stalls;
+	const int64_t *write_after; // Beats taken before each write; null: none.
 	int64_t write_count, input_count, input_period, output_period;
 	int64_t count; // -1: as many as come
 	int64_t idle_timeout, settle;
@@ -500,13 +501,15 @@ int32_t blysk_run(void *handle, Job *job, int64_t cycles) {
 			break;
 		}
 
-		const bool writing = written < job->write_count;
+		const int64_t after = job->write_after && written < job->write_count ? job->write_after[written] : 0;
+		const bool writing = written < job->write_count && taken >= after;
 		if (writing) {
 #ifdef BLYSK_HAS_WRITE
 			model.p_write____valid.set(true);
 			load(model.p_write____payload, job->write + written * count(model.p_write____payload));
 #endif
-		} else if (!offered && taken < job->input_count && !job->input_stalls[input_phase]) {
+		}
+		if (!offered && !(writing && after == 0) && taken < job->input_count && !job->input_stalls[input_phase]) {
 			offered = true;
 			model.p_i____valid.set(true);
 			load(model.p_i____payload, job->input + taken * count(model.p_i____payload));
@@ -554,10 +557,9 @@ int32_t blysk_run(void *handle, Job *job, int64_t cycles) {
 #ifdef BLYSK_HAS_WRITE
 		if (write_moves) {
 			moved = true;
-			if (++written == job->write_count) {
-				model.p_write____valid.set(false);
-				fill(model.p_write____payload);
-			}
+			written++;
+			model.p_write____valid.set(false);
+			fill(model.p_write____payload);
 		}
 #endif
 		if (input_moves) {

@@ -2,14 +2,15 @@
 
 A component that can be simulated is an `amaranth.lib.wiring.Component` in the clock domain ``sync`` with
 the streams ``i`` (in) and ``o`` (out) and, where it wants them, ``constants`` (in, driven for the whole
-run), ``write`` (a stream in, served before the first input beat) and ``status`` (out, read after the run).
+run), ``write`` (a stream in) and ``status`` (out, read after the run).
 
 Both engines do the same on every clock, so they give equal beats at equal cycles:
 
 1. The writes are offered first, each until it is taken. From the clock after the last of them on, the
    source offers the next input beat unless ``input_stalls`` says otherwise on this clock; an offered beat
-   stays until it is taken. While ``valid`` is low, every payload bit of an input is 1: so a component that
-   uses a payload without ``valid`` gives wrong results.
+   stays until it is taken. Writes that come after a number of beats are offered when these are taken; the
+   next beats are offered beside them. While ``valid`` is low, every payload bit of an input is 1: so a
+   component that uses a payload without ``valid`` gives wrong results.
 2. The sink is ready unless ``output_stalls`` says otherwise on this clock.
 3. ``ready``, ``valid`` and payloads are read as they stand just before the rising edge; a beat moves at the
    edge where its ``valid`` and ``ready`` are both high.
@@ -125,6 +126,8 @@ class Stimulus:
         Cycles to go on after the last transfer of a complete run, at most ``idle_timeout``.
     limit : int or None
         Number of cycles after which the run ends in any case (``LIMIT``).
+    write_after : int64 array, shape (writes,), or None
+        Number of input beats taken before each write is offered, in increasing order; ``None`` for 0.
     """
 
     input: np.ndarray
@@ -136,6 +139,7 @@ class Stimulus:
     idle_timeout: int
     settle: int
     limit: int | None = None
+    write_after: np.ndarray | None = None
 
 
 class StopReason(IntEnum):

@@ -90,6 +90,7 @@ class Model:
         input_payload = Value.cast(component.i.payload).as_unsigned()
         output_payload = Value.cast(component.o.payload).as_unsigned()
         inputs, writes = _codes(stimulus.input), _codes(stimulus.write)
+        after = [0] * len(writes) if stimulus.write_after is None else stimulus.write_after.tolist()
         input_stalls, output_stalls = stimulus.input_stalls.tolist(), stimulus.output_stalls.tolist()
         count = stimulus.count
         if stimulus.constants.size:
@@ -117,12 +118,12 @@ class Model:
                 )
                 break
 
-            writing = written < len(writes)
+            writing = written < len(writes) and len(input_cycles) >= after[written]
             if writing:
                 ctx.set(component.write.valid, 1)
                 ctx.set(write_payload, writes[written])
-            elif (
-                not offered
+            if (
+                not (offered or (writing and after[written] == 0))
                 and len(input_cycles) < len(inputs)
                 and not input_stalls[clock % len(input_stalls)]
             ):
@@ -157,7 +158,7 @@ class Model:
 
             await ctx.tick()
             clock += 1
-            if write_moves and written == len(writes):
+            if write_moves:
                 ctx.set(component.write.valid, 0)
                 ctx.set(write_payload, -1)
             if input_moves:

@@ -108,6 +108,16 @@ def _writes(shape, write) -> np.ndarray:
     return np.zeros((0, 0), dtype=np.uint32) if write is None else pack(shape, write)
 
 
+def _places(write_after, writes: int, beats: int) -> np.ndarray:
+    after = np.ascontiguousarray(write_after)
+    if after.dtype.kind not in "iu" or after.shape != (writes,):
+        raise ValueError(f"write_after must be {writes} integers, not {after.dtype} {after.shape}")
+    after = after.astype(np.int64)
+    if writes and (after[0] < 0 or after[-1] > beats or np.any(np.diff(after) < 0)):
+        raise ValueError(f"write_after must increase, from 0 up to the number of beats, {beats}")
+    return after
+
+
 def stimulus_of(
     component: Component,
     beats: np.ndarray | Mapping,
@@ -115,6 +125,7 @@ def stimulus_of(
     count: int | None,
     constants: np.ndarray | Mapping | None = None,
     write: np.ndarray | Mapping | None = None,
+    write_after: np.ndarray | None = None,
     input_stalls: np.ndarray | None = None,
     output_stalls: np.ndarray | None = None,
     idle_timeout: int = 10_000,
@@ -131,9 +142,11 @@ def stimulus_of(
     idle_timeout, settle = _whole("idle_timeout", idle_timeout, 1), _whole("settle", settle, 0)
     if count is not None and settle > idle_timeout:
         raise ValueError(f"settle must be at most idle_timeout, {idle_timeout}, not {settle}")
+    packed, writes = pack(ports.i, beats), _writes(ports.write, write)
     return Stimulus(
-        input=pack(ports.i, beats),
-        write=_writes(ports.write, write),
+        input=packed,
+        write=writes,
+        write_after=None if write_after is None else _places(write_after, len(writes), len(packed)),
         constants=_constants(ports.constants, constants),
         input_stalls=_pattern("input_stalls", input_stalls),
         output_stalls=_pattern("output_stalls", output_stalls),
@@ -150,6 +163,7 @@ def simulate(
     count: int | None,
     constants: np.ndarray | Mapping | None = None,
     write: np.ndarray | Mapping | None = None,
+    write_after: np.ndarray | None = None,
     engine: str = "cxxrtl",
     origin: Any = None,
     input_stalls: np.ndarray | None = None,
@@ -178,6 +192,10 @@ def simulate(
         Driven for the whole run; needed when the component has ``constants``.
     write : structured array or mapping, optional
         Beats for the ``write`` stream, delivered before the first input beat.
+    write_after : int array, optional
+        Number of input beats that are taken before each write is offered, in increasing order. The next input
+        beats are offered beside a write that is not before the first: the component has to take the write
+        first if the beats depend on it.
     engine : str
         ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine or, with a warning that says why, pysim
         where no compiler works.
@@ -224,6 +242,7 @@ def simulate(
         count=count,
         constants=constants,
         write=write,
+        write_after=write_after,
         input_stalls=input_stalls,
         output_stalls=output_stalls,
         idle_timeout=idle_timeout,

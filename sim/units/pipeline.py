@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,7 +48,7 @@ from blysk.sim.units.pipeline_spans import (
     spans_near_terminator,
     tabled,
 )
-from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant, first, once
 
 __all__ = ["DESIGNS", "LONG_DESIGNS", "RECORD", "case_of", "spans_of"]
 
@@ -123,20 +124,35 @@ def spans_of(beats) -> Spans:
     return Spans(*of_span, *normals, *further)
 
 
-def _pixels(unit, case):
-    design = unit.parameters
-    return design.compute(spans_of(case.beats), constants_written(design, case.write))
+def _together(parts):
+    """Beats of several mappings in a row."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+@once
+def _frames_of(unit, case):
+    """Pixels by frames: the spans between writes, each with what is written up to there."""
+    design, spans = unit.parameters, spans_of(case.beats)
+    after = np.zeros(len(case.write["address"]), int) if case.write_after is None else case.write_after
+    starts = np.unique(np.r_[0, after])
+    return [
+        design.compute(
+            spans[start:stop],
+            constants_written(design, first(case.write, np.searchsorted(after, start, "right"))),
+        )
+        for start, stop in pairwise((*starts, len(spans)))
+    ]
 
 
 def _expect(unit, case):
-    return pixel_beats(_pixels(unit, case))
+    return _together([pixel_beats(pixels) for pixels in _frames_of(unit, case)])
 
 
 def _status(unit, case):
-    length, pixels, most = case.beats["length"], _pixels(unit, case), 65535
+    length, frames, most = case.beats["length"], _frames_of(unit, case), 65535
     return {
-        "out_of_range_spans": min(pixels.out_of_range_spans, most),
-        "wide_spans": min(pixels.wide_spans, most),
+        "out_of_range_spans": min(sum(frame.out_of_range_spans for frame in frames), most),
+        "wide_spans": min(sum(frame.wide_spans for frame in frames), most),
         "empty_spans": min(int(np.count_nonzero(length == 0)), most),
         "overrun": int(np.any(case.beats["x"] + length > 1 << unit.parameters.x_bits)),
     }
@@ -151,8 +167,7 @@ def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     # Tables have an order of their own.
     kept = np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS))
     parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
-    write = {name: np.concatenate([part[name] for part in (*parts, write)]) for name in write}
-    return Case(beats_of(unit, ends_for(unit.parameters, spans)), write=write)
+    return Case(beats_of(unit, ends_for(unit.parameters, spans)), write=_together([*parts, write]))
 
 
 def _spans(unit, rng, count):
@@ -277,6 +292,47 @@ def _brightest(unit, rng, count):
     return case_of(unit, spans, constants, 0x3FFFF, 0, 0x15555, 0x2AAAA, 20, 0x3FFFF)
 
 
+_LOST = 700
+"""Number of values that no table takes, more than one has."""
+
+
+def _disordered(rng, write, share):
+    """A share of the words of a frame, in any order, but none of tables."""
+    kept = ~np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS)) & (rng.random(len(write["data"])) < share)
+    order = rng.permutation(np.flatnonzero(kept))
+    return {name: words[order] for name, words in write.items()}
+
+
+def _lost(rng, design):
+    """Values past the end of a table, and for a bank that there is not."""
+    data = rng.integers(0, 1 << 17, 2 * _LOST)
+    data[_LOST] = (1 << 17) + design.specular.banks
+    return {"address": np.full(len(data), LOBE_ADDRESS), "data": data}
+
+
+def _frames(unit, rng, count):
+    """Constants written between spans, all or some of them: a frame may have one pixel, or none."""
+    design, frames, writes, after = unit.parameters, [], [], [0]
+    while after[-1] < count:
+        length = short_lengths(rng, int(rng.choice([1, 2, 5, 20, 80])))
+        frame = any_spans(rng, design, length if 2 < len(length) < 80 else length % 3)
+        constants = any_constants(rng, design, frame, rng.choice([1.0, 8.0]))
+        if rng.random() < 0.3:
+            # A word like the one that begins a table.
+            constants[0].direction[:, 0] = -ONE
+        write = [writes_of(constants)]
+        if design.loads_tables and rng.random() < 0.2:
+            write.append(_lost(rng, design))
+        if writes and rng.random() < 0.6:
+            write = [_disordered(rng, write[0], rng.choice([0.3, 1.0, 1.0]))]
+        frames.append(frame)
+        writes.append(_together(write))
+        after.append(after[-1] + len(frame))
+    places = np.repeat(after[:-1], [len(write["data"]) for write in writes])
+    beats = _together([beats_of(unit, ends_for(design, frame)) for frame in frames])
+    return Case(beats, write=_together(writes), write_after=places)
+
+
 def _counters(unit, rng, count):
     """More spans that are out of range, wide, and empty, than the counters hold; one past the last x."""
     design = unit.parameters
@@ -380,6 +436,7 @@ RECORD = Record(
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 3000, repeats=3),
+        "frames": Stimulus(_frames, 400, variants=_BOTH),
         "setups": Stimulus(_every_setup, 60, stalled=False, variants=_BOTH),
         "terminator": Stimulus(_terminator, variants=_BOTH),
         "roundings": Stimulus(_roundings, variants=_BOTH),
@@ -393,11 +450,6 @@ RECORD = Record(
         "counters": Stimulus(_counters, stalled=False, variants=_BOTH),
     },
     waivers={
-        **dict.fromkeys(
-            ("inside", "came", "went"),
-            "Constants come before the spans; tests/hdl/test_frame_constants.py sends them between, too.",
-        ),
-        "tables.active": "A value for the number of a bank that there is not.",
         "tables.read": "No table is written while beats read it: then the register may move.",
         "kept": "The length beside the first of a span's normals is not read.",
         "multiplier_0_product": "A reciprocal and its square are normalised: the first bit is 1 already.",

@@ -98,7 +98,10 @@ def _tables_written(design: Design, write: dict[str, np.ndarray]) -> list[LobeTa
     data = write["data"][write["address"] == LOBE_ADDRESS]
     starts = np.flatnonzero(data >> 17)
     for start, end in zip(starts, [*starts[1:], len(data)], strict=True):
-        values[data[start] - (1 << 17), : end - start - 1] = data[start + 1 : end]
+        # Values for a bank that there is not are lost, and those past the end of a table.
+        if data[start] - (1 << 17) < lobe.banks:
+            loaded = data[start + 1 : end][: values.shape[1]]
+            values[data[start] - (1 << 17), : len(loaded)] = loaded
     return [LobeTable(lobe, Fixed(lobe.VALUE_FORMAT, row)) for row in values]
 
 

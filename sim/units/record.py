@@ -177,12 +177,28 @@ class Case:
     constants : Beats, optional
         Driven for the whole run, where the unit has a port ``constants``.
     write : Beats, optional
-        Beats of the stream ``write``, before the first input beat.
+        Beats of the stream ``write``.
+    write_after : array, shape (writes,), optional
+        Number of input beats before each write, in increasing order; ``None``: all come before the first.
     """
 
     beats: Beats
     constants: Beats | None = None
     write: Beats | None = None
+    write_after: np.ndarray | None = None
+
+    @property
+    def sent(self) -> dict[str, Any]:
+        """Arguments of `simulate` for what is sent beside the beats."""
+        return {name: getattr(self, name) for name in ("constants", "write", "write_after")}
+
+    def first(self, count: int) -> "Case":
+        """The first input beats, and the writes up to the last of them."""
+        few = replace(self, beats=first(self.beats, count))
+        if self.write_after is None:
+            return few
+        writes = int(np.count_nonzero(self.write_after < count))
+        return replace(few, write=first(self.write, writes), write_after=self.write_after[:writes])
 
 
 @dataclass(frozen=True)
@@ -332,7 +348,7 @@ class Record:
         make = next(iter(self.stimuli_of(variant).values())).make
         case = make(unit, np.random.default_rng(2026), 200)
         for count in (results, 2 * results, 4 * results, 8 * results, PAUSED):
-            few = Case(first(case.beats, count), case.constants, case.write)
+            few = case.first(count)
             expected = self.expect(unit, few)
             if length_of(expected) >= results:
                 break
@@ -365,7 +381,7 @@ class Record:
                 }
                 yield UnitRun(case, expected, status, stalls)
             if given.stalled:
-                few = Case(first(case.beats, PAUSED), case.constants, case.write)
+                few = case.first(PAUSED)
                 pauses = np.arange(PAUSE * PAUSED) % PAUSE != 0
                 stalls = {"input_stalls": pauses}
                 yield UnitRun(few, self.expect(unit, few), self._status(unit, few), stalls)

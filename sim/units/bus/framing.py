@@ -1,5 +1,6 @@
 """Record of the framing of streams."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -42,7 +43,7 @@ def _columns(layout: ByteLayout, beats) -> dict:
 def _core_case(unit, case) -> Case:
     """Input of the core inside a unit."""
     data = np.asarray(case.beats["data"], dtype=np.uint8)
-    return Case(unit.parameters.given.unpack(data), case.constants, case.write)
+    return replace(case, beats=unit.parameters.given.unpack(data))
 
 
 def _frame_of(unit, case) -> np.ndarray:
@@ -50,7 +51,7 @@ def _frame_of(unit, case) -> np.ndarray:
     record, inner = _RECORDS[unit.packets], _core_case(unit, case)
     begins = np.flatnonzero(np.r_[True, case.beats["last"][:-1]])
     counts = [
-        length_of(record.expect(unit.core, Case(first(inner.beats, end), inner.constants, inner.write)))
+        length_of(record.expect(unit.core, inner.first(end)))
         for end in [*begins[1:], len(case.beats["last"])]
     ]
     return np.repeat(np.arange(len(begins)), np.diff([0, *counts]))
@@ -82,7 +83,7 @@ def _case(unit, rng, count, length):
     last = np.isin(np.arange(len(data)), ends)
     # Also the beats that end the run, and the run with pauses.
     last[[-1, min(PAUSED, len(last)) - 1]] = True
-    return Case({"data": data, "last": last.astype(int)}, inner.constants, inner.write)
+    return replace(inner, beats={"data": data, "last": last.astype(int)})
 
 
 def _frames(unit, rng, count):

@@ -98,6 +98,12 @@ def test_equal_to_the_engine(tmp_path):
     output, cycles = model.run(stimulus(model.ports, beats, write, 300))
     assert np.array_equal(output, pack(model.ports.o, run.beats))
     assert np.array_equal(cycles, run.cycles)
+    # Writes between beats.
+    late = np.array([0, 0, 7, 7, 200])
+    run = simulate(component, beats, count=300, write=write, write_after=late)
+    between, cycles = model.run(stimulus(model.ports, beats, write, 300, write_after=late))
+    assert np.array_equal(between, pack(model.ports.o, run.beats))
+    assert np.array_equal(cycles, run.cycles)
     # From power-up every time; a beat that never comes ends the run.
     assert np.array_equal(model.run(stimulus(model.ports, beats, write, 300))[0], output)
     with pytest.raises(SimulationError, match=r"^Verilator's model gave nothing for 100 cycles$"):

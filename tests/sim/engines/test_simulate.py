@@ -134,6 +134,17 @@ def test_plain_signed_members():
     assert runs[0].status == -16
 
 
+@pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
+def test_writes_between_beats(engine):
+    """A write is offered when so many beats are taken, beside the next one, which Plain takes at once."""
+    beats, write, after = pairs(30)["y"], np.array([7, -16, 5, 3, -1]), np.array([0, 10, 10, 20, 30])
+    run = simulate(Plain(), beats, count=30, engine=engine, constants=-32768, write=write, write_after=after)
+    # Beat k is taken at cycle k + 1, the writes at cycles 0, 11, 12, 21 and 31.
+    np.testing.assert_array_equal(run.input_cycles, np.arange(30) + 1)
+    np.testing.assert_array_equal(run.beats - beats * -32768, [7] * 11 + [-16] + [5] * 9 + [3] * 9)
+    assert (run.status, run.total_cycles) == (-1, 32)
+
+
 def test_members_without_bits():
     class Empty(Register):
         constants: In(data.StructLayout({}))
@@ -271,9 +282,19 @@ def test_arguments():
         ({"count": -1}, "count must be at least 0, not -1"),
         ({"constants": {}}, "the component has no constants"),
         ({"write": beats}, "the component has no stream write"),
+        ({"write_after": np.array([0])}, r"write_after must be 0 integers, not int64 \(1,\)"),
     ):
         with pytest.raises(ValueError, match=message):
             simulate(refused(Register()), beats, **{"count": 2} | arguments)
+    for places, message in (
+        ([0.0, 1.0], r"write_after must be 2 integers, not float64 \(2,\)"),
+        ([-1, 0], "write_after must increase, from 0 up to the number of beats, 2"),
+        ([1, 0], "write_after must increase"),
+        ([0, 3], "write_after must increase"),
+    ):
+        arguments = {"constants": 1, "write": np.array([1, 2]), "write_after": np.array(places)}
+        with pytest.raises(ValueError, match=message):
+            simulate(refused(Plain()), beats["y"], count=2, **arguments)
     with pytest.raises(ValueError, match="the component has constants, and none are given"):
         simulate(refused(Accumulator()), beats, count=2)
     with pytest.raises(ValueError, match=r"y of beat 1 is 131072, outside -131072 to 131071"):
