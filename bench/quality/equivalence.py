@@ -21,17 +21,24 @@ _SECONDS = 20
 proofs that succeed take at most 3."""
 
 
+YOSYS_SECONDS = 1800
+"""Limit of a run of Yosys, longer than any that ends."""
+
+
 def yosys(script: str, folder: Path) -> None:
     """Run a Yosys script in a folder, with the package pyosys.
 
     Raises
     ------
     ToolError
-        If Yosys fails.
+        If Yosys fails, or has not ended after `YOSYS_SECONDS`.
     """
-    done = subprocess.run(
-        [sys.executable, "-c", YOSYS], input=script, capture_output=True, encoding="utf-8", cwd=folder
-    )
+    command = [sys.executable, "-c", YOSYS]
+    streams = {"capture_output": True, "encoding": "utf-8"}
+    try:
+        done = subprocess.run(command, input=script, cwd=folder, timeout=YOSYS_SECONDS, **streams)
+    except subprocess.TimeoutExpired:
+        raise ToolError(f"Yosys has not ended after {YOSYS_SECONDS} s") from None
     if done.returncode:
         raise ToolError(f"Yosys failed: {(done.stderr or done.stdout).strip().splitlines()[-1]}")
 

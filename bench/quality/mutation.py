@@ -231,8 +231,10 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     inside = [f"*unit.?{path.replace('.', '.?')}.*" for path in units_inside(Fragment.get(unit, None))]
     own = [
         name
-        for name in top["cells"]
-        if "unit." in name and not any(fnmatchcase(name, pattern) for pattern in inside)
+        for name, cell in top["cells"].items()
+        if "unit." in name
+        and cell["type"] != "$scopeinfo"
+        and not any(fnmatchcase(name, pattern) for pattern in inside)
     ]
     (folder / "own.txt").write_text("".join(f"top/{name}\n" for name in own))
     listed = _listed(count, seed, _most_listed(top, own), folder) if own else []

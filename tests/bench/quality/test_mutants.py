@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from blysk.bench.quality import mutants
+from blysk.bench.quality import equivalence, mutants
 from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutants import LEAST, Score, main, scores, table, waived
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
@@ -72,6 +72,15 @@ def test_more_mutants_than_yosys_lists_at_once(tmp_path):
         re.match(r"mutate -ctrl mutant 8 \d+ ", command)[0] for command in commands
     ]
     assert len({re.sub(r"8 \d+ ", "", command) for command in commands}) == len(commands)
+
+
+def test_units_of_three_gates_have_mutants(monkeypatch, tmp_path):
+    """What only names a part inside is no cell: with it more were asked for than Yosys can list."""
+    monkeypatch.setattr(equivalence, "YOSYS_SECONDS", 60)
+    record = RECORDS["bisection_interpolator"]
+    known = mutate(record.variants[record.default].unit(), 200, 7, tmp_path)
+    assert len((tmp_path / "own.txt").read_text().splitlines()) == 3
+    assert 10 < len(known) < 50
 
 
 @pytest.mark.long
