@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import re
 import struct
 from dataclasses import replace
 
@@ -40,13 +41,14 @@ def load(path, content, **options):
 
 
 def check_refused(source, *words, content=None, **options):
-    """One line that names the file and holds the words; the line."""
+    """One line that names the file, says why and what to do, and holds the words; the line."""
     if content is not None:
         put(source, content)
     with pytest.raises(InputError) as refusal:
         load_mesh(str(source), **options)
     text = str(refusal.value)
-    assert "\n" not in text
+    assert re.fullmatch(r"[^\n]+: [^\n]+; [^\n]+", text)
+    assert "Error" not in text
     assert text.startswith(str(source)) or not os.path.exists(str(source))
     for word in words:
         assert word in text
@@ -74,7 +76,7 @@ def with_normals(mesh, normals):
 def obj_of(vertices, faces):
     """Text of an OBJ file; every bit of a coordinate."""
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, dtype=float).tolist()]
-    return "\n".join(lines + [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces) + 1).tolist()])
+    return "\n".join(lines + [f"f {' '.join(str(corner + 1) for corner in face)}" for face in faces])
 
 
 def gltf(primitives, blobs, accessors, nodes, **extra):

@@ -5,9 +5,9 @@ import struct
 import numpy as np
 import pytest
 
-from blysk.sim.errors import InputError
-from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.polygons import triangulated
+
+from .files import check_refused, load, obj_of
 
 # Corners in order, counter-clockwise; the first corner sees all of none but the square.
 OUTLINES = {
@@ -79,12 +79,6 @@ def test_polygons_without_area():
         assert len(corners) == 3
 
 
-def obj(points, turn=1):
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
-    corners = " ".join(map(str, range(1, len(points) + 1)[::turn]))
-    return "\n".join([*lines, f"f {corners}"]).encode()
-
-
 def ply(points, order):
     format = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
     head = f"ply\nformat {format} 1.0\nelement vertex {len(points)}\n"
@@ -108,9 +102,7 @@ def drawn_area(loaded):
 
 @pytest.mark.parametrize("outline", [OUTLINES["dart"], OUTLINES["C"]], ids=["dart", "C"])
 def test_concave_polygon_of_obj(tmp_path, outline):
-    path = tmp_path / "a.obj"
-    path.write_bytes(obj(placed(outline, 1)))
-    loaded = load_mesh(str(path))
+    loaded = load(tmp_path / "a.obj", obj_of(placed(outline, 1), [range(len(outline))]))
     assert drawn_area(loaded) == pytest.approx(shoelace(outline))
     # All triangles face one way: a fan would turn some over.
     assert (loaded.mesh.normals @ loaded.mesh.normals[0] > 0.999).all()
@@ -119,19 +111,15 @@ def test_concave_polygon_of_obj(tmp_path, outline):
 @pytest.mark.parametrize("order", ["", "<", ">"])
 def test_concave_polygon_beside_a_triangle_of_ply(tmp_path, order):
     """Lists of different lengths, of which trimesh refuses binary ones and fan-splits those of a text."""
-    path = tmp_path / "a.ply"
-    points = placed(OUTLINES["C"], 2)
-    path.write_bytes(ply(points, order))
+    loaded = load(tmp_path / "a.ply", ply(placed(OUTLINES["C"], 2), order))
     extra = abs(shoelace(OUTLINES["C"][:3]))
-    assert drawn_area(load_mesh(str(path))) == pytest.approx(shoelace(OUTLINES["C"]) + extra)
+    assert drawn_area(loaded) == pytest.approx(shoelace(OUTLINES["C"]) + extra)
 
 
 def test_polygon_keeps_normals_and_relative_indices(tmp_path):
-    path = tmp_path / "a.obj"
     lines = [f"v {x} {y} 0" for x, y in OUTLINES["L"]] + ["vn 0 0 1", "vn 0 0.6 0.8"]
     corners = [f"{k - 6}//{-1 - (k % 2)}" for k in range(6)]
-    path.write_text("\n".join([*lines, "f " + " ".join(corners)]))
-    loaded = load_mesh(str(path))
+    loaded = load(tmp_path / "a.obj", "\n".join([*lines, "f " + " ".join(corners)]))
     assert loaded.repaired_normals == 0
     assert drawn_area(loaded) == pytest.approx(shoelace(OUTLINES["L"]))
     for place, normal in zip(loaded.mesh.vertices, loaded.mesh.normals, strict=True):
@@ -159,18 +147,13 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
     ],
 )
 def test_bad_obj(tmp_path, text, reason):
-    path = tmp_path / "a.obj"
-    path.write_text(text)
-    with pytest.raises(InputError, match=r"^[^\n]*$") as refusal:
-        load_mesh(str(path))
-    assert reason in str(refusal.value)
+    check_refused(tmp_path / "a.obj", reason, content=text)
 
 
 def test_weight_of_1_and_colours(tmp_path):
     """Beside positions without: trimesh takes columns by the first line."""
-    path = tmp_path / "a.obj"
-    path.write_text("v 0 0 0 1.0\nv 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 1e0\nf 1 2 3 4\n")
-    loaded = load_mesh(str(path))
+    text = "v 0 0 0 1.0\nv 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 1e0\nf 1 2 3 4\n"
+    loaded = load(tmp_path / "a.obj", text)
     assert drawn_area(loaded) == pytest.approx(2)
     assert loaded.ignored == ("vertex colours",)
 
@@ -197,18 +180,11 @@ HEAD = (
     ],
 )
 def test_bad_ply(tmp_path, body, reason):
-    path = tmp_path / "a.ply"
-    path.write_text(HEAD + body)
-    with pytest.raises(InputError, match=r"^[^\n]*$") as refusal:
-        load_mesh(str(path))
-    assert reason in str(refusal.value)
+    check_refused(tmp_path / "a.ply", reason, content=HEAD + body)
 
 
 def test_wrong_counts_of_binary_lists(tmp_path):
-    path = tmp_path / "a.ply"
     whole = ply(placed(OUTLINES["C"], 2), "<")
     start = whole.index(b"end_header\n") + 11 + 8 * 24
     for count in (0, 2, 7, 9, 255):
-        path.write_bytes(whole[:start] + bytes([count]) + whole[start + 1 :])
-        with pytest.raises(InputError, match=r"^[^\n]*$"):
-            load_mesh(str(path))
+        check_refused(tmp_path / "a.ply", content=whole[:start] + bytes([count]) + whole[start + 1 :])
