@@ -177,7 +177,8 @@ def test_gltf_features_that_would_load_wrongly(tmp_path):
 def test_draco_without_its_decoder(tmp_path, monkeypatch):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda n: None if n == "DracoPy" else find(n))
-    check_refused(tmp_path / "a.glb", "pip install 'blysk[draco]'", content=draco_gltf())
+    reason = "the decoder DracoPy is not installed; pip install 'blysk[draco]'"
+    check_refused(tmp_path / "a.glb", reason, content=draco_gltf())
 
 
 def test_corrupt_gltf_does_not_load_its_neighbour(tmp_path):
@@ -288,8 +289,16 @@ def test_empty_and_nonsense(tmp_path, suffix):
         check_refused(path, content=nonsense)
 
 
-@pytest.mark.parametrize("suffix", [".ply", ".stl", ".glb", "ascii.ply"])
-def test_cut_short(tmp_path, suffix):
+@pytest.mark.parametrize(
+    ("suffix", "reason"),
+    [
+        (".ply", "cut short"),
+        (".stl", "the header says 12 triangles"),
+        (".glb", "cut short"),
+        ("ascii.ply", "cut short"),
+    ],
+)
+def test_cut_short(tmp_path, suffix, reason):
     """At every seventh byte; a text after every line."""
     box, path = trimesh.creation.box(), tmp_path / f"a.{suffix.split('.')[1]}"
     if suffix == "ascii.ply":
@@ -300,6 +309,7 @@ def test_cut_short(tmp_path, suffix):
         pieces = [whole[:length] for length in range(1, len(whole), 7)]
     for piece in pieces:
         check_refused(path, content=piece)
+    check_refused(path, reason)
     text = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
     check_refused(tmp_path / "text.stl", "cut short", content=text)
 
