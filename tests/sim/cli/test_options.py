@@ -135,9 +135,10 @@ def test_wrong_command(capsys, arguments, says):
 
 @pytest.mark.parametrize("option", ["-o", "--compare", "--json", "--vcd"])
 def test_unwritable_output(refused, option):
+    """Before the mesh is looked for."""
     suffix = {"--json": "json", "--vcd": "vcd"}.get(option, "png")
     name, says = f"nowhere/a.{suffix}", "there is no folder nowhere; make the folder first"
-    refused("render", *TINY, option, name, thing=name, says=says)
+    refused("render", "missing.obj", option, name, thing=name, says=says)
 
 
 def test_wrong_suffix_of_picture(refused):
