@@ -1,6 +1,7 @@
 """What tests of the command line share."""
 
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,15 @@ def picture(path):
 
 def files():
     return {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+
+
+def wait(process, happens, seconds=120):
+    """Until something happens while a process runs."""
+    deadline = time.monotonic() + seconds
+    while not happens():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 CORNERS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from blysk.bench.store import Task, results_of
 from blysk.sim.engines import cxxrtl
@@ -27,20 +26,15 @@ from blysk.sim.frames.workers import local_executor
 from blysk.sim.output import check_writable, write_json
 
 from ..engines.scale import BEATS, entries, scaled, script, start
+from .commandline import PROGRAM, wait
 
 THREE = (3 * BEATS).tolist()
 NOBODY = 65534
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, users and permissions")
-
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    """A cache and a temporary folder of each test's own."""
-    folder = tmp_path / "cache"
-    monkeypatch.setenv("BLYSK_CACHE", str(folder))
-    monkeypatch.delenv("CXX", raising=False)
-    return folder
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="signals, users and permissions"),
+    pytest.mark.usefixtures("cache"),
+]
 
 
 @pytest.fixture
@@ -116,11 +110,7 @@ def test_killed_while_compiling(cache, temporary, tmp_path):
     started = tmp_path / "started"
     program = "print(simulate(Triple(), np.arange(5), count=5).beats.tolist())"
     process = start(program, CXX=script(tmp_path, "slow", text), STARTED=str(started))
-    idle_timeout = time.monotonic() + 60
-    while not (started.exists() and started.read_text().endswith("\n")):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < idle_timeout
-        time.sleep(0.02)
+    wait(process, lambda: started.exists() and started.read_text().endswith("\n"), 60)
     process.kill()
     os.kill(int(started.read_text()), signal.SIGKILL)
     process.communicate(timeout=60)
@@ -212,17 +202,6 @@ def test_read_only_cache(open_folder, monkeypatch):
     private_folder.cache_clear()
 
 
-@pytest.mark.skipif(
-    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give a folder away"
-)
-def test_cache_of_another_user(cache):
-    cache.mkdir(mode=0o700)
-    os.chown(cache, NOBODY, NOBODY)
-    with pytest.warns(RuntimeWarning, match="belongs to another user: compiled models are kept for this run"):
-        assert scaled() == THREE
-    assert left_in(cache) == []
-
-
 def test_forbidden_output(open_folder):
     path = open_folder / "locked" / "a.json"
     path.parent.mkdir(mode=0o500)
@@ -308,42 +287,6 @@ def test_killed_worker_of_a_sweep(cache, tmp_path):
     assert all(path.read_bytes() == entry for path, entry in kept.items())
 
 
-PROGRAM = [sys.executable, "-c", "import sys; from blysk.sim.cli.main import main; sys.exit(main())"]
-
-
-@pytest.mark.long
-def test_termination_of_a_turntable(cache, temporary, tmp_path):
-    """As an interrupt: frames done stay, whole, and no process goes on, although the signal reaches one."""
-    arguments = ["render", "teapot", "--triangles", "100", "--size", "32x24", "--engine", "pysim"]
-    arguments += ["--frames", "500", "--jobs", "2", "-o", str(tmp_path / "a.gif")]
-    process = subprocess.Popen(
-        [*PROGRAM, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    try:
-        idle_timeout = time.monotonic() + 120
-        while not (tmp_path / "a-0001.png").exists():
-            assert process.poll() is None
-            assert time.monotonic() < idle_timeout
-            time.sleep(0.02)
-        process.terminate()
-        # Returns when nobody holds the pipes any more: neither the program nor one of its workers.
-        assert process.communicate(timeout=60) == ("", "blysk: interrupted\n")
-        assert process.returncode == 130
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-    left = left_in(tmp_path)
-    assert 1 <= len(left) < 500
-    assert all(re.fullmatch(r"a-\d{4}\.png", path.name) for path in left)
-    for path in left:
-        with Image.open(path) as image:
-            assert np.asarray(image).shape == (24, 32, 3)
-
-
 SWEEP = ["explore", "--size", "24x18", "--methods", "linear,renormalise,chord", "--models", "cosquad"]
 SWEEP += ["--degrees", "3", "--fraction-bits", "46", "--operands", "one_minus_cosine"]
 SWEEP += ["--largest-error", "255"]
@@ -355,20 +298,14 @@ def test_killed_worker_of_a_command(cache):
     """One line, status 2; what was measured is kept, and the next run goes on from there."""
     arguments = [*PROGRAM, *SWEEP, "--jobs", "2"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    idle_timeout = time.monotonic() + 120
-    while not left_in(cache / "results"):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < idle_timeout
-        time.sleep(0.02)
+    wait(process, lambda: left_in(cache / "results"))
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     worker = next(pid for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes())
     os.kill(int(worker), signal.SIGKILL)
     output, errors = process.communicate(timeout=60)
     assert (process.returncode, output) == (2, "")
-    assert (
-        errors
-        == "blysk: --jobs 2: a process died, perhaps for want of memory; use fewer, or smaller pictures\n"
-    )
+    reason = "a process died, perhaps for want of memory; use fewer, or smaller pictures"
+    assert errors == f"blysk: --jobs 2: {reason}\n"
     kept = {path: path.stat().st_mtime_ns for path in left_in(cache / "results")}
     assert kept
     done = subprocess.run(arguments, capture_output=True, text=True)

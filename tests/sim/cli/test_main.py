@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import ModuleType
 
@@ -16,7 +15,7 @@ import blysk.__main__ as entry
 from blysk.sim.api.scene_file import read_scene_file
 from blysk.sim.cli.main import main
 
-from .commandline import PROGRAM, files
+from .commandline import PROGRAM, files, wait
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -72,12 +71,8 @@ def test_interrupt():
         [*PROGRAM, "render", "teapot", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
-        idle_timeout = time.monotonic() + 60
         # The simulation has begun when its waveforms grow.
-        while not any(path.stat().st_size for path in Path().iterdir()):
-            assert process.poll() is None
-            assert time.monotonic() < idle_timeout
-            time.sleep(0.02)
+        wait(process, lambda: any(path.stat().st_size for path in Path().iterdir()), 60)
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=60)
     finally:

@@ -70,9 +70,8 @@ def figures_of(name):
 
 def test_scene_file_says_what_the_options_say(scenes, capsys):
     assert main(["render", "scenes/a.toml", *SLOW, "--json", "file.json"]) == 0
-    assert (
-        main(["render", "scenes/a.obj", *SCENE_OPTIONS, *SLOW, "-o", "b.png", "--json", "options.json"]) == 0
-    )
+    options = [*SCENE_OPTIONS, *SLOW, "-o", "b.png", "--json", "options.json"]
+    assert main(["render", "scenes/a.obj", *options]) == 0
     assert capsys.readouterr().err == ""
     assert Path("a-blysk.png").read_bytes() == Path("b.png").read_bytes()
     assert figures_of("file.json") == figures_of("options.json")
@@ -83,20 +82,8 @@ def test_scene_file_says_what_the_options_say(scenes, capsys):
 
 @pytest.mark.long
 def test_options_go_before_the_scene_file(scenes, capsys):
-    given = [
-        "--size",
-        "32x24",
-        "--exponent",
-        "70",
-        "--light",
-        "0,0,1",
-        "--method",
-        "quadratic",
-        "--model",
-        "cosquad",
-        "--view",
-        "1,2,3",
-    ]
+    given = ["--size", "32x24", "--exponent", "70", "--light", "0,0,1", "--view", "1,2,3"]
+    given += ["--method", "quadratic", "--model", "cosquad"]
     assert main(["render", "scenes/a.toml", *given, "-o", "a.png", "--json", "a.json"]) == 0
     options = [*SCENE_OPTIONS]
     for name in ("--light", "--light=-1,1,1,0.5,0.25,0"):
@@ -161,53 +148,41 @@ def test_no_light(capsys):
     assert colors.tolist() == [[0x1A, 0x1C, 0x20], [51, 51, 51]]
 
 
+OVER_THE_CENTRE = "camera.position = [0, 9, 0]\ncamera.target = [0, 0, 0]"
+
+
 @pytest.mark.parametrize(
-    ("text", "options", "thing", "says"),
+    ("text", "options", "key", "says"),
     [
-        ("mesh.file = 'no.obj'", [], "a.toml, mesh.file", "no.obj, there is no such file"),
-        ("mesh.file = 'b.toml'", [], "a.toml, mesh.file", "unknown mesh type '.toml'"),
-        ("mesh.file = '.'", [], "a.toml, mesh.file", "is no file's name"),
-        ("mesh.file = 'empty.obj'", [], "a.toml, mesh.file", "empty.obj, the file is empty"),
-        ("mesh.file = 'empty.obj'", ["--triangles", "100"], "--triangles 100", "leave it out"),
-        ("mesh.file = 'teapot'\nexponent = 3", [], "a.toml, exponent", "unknown key"),
-        ("mesh.file = 'teapot'\nsize = ]", [], "a.toml", "is no TOML"),
-        ("pipeline = {method = 'chord', operand = 'cosine'}", [], "a.toml, pipeline.operand", "leave it out"),
-        (
-            "pipeline = {setup_interval = 26}",
-            ["--method", "linear"],
-            "a.toml, pipeline.setup_interval",
-            "linear",
-        ),
-        ("lights = [{direction = [1, 1, 1], color = 30}]", [], "a.toml, lights", "make the light darker"),
-        (
-            "camera.position = [0, 0, 0]\ncamera.target = [0, 0, 0]",
-            [],
-            "a.toml, camera.position",
-            "its target",
-        ),
-        ("camera.position = [1e300, 0, 0]", [], "a.toml, camera.position", "too far away"),
-        ("camera.view = [0, 1, 0]", ["--frames", "2"], "a.toml, camera.view", "looks along the axis"),
-        (
-            "camera.position = [0, 9, 0]\ncamera.target = [0, 0, 0]",
-            ["--frames", "2"],
-            "a.toml, camera.position",
-            "axis",
-        ),
-        ("", ["--json", "a.toml"], "a.toml", "another output"),
+        ("mesh.file = 'no.obj'", [], "mesh.file", "no.obj, there is no such file"),
+        ("mesh.file = 'b.toml'", [], "mesh.file", "unknown mesh type '.toml'"),
+        ("mesh.file = '.'", [], "mesh.file", "is no file's name"),
+        ("mesh.file = 'empty.obj'", [], "mesh.file", "empty.obj, the file is empty"),
+        ("mesh.file = 'teapot'\nexponent = 3", [], "exponent", "unknown key"),
+        ("pipeline = {method = 'chord', operand = 'cosine'}", [], "pipeline.operand", "leave it out"),
+        ("pipeline.setup_interval = 26", ["--method", "linear"], "pipeline.setup_interval", "linear"),
+        ("lights = [{direction = [1, 1, 1], color = 30}]", [], "lights", "make the light darker"),
+        (OVER_THE_CENTRE.replace("9", "0"), [], "camera.position", "its target"),
+        ("camera.position = [1e300, 0, 0]", [], "camera.position", "too far away"),
+        ("camera.view = [0, 1, 0]", ["--frames", "2"], "camera.view", "looks along the axis"),
+        (OVER_THE_CENTRE, ["--frames", "2"], "camera.position", "axis"),
     ],
 )
-def test_bad_scene(refused, text, options, thing, says):
+def test_bad_scene(refused, text, options, key, says):
     Path("empty.obj").touch()
     Path("b.toml").touch()
     mesh = "" if "mesh." in text else "mesh.file = 'teapot'\n"
     Path("a.toml").write_text(mesh + text)
-    refused("render", "a.toml", *options, thing=thing, says=says)
+    refused("render", "a.toml", *options, thing=f"a.toml, {key}", says=says)
 
 
-def test_no_scene(refused):
-    refused("render", "no.toml", thing="no.toml", says="there is no such file")
-    Path("folder.toml").mkdir()
-    refused("render", "folder.toml", thing="folder.toml", says="is a folder")
+def test_bad_options_of_a_scene(refused):
+    Path("a.toml").write_text("mesh.file = 'a.obj'")
+    Path("a.obj").touch()
+    refused("render", "a.toml", "--triangles", "100", thing="--triangles 100", says="leave it out")
+    refused("render", "a.toml", "--json", "a.toml", thing="a.toml", says="another output")
+    Path("a.toml").write_text("size = ]")
+    refused("render", "a.toml", thing="a.toml", says="is no TOML")
 
 
 @pytest.mark.long
@@ -221,17 +196,7 @@ def test_point_lights(folder, refused, capsys):
     )
     assert main(["render", "a.toml", "--size", "48x36", "-o", "b.png"]) == 0
     np.testing.assert_array_equal(picture("a.png"), picture("b.png"))
-    smallest = [
-        "--specialise",
-        "--engine",
-        "pysim",
-        "--triangles",
-        "64",
-        "--size",
-        "16x12",
-        "--json",
-        "c.json",
-    ]
+    smallest = ["--specialise", "--engine", "pysim", "--triangles", "64", "--size", "16x12"]
     assert main(["render", "teapot", *local, *smallest, "--json", "c.json"]) == 0
     assert json.loads(Path("c.json").read_text())["specialisation"]["different_pixels"] == 0
     capsys.readouterr()

@@ -7,7 +7,6 @@ import os
 import re
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from PIL import Image
 
 from blysk.sim.cli.main import main
 
-from .commandline import ERROR_NAMES, PROGRAM, TINY, files, picture
+from .commandline import ERROR_NAMES, PROGRAM, TINY, files, picture, wait
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -86,8 +85,9 @@ def test_failed_figures_leave_no_frames(capsys):
 
 @pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-def test_interrupt_of_a_turntable():
-    """Ctrl-C in a terminal reaches all processes: frames done stay, whole, and no process goes on."""
+@pytest.mark.parametrize("of_all", [True, False], ids=["interrupt", "termination"])
+def test_end_of_a_turntable(of_all):
+    """Frames done stay, whole, and no process goes on: Ctrl-C reaches all processes, a termination one."""
     arguments = ["render", "teapot", "--triangles", "100", "--size", "32x24", "--engine", "pysim"]
     process = subprocess.Popen(
         [*PROGRAM, *arguments, "--frames", "200", "--jobs", "2", "-o", "a.gif"],
@@ -97,12 +97,11 @@ def test_interrupt_of_a_turntable():
         start_new_session=True,
     )
     try:
-        idle_timeout = time.monotonic() + 120
-        while not Path("a-0001.png").exists():
-            assert process.poll() is None
-            assert time.monotonic() < idle_timeout
-            time.sleep(0.02)
-        os.killpg(process.pid, signal.SIGINT)
+        wait(process, Path("a-0001.png").exists)
+        if of_all:
+            os.killpg(process.pid, signal.SIGINT)
+        else:
+            process.terminate()
         # Returns when nobody holds the pipes any more: neither the program nor one of its workers.
         output, errors = process.communicate(timeout=60)
         assert (process.returncode, output, errors) == (130, "", "blysk: interrupted\n")

@@ -8,15 +8,6 @@ import pytest
 from .scale import BEATS, scaled, script
 
 
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    """A cache of each test's own."""
-    folder = tmp_path / "cache"
-    monkeypatch.setenv("BLYSK_CACHE", str(folder))
-    monkeypatch.delenv("CXX", raising=False)
-    return folder
-
-
 @pytest.fixture(scope="module")
 def logged(tmp_path_factory):
     """A compiler that writes into `LOG` what it compiles."""

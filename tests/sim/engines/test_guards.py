@@ -87,11 +87,6 @@ def generated(component, monkeypatch):
         return cxxrtl._generate(rtlil.convert(component, name="top", emit_src=False))
 
 
-@pytest.fixture(autouse=True)
-def _cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
-
-
 def test_the_machine_is_the_same(monkeypatch):
     """Against pysim, over ten times the cycles that a new model is checked with, with stalls."""
     rng = np.random.default_rng(4)

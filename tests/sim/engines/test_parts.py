@@ -3,7 +3,6 @@
 import re
 
 import numpy as np
-import pytest
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
@@ -56,11 +55,6 @@ class Fields(Component):
                 self.o.payload[3].eq(again.as_value()[5:40] ^ both[BITS + 3 :][:50]),
             ]
         return m
-
-
-@pytest.fixture(autouse=True)
-def _cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
 
 
 def test_the_machine_is_the_same():

@@ -23,13 +23,6 @@ from .components import (
 )
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("BLYSK_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 def assert_equal(first, second):
     assert first.beats.dtype == second.beats.dtype
     np.testing.assert_array_equal(first.beats, second.beats)
