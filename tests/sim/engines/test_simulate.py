@@ -9,18 +9,7 @@ from amaranth.lib.wiring import Component, In, Out
 from blysk.sim.engines.engine import CompilerMissing, Ports, SimulationError
 from blysk.sim.engines.simulate import simulate
 
-from .components import (
-    ALL,
-    PAIR,
-    Accumulator,
-    Expander,
-    Faulty,
-    Lookup,
-    Plain,
-    Register,
-    pairs,
-    refused,
-)
+from .components import ALL, PAIR, Accumulator, Expander, Faulty, Lookup, Plain, Register, pairs, refused
 
 
 def assert_equal(first, second):
@@ -32,51 +21,54 @@ def assert_equal(first, second):
     assert first.status == second.status
 
 
+def both(component, beats, count, **options):
+    """A run of both engines, which agree."""
+    slow, fast = (
+        simulate(component, beats, count=count, engine=engine, **options) for engine in ("pysim", "cxxrtl")
+    )
+    assert (slow.engine, fast.engine) == ("pysim", "cxxrtl")
+    assert_equal(slow, fast)
+    return fast
+
+
 def stall_patterns(seed):
     rng = np.random.default_rng(seed)
-    return {
+    patterns = {
         "free": (None, None),
         "both": (rng.random(61) < 0.3, rng.random(53) < 0.7),
         "alternating": (np.array([True, False]), np.array([False, True])),
     }
+    return [
+        pytest.param(dict(zip(("input_stalls", "output_stalls"), pattern, strict=True)), id=name)
+        for name, pattern in patterns.items()
+    ]
 
 
-@pytest.mark.parametrize("stalls", stall_patterns(5).values(), ids=stall_patterns(5).keys())
+@pytest.mark.parametrize("stalls", stall_patterns(5))
 @pytest.mark.parametrize("kind", ALL)
 def test_engines_agree_with_each_other_and_with_arithmetic(kind, stalls):
     beats = pairs(120)
     expected = kind.model(beats)
-    runs = [
-        simulate(
-            kind(), beats, count=len(expected), engine=engine, input_stalls=stalls[0], output_stalls=stalls[1]
-        )
-        for engine in ("pysim", "cxxrtl")
-    ]
-    assert_equal(*runs)
-    assert [run.engine for run in runs] == ["pysim", "cxxrtl"]
-    beats = runs[0].beats
-    assert beats.tolist() == expected.tolist()
-    assert len(runs[0].cycles) == len(expected)
-    assert len(runs[0].input_cycles) == 120
+    run = both(kind(), beats, len(expected), **stalls)
+    assert run.beats.tolist() == expected.tolist()
+    assert len(run.cycles) == len(expected)
+    assert len(run.input_cycles) == 120
 
 
 def test_clocks_of_a_register():
     """A beat taken at clock k comes out at k + 1 when nobody stalls, and clock 0 is the first."""
-    for engine in ("pysim", "cxxrtl"):
-        run = simulate(Register(), pairs(9), count=9, engine=engine)
-        np.testing.assert_array_equal(run.input_cycles, np.arange(9))
-        np.testing.assert_array_equal(run.cycles, np.arange(1, 10))
-        assert run.total_cycles == 10
+    run = both(Register(), pairs(9), 9)
+    np.testing.assert_array_equal(run.input_cycles, np.arange(9))
+    np.testing.assert_array_equal(run.cycles, np.arange(1, 10))
+    assert run.total_cycles == 10
 
 
-@pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
-def test_stall_patterns_are_by_clock_and_an_offer_is_held(engine):
+def test_stall_patterns_are_by_clock_and_an_offer_is_held():
     # Offers start at cycles 1, 4, 7 ... (stall 1, 0, 1); the sink is ready at cycles 0, 5, 10, 15 ...
-    run = simulate(
+    run = both(
         Register(),
         pairs(3),
-        count=3,
-        engine=engine,
+        3,
         input_stalls=np.array([True, False, True]),
         output_stalls=np.array([False, True, True, True, True]),
     )
@@ -86,52 +78,34 @@ def test_stall_patterns_are_by_clock_and_an_offer_is_held(engine):
     np.testing.assert_array_equal(run.cycles, [5, 10, 15])
 
 
-@pytest.mark.parametrize("stalls", stall_patterns(6).values(), ids=stall_patterns(6).keys())
+@pytest.mark.parametrize("stalls", stall_patterns(6))
 def test_constants_writes_and_status(stalls):
     beats = pairs(50)
     rows = {"row": np.array([3, 0, 1, 2, 0]), "value": np.array([-2048, 5, 2047, -1, 99])}
     constants = {"scale": np.array([-256, 255]), "unused": (1 << 40) - 1}
-    runs = [
-        simulate(
-            Accumulator(),
-            beats,
-            count=50,
-            engine=engine,
-            constants=constants,
-            write=rows,
-            input_stalls=stalls[0],
-            output_stalls=stalls[1],
-        )
-        for engine in ("pysim", "cxxrtl")
-    ]
-    assert_equal(*runs)
+    run = both(Accumulator(), beats, 50, constants=constants, write=rows, **stalls)
     x = beats["x"]
     memory = np.array([99, 2047, -1, -2048])
     scale = np.where(x & 4, 255, -256)
-    np.testing.assert_array_equal(runs[1].beats, scale * memory[x % 4] + beats["y"])
-    assert runs[1].status["writes"] == 5
-    assert runs[1].status["total"] == beats["y"].sum()
-    assert runs[1].status["busy"] == 0
+    np.testing.assert_array_equal(run.beats, scale * memory[x % 4] + beats["y"])
+    assert run.status["writes"] == 5
+    assert run.status["total"] == beats["y"].sum()
+    assert run.status["busy"] == 0
     # Writes go at cycles 1, 3, 5, 7, 9, before any input beat.
-    assert runs[1].input_cycles[0] > 9
+    assert run.input_cycles[0] > 9
 
 
 def test_plain_signed_members():
     beats = pairs(30)["y"]
-    runs = [
-        simulate(Plain(), beats, count=30, engine=engine, constants=-32768, write=np.array([7, -16]))
-        for engine in ("pysim", "cxxrtl")
-    ]
-    assert_equal(*runs)
-    np.testing.assert_array_equal(runs[0].beats, beats * -32768 - 16)
-    assert runs[0].status == -16
+    run = both(Plain(), beats, 30, constants=-32768, write=np.array([7, -16]))
+    np.testing.assert_array_equal(run.beats, beats * -32768 - 16)
+    assert run.status == -16
 
 
-@pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
-def test_writes_between_beats(engine):
+def test_writes_between_beats():
     """A write is offered when so many beats are taken, beside the next one, which Plain takes at once."""
     beats, write, after = pairs(30)["y"], np.array([7, -16, 5, 3, -1]), np.array([0, 10, 10, 20, 30])
-    run = simulate(Plain(), beats, count=30, engine=engine, constants=-32768, write=write, write_after=after)
+    run = both(Plain(), beats, 30, constants=-32768, write=write, write_after=after)
     # Beat k is taken at cycle k + 1, the writes at cycles 0, 11, 12, 21 and 31.
     np.testing.assert_array_equal(run.input_cycles, np.arange(30) + 1)
     np.testing.assert_array_equal(run.beats - beats * -32768, [7] * 11 + [-16] + [5] * 9 + [3] * 9)
@@ -143,26 +117,17 @@ def test_members_without_bits():
         constants: In(data.StructLayout({}))
         status: Out(unsigned(0))
 
-    runs = [
-        simulate(Empty(), pairs(5), count=5, engine=engine, constants={}) for engine in ("pysim", "cxxrtl")
-    ]
-    assert_equal(*runs)
-    assert runs[0].status == 0
+    assert both(Empty(), pairs(5), 5, constants={}).status == 0
 
 
 def test_count_none_takes_what_comes():
     beats = pairs(40)
-    runs = [
-        simulate(Expander(), beats, count=None, engine=engine, idle_timeout=50)
-        for engine in ("pysim", "cxxrtl")
-    ]
-    assert_equal(*runs)
-    assert runs[0].beats.tolist() == Expander.model(beats).tolist()
+    run = both(Expander(), beats, None, idle_timeout=50)
+    assert run.beats.tolist() == Expander.model(beats).tolist()
 
 
-@pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
-def test_no_beats(engine):
-    run = simulate(Register(), pairs(0), count=0, engine=engine)
+def test_no_beats():
+    run = both(Register(), pairs(0), 0)
     assert (len(run.beats), len(run.cycles), run.total_cycles, run.status) == (0, 0, 0, None)
 
 
@@ -199,11 +164,8 @@ def test_faults_are_caught(fault, engine):
 
 
 def test_no_fault_is_no_error():
-    for engine in ("pysim", "cxxrtl"):
-        run = simulate(
-            Faulty(None), pairs(20), count=20, engine=engine, output_stalls=ONE_STALL, idle_timeout=100
-        )
-        np.testing.assert_array_equal(run.beats, pairs(20)["y"])
+    run = both(Faulty(None), pairs(20), 20, output_stalls=ONE_STALL, idle_timeout=100)
+    np.testing.assert_array_equal(run.beats, pairs(20)["y"])
 
 
 @pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])

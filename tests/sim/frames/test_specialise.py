@@ -46,15 +46,19 @@ def pixels_of(scene, design):
     return design.compute(prepare(scene, design).spans, constants)
 
 
-def assert_same_frame(scene, special):
-    """By the bit-accurate models; spans of merged materials may come in another order."""
-    frames = []
+def fitted(scene, full):
+    """A pipeline fitted to a scene, with the same frame by the bit-accurate models.
+
+    Spans of merged materials may come in another order.
+    """
+    special, frames = specialise(scene, full), []
     for drawn, design in ((scene, special.full), (special.scenes[0], special.design)):
         pixels = pixels_of(drawn, design)
         order = np.lexsort((*pixels.color.T, pixels.x, pixels.y))
         frames.append((pixels.x[order], pixels.y[order], pixels.color[order]))
-    for full, smaller in zip(*frames, strict=True):
-        np.testing.assert_array_equal(full, smaller)
+    for whole, smaller in zip(*frames, strict=True):
+        np.testing.assert_array_equal(whole, smaller)
+    return special
 
 
 def reasons(special):
@@ -71,19 +75,17 @@ def test_everything_is_needed():
     mesh = teapot(2000)
     mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 2)
     scene = scene_of((CLAY, replace(CLAY, exponent=9)), (KEY, FILL), mesh=mesh)
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert set(reasons(special)) == {"x_bits", "y_bits", "length_bits"}
-    assert_same_frame(scene, special)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
 def test_no_specular_path(style):
     scene = scene_of(replace(CLAY, specular=(0, 0, 0)))
-    special = specialise(scene, full_of(scene, style=style))
+    special = fitted(scene, full_of(scene, style=style))
     assert reasons(special)["specular"] == "no specular path: every k_s is 0"
     assert (special.design.model, special.design.gate, special.design.build.exponent) == (None, False, None)
-    assert_same_frame(scene, special)
     full, steps = special.costs()
     assert steps[0].multiplier_count <= full.multiplier_count - (6 if style == "throughput" else 1)
     assert steps[-1].register_bits < steps[0].register_bits < 0.65 * full.register_bits
@@ -95,27 +97,24 @@ def test_no_specular_path(style):
 def test_no_highlight_by_the_gate():
     """A light from behind: its half-way vector is far from every normal."""
     scene = scene_of(replace(CLAY, exponent=500), (Light((0.3, 0.3, -1)),), mesh=FLOOR)
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["specular"] == "no specular path: the gate proves that no span holds a highlight"
-    assert_same_frame(scene, special)
 
 
 def test_no_gate():
     """At exponent 1 the highlight is everywhere."""
     scene = scene_of(replace(CLAY, exponent=1))
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["gate"] == "no highlight gate: every span may hold a highlight"
     assert not special.design.gate
-    assert_same_frame(scene, special)
     assert "gate" not in reasons(specialise(scene, full_of(scene, gate=False)))
 
 
 @pytest.mark.long
 def test_fixed_exponent():
     scene = scene_of()
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["exponent"] == "exponent fixed at 50: PROM folded"
-    assert_same_frame(scene, special)
     full, step = (cost_of(ShadingPipelineUnit(special.full.built(exponent=x))) for x in (None, 50))
     assert step.rom_bits <= full.rom_bits - 2 * 1024 * 17
     assert step.multiplier_count == full.multiplier_count - 1
@@ -127,14 +126,12 @@ def test_equal_materials():
     mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 3)
     other = replace(CLAY, diffuse=(0.1, 0.2, 0.3))
     scene = scene_of((CLAY, other, CLAY), mesh=mesh)
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["materials"] == "a smaller memory of materials: 2 of 3 differ"
-    assert_same_frame(scene, special)
     scene = scene_of((CLAY, CLAY, CLAY), mesh=mesh)
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["materials"] == "no memory of materials: 1 of 3 differ"
     assert (special.design.materials, special.design.build.exponent) == (1, 50)
-    assert_same_frame(scene, special)
     full = cost_of(ShadingPipelineUnit(special.full))
     assert cost_of(ShadingPipelineUnit(special.design)).ram_bits < full.ram_bits
 
@@ -142,10 +139,9 @@ def test_equal_materials():
 def test_black_lights():
     """No span is cut for a light that is off; one that is on counts, even where nothing shows it."""
     scene = scene_of(lights=(KEY, BLACK, FILL))
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["lights"] == "1 of 3 lights: they light nothing"
     assert special.scenes[0].lights == (KEY, FILL)
-    assert_same_frame(scene, special)
     faint = scene_of(lights=(KEY, Light((0, 0, 1), (1e-9,) * 3), FILL))
     assert "lights" not in reasons(specialise(faint, full_of(faint)))
     assert "lights" in reasons(specialise(faint, preset("linear", "cosquad", lights=3)))
@@ -156,9 +152,8 @@ def test_factors_of_lights():
     lamp = Light(position=(1, 2, 3), attenuation=(1, 1, 0))
     scene = scene_of(lights=(BLACK, KEY, lamp), size=(60, 50))
     full = preset("chord-local", "cosquad", 3, factors=(0, 2))
-    special = specialise(scene, full)
+    special = fitted(scene, full)
     assert special.design.factors == (1,)
-    assert_same_frame(scene, special)
     matt = replace(scene, material=replace(CLAY, specular=(0, 0, 0)))
     assert specialise(matt, full).design.factors == ()
 
@@ -184,14 +179,12 @@ def test_methods_that_no_gate_serves():
     """Spans that are cut by their error are not cut by a light that is off."""
     scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
     for method in ("chord-local", "quadratic-published", "renormalise"):
-        special = specialise(scene, preset(method, "cosquad", lights=3))
+        special = fitted(scene, preset(method, "cosquad", lights=3))
         assert "lights" in reasons(special)
         assert reasons(special)["exponent"] == "exponent fixed at 400: PROM folded"
-        assert_same_frame(scene, special)
     dark = scene_of(lights=(BLACK,))
-    special = specialise(dark, preset("chord-local", "cosquad"))
+    special = fitted(dark, preset("chord-local", "cosquad"))
     assert reasons(special)["lights"] == "no light path: no light lights anything"
-    assert_same_frame(dark, special)
 
 
 @pytest.mark.parametrize(
@@ -200,30 +193,27 @@ def test_methods_that_no_gate_serves():
 )
 def test_no_light_at_all(material, lights):
     scene = scene_of(material, lights)
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["lights"] == "no light path: no light lights anything"
-    assert_same_frame(scene, special)
     assert cost_of(ShadingPipelineUnit(special.design)).multiplier_count == 0
 
 
 def test_one_channel():
     scene = scene_of(Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 30))
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     assert reasons(special)["grey"] == "one channel of three: every colour is grey"
-    assert_same_frame(scene, special)
     tinted = replace(scene, lights=(Light((0, 0, 1), (1, 1, 0.9)),))
     assert "grey" not in reasons(specialise(tinted, full_of(tinted)))
 
 
 def test_widths():
     scene = scene_of(size=(512, 300))
-    special = specialise(scene, full_of(scene))
+    special = fitted(scene, full_of(scene))
     longest = prepare(scene, special.full).spans.length.max()
     bits = int(longest).bit_length()
     assert (special.design.x_bits, special.design.y_bits, special.design.length_bits) == (9, 9, bits)
     assert reasons(special)["length_bits"] == f"length in {bits} bits: the longest span has {longest} pixels"
     assert reasons(special)["x_bits"] == "x in 9 bits: 512 columns"
-    assert_same_frame(scene, special)
 
 
 @pytest.mark.long
