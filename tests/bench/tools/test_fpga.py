@@ -5,8 +5,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -21,6 +19,7 @@ from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import RenderUnit
 from blysk.sim.cli.main import main
 
+from ...sim.cli.commandline import PROGRAM, wait
 from .test_place_and_route import tools
 
 
@@ -109,18 +108,10 @@ def test_registers_stay_outside_where_asked_for(options, calls, cache, monkeypat
 
 
 @pytest.mark.parametrize(("options", "target"), [([], 150), (["--target", "113"], 113)])
-def test_target_of_the_router(options, target, calls, cache, tmp_path, monkeypatch):
-    run, given = place_and_route.ToolRunner.run, []
-
-    def kept(self, name, code, arguments, *others, **more):
-        given.append(arguments)
-        run(self, name, code, arguments, *others, **more)
-
-    monkeypatch.setattr(place_and_route.ToolRunner, "run", kept)
+def test_target_of_the_router(options, target, calls, cache, tmp_path):
     path = tmp_path / "out.json"
     assert main(["fpga", "--unit", "diffuse", "--seeds", "1", *options, "--json", str(path)]) == 0
-    asked = given[-1]
-    assert asked[asked.index("--freq") + 1] == str(target)
+    assert calls.arguments[calls.arguments.index("--freq") + 1] == str(target)
     assert json.loads(path.read_text())["target_mhz"] == target
 
 
@@ -191,10 +182,7 @@ def test_designs():
         ),
         (["--seeds", "0"], "blysk: --seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "blysk: --jobs no: not a whole number; give"),
-        (
-            ["--unit", "fuse"],
-            "blysk: --unit fuse: unknown unit; use gradient_setup, halfway_vector, ",
-        ),
+        (["--unit", "fuse"], "blysk: --unit fuse: unknown unit; use gradient_setup, halfway_vector, "),
         (["--unit", "gpq", "--method", "chord"], "blysk: --method: is for the pipeline; leave it out, or"),
         (["--unit", "gpq", "--every-method"], "blysk: --every-method: is for the pipeline; leave it out"),
         (["--method", "chord", "--every-method"], "blysk: --method: is one of every method; leave it out"),
@@ -232,23 +220,14 @@ def test_missing_tools_are_one_line_that_names_the_extra(which, family, capsys, 
 def test_interrupt_leaves_nothing_behind(cache, tmp_path):
     folder = tmp_path / "temporary"
     folder.mkdir()
-    environment = {**os.environ, "TMPDIR": str(folder)}
-    arguments = ["fpga", "--method", "chord"]
     process = subprocess.Popen(
-        [
-            sys.executable,
-            "-c",
-            "import sys; from blysk.sim.cli.main import main; sys.exit(main())",
-            *arguments,
-        ],
-        env=environment,
+        [*PROGRAM, "fpga", "--method", "chord"],
+        env={**os.environ, "TMPDIR": str(folder)},
         stderr=subprocess.PIPE,
         text=True,
         cwd=Path(__file__).parents[3],
     )
-    while not list(folder.glob("blysk-*/top.il")):
-        assert process.poll() is None
-        time.sleep(0.05)
+    wait(process, lambda: list(folder.glob("blysk-*/top.il")))
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 130

@@ -1,7 +1,6 @@
 # amaranth: UnusedElaboratable=no
 """Place and route: what is counted, what is timed, what is kept, and what is refused."""
 
-import json
 import time
 
 import pytest
@@ -98,15 +97,11 @@ def test_cells_of_nexus():
         (NEXUS, ("MULTADDSUB18X18", {"REGOUTPUT": "BYPASS"}, 8, 9), "MULTADDSUB18X18"),
     ],
 )
-def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, monkeypatch):
-    def run(self, tool, code, arguments, folder, text="", given_up=None):
-        assert tool == "Yosys"
-        (folder / "netlist.json").write_text(json.dumps(netlist(("LUT4", {}, 3, 4), cell)))
-
-    monkeypatch.setattr(place_and_route.ToolRunner, "run", run)
-    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
+def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, calls, cache):
+    calls.cells = [("LUT4", {}, 3, 4), cell]
     with pytest.raises(ToolError, match=f"has a cell {name}, which nextpnr does not time paths through"):
         lay_out("counter", Counter(), 1, family=family)
+    assert calls == [("Yosys",)]
 
 
 @pytest.mark.parametrize(
@@ -119,23 +114,14 @@ def test_what_nextpnr_does_not_time_is_not_placed(family, cell, name, cache, mon
         (NEXUS, "MULT18X18", 56, "multipliers"),
     ],
 )
-def test_what_does_not_fit_is_not_placed(family, cell, most, name, cache, monkeypatch):
+def test_what_does_not_fit_is_not_placed(family, cell, most, name, calls, cache):
     """nextpnr's static placer would never end."""
-    count = most
-
-    def run(self, tool, code, arguments, folder, text="", given_up=None):
-        if tool == "Yosys":
-            (folder / "netlist.json").write_text(json.dumps(netlist(*[(cell, {}, 3, 4)] * count)))
-        else:
-            raise ToolError("it is placed")
-
-    monkeypatch.setattr(place_and_route.ToolRunner, "run", run)
-    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
-    with pytest.raises(ToolError, match=r"^it is placed$"):
-        lay_out("counter", Counter(), 1, family=family)
-    count += 1
-    with pytest.raises(TooLarge, match=f"^does not fit: {count:,} {name}, ports too, on {most:,} of the "):
-        lay_out("counter", Counter(), 1, family=family)
+    calls.cells = [(cell, {}, 3, 4)] * most
+    lay_out("fits", Counter(), 1, family=family)
+    calls.cells = [(cell, {}, 3, 4)] * (most + 1)
+    with pytest.raises(TooLarge, match=f"^does not fit: {most + 1:,} {name}, ports too, on {most:,} of the "):
+        lay_out("counter", Counter(23), 1, family=family)
+    assert calls == [("Yosys",), ("nextpnr", "1"), ("Yosys",)]
 
 
 def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
@@ -158,14 +144,8 @@ def test_what_finds_no_place_does_not_fit(calls, cache, monkeypatch):
 def test_every_port_has_a_register():
     unit = DiffuseUnit()
     wrapped = Registered(unit)
-    assert set(wrapped.signature.members) == {
-        "i__payload",
-        "i__valid",
-        "i__ready",
-        "o__payload",
-        "o__valid",
-        "o__ready",
-    }
+    parts = ("payload", "valid", "ready")
+    assert set(wrapped.signature.members) == {f"{port}__{part}" for port in "io" for part in parts}
     bits = sum(len(getattr(wrapped, name)) for name in wrapped.signature.members)
     assert cost_of(wrapped).register_bits == cost_of(DiffuseUnit()).register_bits + bits
 
@@ -207,20 +187,11 @@ def test_what_is_cached_runs_no_tool(calls, cache):
 @pytest.mark.parametrize(
     ("luts", "placer"), [(place_and_route._MANY - 1, ()), (place_and_route._MANY, ECP5.large)]
 )
-def test_placer_by_size(luts, placer, cache, monkeypatch):
+def test_placer_by_size(luts, placer, calls, cache):
     """Hardly any logic would never end in the static placer."""
-    given = []
-
-    def run(self, name, code, arguments, folder, text="", given_up=None):
-        if name == "Yosys":
-            (folder / "netlist.json").write_text(json.dumps(netlist(*[("LUT4", {}, 3, 4)] * luts)))
-        else:
-            given.extend(arguments)
-            (folder / "1.json").write_text(json.dumps(REPORT))
-
-    monkeypatch.setattr(place_and_route.ToolRunner, "run", run)
-    monkeypatch.setattr(place_and_route, "versions_of", lambda family: {})
+    calls.cells = [("LUT4", {}, 3, 4)] * luts
     lay_out("counter", Counter(), 1)
+    given = calls.arguments
     place = given.index("--placer") if placer else 0
     assert ("--placer" in given) == bool(placer)
     assert tuple(given[place : place + len(placer)]) == placer

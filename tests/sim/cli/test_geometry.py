@@ -39,18 +39,6 @@ def test_picture_and_figures(capsys):
     assert "the same method and model in float64" not in printed
 
 
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (["--specialise"], "a specialised pipeline takes spans; leave out specialise"),
-        (["--method", "chord-local"], "triangles give normals, and chord-local takes values"),
-    ],
-)
-def test_what_triangles_cannot_be_drawn_with(refused, options, says):
-    """One line of reason and remedy."""
-    refused("render", *SMALL, *HARDWARE, *options, thing="--geometry hardware", says=says)
-
-
 @pytest.mark.long
 def test_coarse_depth_test():
     """The same picture, of fewer pixels that were shaded."""
@@ -65,11 +53,6 @@ def test_coarse_depth_test():
     assert coarse["counts"]["dropped_pixels"] > 0.05 * plain["pixels"]
     # In a picture as small as this the triangles' setup takes the time.
     assert coarse["cycles"] < 1.01 * plain["cycles"]
-
-
-def test_coarse_depth_test_of_spans(refused):
-    refused("render", *SMALL, "--coarse", thing="--coarse", says="give geometry hardware, too")
-    refused("verilog", "--coarse", "64x48", thing="--coarse", says="give --top render, too")
 
 
 def test_coarse_depth_test_in_verilog(capsys):
@@ -93,16 +76,6 @@ def test_two_setups():
     assert found["2"]["cycles"] < found["1"]["cycles"]
 
 
-def test_setups_need_triangles(refused):
-    """Of both commands, and of a scene file."""
-    needs = "spans need no triangle setup; "
-    refused("render", *SMALL, "--setups", "2", thing="--setups 2", says=needs + "give geometry hardware, too")
-    refused("verilog", "--setups", "2", thing="--setups 2", says=needs + "use top geometry or render")
-    refused("verilog", "--setups", "3", thing="--setups 3", says="give one of 1, 2")
-    Path("a.toml").write_text('[mesh]\nfile = "teapot"\n[pipeline]\nsetups = 2\n')
-    refused("render", "a.toml", thing="a.toml, pipeline.setups", says=needs)
-
-
 @pytest.mark.long
 def test_turntable():
     """Each frame is the model's; errors, cycles and counters are those of all."""
@@ -117,20 +90,6 @@ def test_turntable():
     assert figures["frames"][0]["pixels"] > 0
     assert picture(figures["frames"][0]["picture"]).shape == model.image.shape
     assert figures["frames"][0]["method_error"]["max_lsb"] < 0.6
-
-
-def test_scene_file_names_the_key(refused):
-    """Where the file asks for it."""
-    Path("a.toml").write_text(
-        '[mesh]\nfile = "teapot"\n[pipeline]\ngeometry = "hardware"\nspecialise = true\n'
-    )
-    refused("render", "a.toml", thing="a.toml, pipeline.geometry", says="takes spans")
-
-
-def test_unknown(refused):
-    """Both commands know the two names."""
-    for command in (["render", "teapot"], ["verilog"]):
-        refused(*command, "--geometry", "x", thing="--geometry x", says="use one of software, hardware")
 
 
 @pytest.mark.long
@@ -163,26 +122,48 @@ def test_same_from_python(capsys):
     assert "_geometry_normals_normaliser" not in text
 
 
-def test_verilog_refuses(refused):
-    """Values of spans; and a bench that would send spans."""
-    refused("verilog", *HARDWARE, "--method", "chord-local", thing="--geometry hardware", says="takes values")
-    refused("verilog", *HARDWARE, "--testbench", "a", thing="--testbench", says="takes triangles")
+RENDER, VERILOG = ("render", *SMALL), ("verilog",)
+POINT_LIGHT = "--point-light", "3,4,5"
+SPANS = "a specialised pipeline takes spans; leave out specialise"
+VALUES = "triangles give normals, and chord-local takes values"
+LOCAL = "--method", "chord-local"
+NO_SETUP = "spans need no triangle setup; "
+UNKNOWN = "use one of software, hardware"
 
 
-@pytest.mark.parametrize("method", ["chord", "chord-local"])
-def test_local_light_needs_spans(refused, method):
-    """Another method does not help: of triangles none serves a point light."""
-    options = ["--method", method, "--point-light", "3,4,5"]
-    refused(
-        "render",
-        *SMALL,
-        *HARDWARE,
-        *options,
-        thing="--geometry hardware",
-        says="the values of a span; use software",
-    )
+@pytest.mark.parametrize(
+    ("arguments", "thing", "says"),
+    [
+        ((*RENDER, "--geometry", "x"), "--geometry x", UNKNOWN),
+        ((*VERILOG, "--geometry", "x"), "--geometry x", UNKNOWN),
+        ((*RENDER, *HARDWARE, "--specialise"), "", SPANS),
+        # Values of spans; another method does not help: of triangles none serves a point light.
+        ((*RENDER, *HARDWARE, *LOCAL), "", VALUES),
+        ((*RENDER, *HARDWARE, *POINT_LIGHT), "", "the values of a span; use software"),
+        ((*RENDER, *HARDWARE, *POINT_LIGHT, *LOCAL), "", "the values of a span; use software"),
+        # The remedy is not one that is refused, too.
+        ((*RENDER, *HARDWARE, "--short-words"), "--short-words", "leave it out"),
+        ((*RENDER, "--coarse"), "--coarse", "give geometry hardware, too"),
+        ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "give geometry hardware, too"),
+        ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
+        # It would send spans.
+        ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
+        ((*VERILOG, "--coarse", "64x48"), "--coarse", "give --top render, too"),
+        ((*VERILOG, "--setups", "2"), "--setups 2", NO_SETUP + "use top geometry or render"),
+        ((*VERILOG, "--setups", "3"), "--setups 3", "give one of 1, 2"),
+    ],
+)
+def test_what_is_refused(refused, arguments, thing, says):
+    refused(*arguments, thing=thing or "--geometry hardware", says=says)
 
 
-def test_short_words_need_spans(refused):
-    """Their remedy is not one that is refused, too."""
-    refused("render", *SMALL, *HARDWARE, "--short-words", thing="--short-words", says="leave it out")
+@pytest.mark.parametrize(
+    ("text", "key", "says"),
+    [
+        ("geometry = 'hardware'\nspecialise = true", "geometry", "takes spans"),
+        ("setups = 2", "setups", NO_SETUP),
+    ],
+)
+def test_what_is_refused_of_a_scene_file(refused, text, key, says):
+    Path("a.toml").write_text(f"[mesh]\nfile = 'teapot'\n[pipeline]\n{text}\n")
+    refused("render", "a.toml", thing=f"a.toml, pipeline.{key}", says=says)
