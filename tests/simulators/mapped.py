@@ -14,7 +14,7 @@ from blysk.bench.quality.equivalence import yosys
 from blysk.bench.tools.families import ECP5
 from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE
 
-__all__ = ["cells", "core", "map_component", "same", "verilog_of"]
+__all__ = ["cells", "connect", "core", "first", "map_component", "same", "swap", "verilog_of"]
 
 _YOSYS_CELLS = ("LUT2", "LUT4", "PFUMX", "L6MUX21", "TRELLIS_FF", "TRELLIS_DPR16X4", "CCU2C")
 """Cells that Yosys has models of."""
@@ -58,6 +58,20 @@ def _ours() -> str:
 def cells() -> str:
     """Models of the cells: Yosys's, and ours where Yosys has black boxes."""
     return cells_of(*_YOSYS_CELLS) + _ours()
+
+
+def first(cells: dict[str, Any], kind: str) -> dict[str, Any]:
+    """The first cell of a kind, to be changed."""
+    return next(cell for cell in cells.values() if cell["type"] == kind)
+
+
+def swap(cell: dict[str, Any], one: str, other: str) -> None:
+    pins = cell["connections"]
+    pins[one], pins[other] = pins[other], pins[one]
+
+
+def connect(cell: dict[str, Any], pin: str, bit: str) -> None:
+    cell["connections"][pin] = [bit]
 
 
 def core(component: Component, text: str) -> str:

@@ -19,8 +19,8 @@ from blysk.sim.frames.testbench import pixel_beats, teapot_frame
 from blysk.sim.units.record import length_of
 from blysk.sim.units.registry import RECORDS
 
-from .mapped import core, map_component, same, verilog_of
-from .verilog_bench import BenchError, VerilogBench, assert_beats, missing_tool
+from .mapped import connect, core, first, map_component, same, swap, verilog_of
+from .verilog_bench import BenchError, VerilogBench, assert_beats, missing_tool, pauses
 
 pytestmark = pytest.mark.skipif(
     tool_versions()["pyosys"] is None or bool(missing_tool("icarus")),
@@ -82,8 +82,7 @@ def check(tmp_path, mapped):
         netlist, absorbed = absorb_registers(mapped(name, variant))
         change(netlist["modules"]["top"]["cells"])
         bench = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)))
-        stalls = {"input_stalls": rng.random(997) < 0.3, "output_stalls": rng.random(1009) < 0.3}
-        sent = {"constants": case.constants, "write": case.write, **stalls}
+        sent = {"constants": case.constants, "write": case.write, **pauses(rng)}
         found = bench.run("icarus", case.beats, length_of(expected), **sent)
         assert_beats(found.beats, expected)
         return absorbed
@@ -103,67 +102,37 @@ def test_unit_with_a_memory(check):
     assert absorbed.words == absorbed.products == 1
 
 
-def first(cells, kind):
-    return next(cell for cell in cells.values() if cell["type"] == kind)
-
-
-def wrong_enable(cells):
-    """A product is taken while the unit waits."""
-    multiplier = first(cells, "MULT18X18D")
-    multiplier["connections"][multiplier["parameters"]["REG_OUTPUT_CE"]] = ["1"]
-
-
-def wrong_operand_bit(cells):
-    pins = first(cells, "MULT18X18D")["connections"]
-    pins["A3"], pins["A4"] = pins["A4"], pins["A3"]
-
-
-def wrong_product_bit(cells):
-    pins = first(cells, "MULT18X18D")["connections"]
-    pins["P20"], pins["P21"] = pins["P21"], pins["P20"]
-
-
-def no_register(cells):
-    """A product is not held while the unit waits, and comes a cycle early."""
-    first(cells, "MULT18X18D")["parameters"]["REG_OUTPUT_CLK"] = "NONE"
-
-
-def in_reset(cells):
-    first(cells, "MULT18X18D")["connections"]["RST0"] = ["1"]
+FAULTS = {
+    # A product is taken while the unit waits.
+    "wrong enable": lambda cell: connect(cell, cell["parameters"]["REG_OUTPUT_CE"], "1"),
+    "wrong operand bit": lambda cell: swap(cell, "A3", "A4"),
+    "wrong product bit": lambda cell: swap(cell, "P20", "P21"),
+    # A product is not held while the unit waits, and comes a cycle early.
+    "no register": lambda cell: cell["parameters"].update(REG_OUTPUT_CLK="NONE"),
+    "in reset": lambda cell: connect(cell, "RST0", "1"),
+}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "inject", [wrong_enable, wrong_operand_bit, wrong_product_bit, no_register, in_reset]
-)
-def test_injected_faults_are_found(check, inject):
+@pytest.mark.parametrize("fault", FAULTS)
+def test_injected_faults_are_found(check, fault):
     with pytest.raises((AssertionError, BenchError)):
-        check("dot_product", change=inject)
+        check("dot_product", change=lambda cells: FAULTS[fault](first(cells, "MULT18X18D")))
 
 
-def word_always_taken(cells):
-    """A word is not held while the unit waits."""
-    pins = first(cells, "DP16KD")["connections"]
-    pins["OCEA"] = pins["OCEB"] = ["1"]
+MEMORY_FAULTS = {
+    # A word is not held while the unit waits.
+    "word always taken": lambda cell: cell["connections"].update(OCEA=["1"], OCEB=["1"]),
+    "half a word without register": lambda cell: cell["parameters"].update(REGMODE_A="NOREG"),
+    "no word": lambda cell: connect(cell, "OCEB", "0"),
+    "wrong word bit": lambda cell: swap(cell, "DOB4", "DOB5"),
+}
 
 
-def half_a_word_without_register(cells):
-    first(cells, "DP16KD")["parameters"]["REGMODE_A"] = "NOREG"
-
-
-def no_word(cells):
-    first(cells, "DP16KD")["connections"]["OCEB"] = ["0"]
-
-
-def wrong_word_bit(cells):
-    pins = first(cells, "DP16KD")["connections"]
-    pins["DOB4"], pins["DOB5"] = pins["DOB5"], pins["DOB4"]
-
-
-@pytest.mark.parametrize("inject", [word_always_taken, half_a_word_without_register, no_word, wrong_word_bit])
-def test_faults_injected_in_a_memory_are_found(check, inject):
+@pytest.mark.parametrize("fault", MEMORY_FAULTS)
+def test_faults_injected_in_a_memory_are_found(check, fault):
     with pytest.raises((AssertionError, BenchError)):
-        check(**READS, change=inject)
+        check(**READS, change=lambda cells: MEMORY_FAULTS[fault](first(cells, "DP16KD")))
 
 
 @pytest.mark.long
@@ -186,14 +155,12 @@ def test_a_frame_of_a_pipeline(design, tmp_path):
         # Icarus simulates some ten cycles a second of such a netlist; the proof is of every cycle.
         spans = spans[:: len(spans) // 20]
         pixels = design.compute(spans, constants)
-    rng = np.random.default_rng(2026)
     found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path))).run(
         "icarus",
         beats_of(unit, spans),
         len(pixels.x),
         write=writes_of(constants),
-        input_stalls=rng.random(997) < 0.3,
-        output_stalls=rng.random(1009) < 0.3,
+        **pauses(np.random.default_rng(2026)),
     )
     assert_beats(found.beats, pixel_beats(pixels))
     assert len(np.unique(pixels.color)) > 10

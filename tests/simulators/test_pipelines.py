@@ -11,7 +11,7 @@ from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats, teapot_frame
 from blysk.sim.units.registry import RECORDS
 
-from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool
+from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool, pauses
 
 PIPELINES = {name: given.unit for name, given in RECORDS["pipeline"].variants.items() if not given.long}
 QUICK = ("chord, blinn",)
@@ -29,14 +29,12 @@ def check(tmp_path):
         unit = PIPELINES[name]()
         design = unit.parameters
         spans, constants, pixels = teapot_frame(design, *size)
-        rng = np.random.default_rng(2026)
         found = VerilogBench(unit, tmp_path, **options).run(
             simulator,
             beats_of(unit, spans),
             len(pixels.x),
             write=writes_of(constants),
-            input_stalls=rng.random(997) < 0.3,
-            output_stalls=rng.random(1009) < 0.3,
+            **pauses(np.random.default_rng(2026)),
         )
         assert_beats(found.beats, pixel_beats(pixels))
         assert len(np.unique(pixels.color)) > 10 * min(design.lights, 1)

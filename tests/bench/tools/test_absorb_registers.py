@@ -12,7 +12,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
 from blysk.bench.tools.place_and_route import tool_versions
 
-from ...simulators.mapped import map_component, same
+from ...simulators.mapped import connect, first, map_component, same, swap
 
 pytestmark = pytest.mark.skipif(tool_versions()["pyosys"] is None, reason="pyosys is not installed")
 
@@ -194,15 +194,6 @@ def test_registers_behind_a_memory(name, mapped, tmp_path):
     assert not words or same(before, after, tmp_path) == ""
 
 
-def swap(cell, one, other):
-    pins = cell["connections"]
-    pins[one], pins[other] = pins[other], pins[one]
-
-
-def connect(cell, pin, bit):
-    cell["connections"][pin] = [bit]
-
-
 MEMORY_FAULTS = {
     "never enabled": lambda cell: connect(cell, "OCEB", "0"),
     "register always enabled": lambda cell: connect(cell, "OCEB", "1"),
@@ -217,8 +208,7 @@ def test_faults_injected_in_a_memory_are_found(fault, mapped, tmp_path):
     name = "the same enable"
     before = mapped(f"read, {name}", READS[name][0])
     after = copy.deepcopy(absorb_registers(before)[0])
-    cells = after["modules"]["top"]["cells"].values()
-    MEMORY_FAULTS[fault](next(cell for cell in cells if cell["type"] == "DP16KD"))
+    MEMORY_FAULTS[fault](first(after["modules"]["top"]["cells"], "DP16KD"))
     assert "not shown to be equal" in same(before, after, tmp_path)
 
 
