@@ -1,5 +1,6 @@
 """What all tests share: the order of their groups, a limit of time, interrupts, compiled models, normals."""
 
+import importlib.util
 import os
 import re
 import signal
@@ -123,6 +124,19 @@ def model_cache(tmp_path_factory, worker_id, pytestconfig):
         # Of few cycles the compiler takes most of the time; with -O1 a model runs as fast as with -O2.
         patch.setenv("CXXFLAGS", "-O0" if "not long" in pytestconfig.option.markexpr else "-O1")
         yield
+
+
+@pytest.fixture
+def uninstalled(monkeypatch):
+    """Let a package be not installed, as far as a search for it tells."""
+
+    def uninstalled(package):
+        find = importlib.util.find_spec
+        monkeypatch.setattr(
+            importlib.util, "find_spec", lambda name, *rest: None if name == package else find(name, *rest)
+        )
+
+    return uninstalled
 
 
 @pytest.fixture(scope="session")

@@ -32,10 +32,7 @@ from blysk.sim.units.registry import RECORDS
 BASELINES = read()
 
 
-QUICK = (
-    "frames: pipeline linear, cosquad, throughput",
-    "parts: dot_product",
-)
+QUICK = "frames: pipeline linear, cosquad, throughput", "parts: dot_product"
 """Of pipelines and units; all of them take minutes."""
 
 
@@ -129,37 +126,17 @@ def test_frames_have_short_spans_and_long_ones():
 # The check.
 
 
-@pytest.mark.parametrize(("share", "found"), [(0.03, True), (0.019, False), (-0.03, True), (-0.019, False)])
-def test_three_per_cent_are_seen_and_less_than_two_are_not(share, found):
-    """Of real figures, each moved alone."""
-    entry = "parts: pipeline recurrence, cosquad, throughput"
-    for figure, value in BASELINES[entry].items():
-        moved = {**BASELINES, entry: {**BASELINES[entry], figure: round(value * (1 + share))}}
-        lines = differences(BASELINES, moved, TOLERANCE)
-        if value < 1000 and not found:
-            # A few multipliers do not move by less than one.
-            continue
-        assert bool(lines) == found
-        if found:
-            (line,) = lines
-            assert line.startswith(f"{entry}: {figure} was {value:,}, is ")
-
-
 def test_tolerance_is_two_per_cent_either_way_and_includes_its_bounds():
     for new, far in ((1020, False), (1021, True), (980, False), (979, True)):
         assert bool(differences({"x": {"cells": 1000}}, {"x": {"cells": new}}, TOLERANCE)) == far
-    assert differences({"x": {"cells": 1000}}, {"x": {"cells": 1030}}, TOLERANCE) == [
-        "x: cells was 1,000, is 1,030, +3.00%"
-    ]
-    assert differences({"x": {"cells": 3}}, {"x": {"cells": 2}}, TOLERANCE) == [
-        "x: cells was 3, is 2, -33.33%"
-    ]
+    old, new = {"x": {"cells": 1000, "memory_bits": 3}}, {"x": {"cells": 1030, "memory_bits": 2}}
+    far = ["x: cells was 1,000, is 1,030, +3.00%", "x: memory_bits was 3, is 2, -33.33%"]
+    assert differences(old, new, TOLERANCE) == far
 
 
 def test_anything_is_far_from_nothing():
-    assert differences({"x": {"multipliers": 0}}, {"x": {"multipliers": 1}}, TOLERANCE) == [
-        "x: multipliers was 0, is 1"
-    ]
+    far = ["x: multipliers was 0, is 1"]
+    assert differences({"x": {"multipliers": 0}}, {"x": {"multipliers": 1}}, TOLERANCE) == far
     assert differences({"x": {"multipliers": 0}}, {"x": {"multipliers": 0}}) == []
 
 

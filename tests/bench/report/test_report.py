@@ -2,7 +2,6 @@
 
 import contextlib
 import csv
-import importlib.util
 import json
 import os
 import re
@@ -288,10 +287,9 @@ def test_bad_options(run, tmp_path, arguments, message):
 
 
 @pytest.mark.parametrize("module", ["jinja2", "markdown_it", "flip_evaluator", "skimage"])
-def test_missing_library_is_named_before_the_work(run, tmp_path, monkeypatch, module):
+def test_missing_library_is_named_before_the_work(run, tmp_path, monkeypatch, uninstalled, module):
     environment.cache_clear()
-    find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda n, *rest: None if n == module else find(n, *rest))
+    uninstalled(module)
     if module in ("jinja2", "markdown_it"):
         monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr(report, "results_of", lambda *_: pytest.fail("work was begun"))

@@ -54,11 +54,6 @@ class Pair(Component):
         return m
 
 
-@pytest.fixture(autouse=True)
-def _cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
-
-
 @pytest.mark.long
 def test_measure():
     beats = np.random.default_rng(1).integers(-(1 << 17), 1 << 17, 500_000)

@@ -59,9 +59,8 @@ class Sums(Component):
 
 
 @pytest.fixture(autouse=True)
-def _cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
-    # Speed is not the question here, and Verilator's runtime takes long to optimise.
+def _quick(monkeypatch):
+    """Speed is not the question here, and Verilator's runtime takes long to optimise."""
     quick = [
         dataclasses.replace(each, compile=tuple("-O0" if flag == "-O2" else flag for flag in each.compile))
         for each in find_compilers()

@@ -21,29 +21,22 @@ def test_help(capsys):
     assert "[SITE] [MODULE ...]" in capsys.readouterr().out
 
 
-def test_needs_a_site(tmp_path, capsys):
-    assert web_speed.main([str(tmp_path / "site")]) == 2
-    line = capsys.readouterr().err
-    assert (
-        line == f"blysk.bench.speed.web_speed: {tmp_path / 'site'}: is no site; "
-        "make one with `blysk web -o FOLDER`\n"
-    )
-
-
-def test_needs_modules_of_the_site(site, capsys):
-    assert web_speed.main([str(site), "chord-exp", "chord-exq"]) == 2
-    line = capsys.readouterr().err
-    reason = f"is no module of {site}; choose from chord-exp, linear-exp"
-    assert line == f"blysk.bench.speed.web_speed: chord-exq: {reason}\n"
-
-
-def test_needs_playwright(site, capsys, monkeypatch):
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["{0}/site"], "{0}/site: is no site; make one with `blysk web -o FOLDER`"),
+        (
+            ["{0}", "chord-exp", "chord-exq"],
+            "chord-exq: is no module of {0}; choose from chord-exp, linear-exp",
+        ),
+        (["{0}"], "browser: playwright is not installed; pip install playwright"),
+    ],
+    ids=["no site", "no module", "no playwright"],
+)
+def test_bad_input_is_one_line(arguments, says, site, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
-    assert web_speed.main([str(site)]) == 2
-    line = capsys.readouterr().err
-    assert (
-        line == "blysk.bench.speed.web_speed: browser: playwright is not installed; pip install playwright\n"
-    )
+    assert web_speed.main([argument.format(site) for argument in arguments]) == 2
+    assert capsys.readouterr().err == f"blysk.bench.speed.web_speed: {says.format(site)}\n"
 
 
 def test_needs_a_browser(site, capsys, monkeypatch):

@@ -13,13 +13,7 @@ from click.testing import CliRunner
 
 from blysk.bench import store
 from blysk.bench.tools import design_space, explore
-from blysk.bench.tools.design_space import (
-    COSTS,
-    Candidate,
-    costs_of,
-    explored,
-    front_of,
-)
+from blysk.bench.tools.design_space import COSTS, Candidate, costs_of, explored, front_of
 from blysk.bench.tools.explore import command, section, tasks
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.raster import rasterise
@@ -127,6 +121,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         (["--exponent", "1001"], "--exponent 1001: out of range"),
         (["--limit", "0"], "--limit 0: out of range"),
         (["--mesh", "missing.obj"], "missing.obj: "),
+        (["--cluster", "tcp://localhost:1", "--jobs", "1"], "--jobs: a cluster has its own workers"),
         (["--cluster", "nowhere"], "--cluster nowhere: not the address of a Dask scheduler"),
         (["--json", "missing/folder.json"], "missing/folder.json: cannot be written"),
         (
@@ -141,11 +136,6 @@ def test_bad_options_are_one_line(arguments, text):
     assert isinstance(result.exception, InputError)
     assert text in str(result.exception)
     assert "\n" not in str(result.exception)
-
-
-def test_jobs_are_not_for_a_cluster():
-    result = run("--cluster", "tcp://localhost:1")
-    assert "--jobs: a cluster has its own workers" in str(result.exception)
 
 
 def made_up(monkeypatch, out_of_range=False, error=0.5):

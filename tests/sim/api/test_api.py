@@ -1,7 +1,6 @@
 """The Python interface: scenes, designs, frames and Verilog by the words of the command line."""
 
 import base64
-import importlib.util
 import io
 import re
 import subprocess
@@ -142,14 +141,11 @@ def test_waveforms(tmp_path):
 
 
 @pytest.mark.long
-def test_without_a_compiler(monkeypatch):
+def test_without_a_compiler(monkeypatch, uninstalled):
     """pysim, with a warning and a smaller picture; a scene that is given keeps its size."""
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CXX", raising=False)
-    find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *rest: None if name == "ziglang" else find(name, *rest)
-    )
+    uninstalled("ziglang")
     monkeypatch.setattr("blysk.sim.api.render.SLOW_SIZE", (8, 8))
     with pytest.warns(RuntimeWarning, match=r"^pysim at 8x6 instead of cxxrtl, no working C\+\+ compiler"):
         frame = blysk.render("teapot", method="linear", **TINY)

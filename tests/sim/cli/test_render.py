@@ -1,7 +1,6 @@
 """What a run of ``blysk render`` writes and says, with a compiler and without one."""
 
 import contextlib
-import importlib.util
 import io
 import json
 import re
@@ -18,6 +17,7 @@ from blysk.sim.cli.main import main
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.mesh import load_mesh
 
+from ..engines.scale import script
 from .commandline import CORNERS, ERROR_NAMES, SMALL, TINY, files, picture
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -178,26 +178,23 @@ def test_waveforms(capsys):
     assert set(files()) == {Path("a.vcd"), Path("a.json"), Path("teapot-blysk.png")}
 
 
-def hide_compilers(monkeypatch):
+@pytest.fixture
+def hidden(monkeypatch, uninstalled):
+    """No compiler is found."""
     monkeypatch.setenv("PATH", "")
-    find_spec = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name, *rest: None if name == "ziglang" else find_spec(name, *rest)
-    )
+    uninstalled("ziglang")
 
 
-def break_compiler(monkeypatch):
-    script = Path("compiler").absolute()
-    script.write_text(
-        '#!/bin/sh\ncase "$1" in --version) echo 1.0; exit 0;; esac\necho "error: out of luck"; exit 1\n'
-    )
-    script.chmod(0o755)
-    monkeypatch.setenv("CXX", str(script))
+@pytest.fixture
+def broken(folder, monkeypatch):
+    """The compiler fails."""
+    text = 'case "$1" in --version) echo 1.0; exit 0;; esac\necho "error: out of luck"; exit 1'
+    monkeypatch.setenv("CXX", script(folder, "compiler", text))
 
 
-@pytest.mark.parametrize("obstacle", [hide_compilers, break_compiler])
-def test_without_compiler(capsys, monkeypatch, obstacle):
-    obstacle(monkeypatch)
+@pytest.mark.parametrize("obstacle", ["hidden", "broken"])
+def test_without_compiler(capsys, request, obstacle):
+    request.getfixturevalue(obstacle)
     before = files()
     assert main(["render", *TINY, "--engine", "cxxrtl"]) == 2
     output, line = capsys.readouterr()
@@ -207,9 +204,8 @@ def test_without_compiler(capsys, monkeypatch, obstacle):
     assert files() == before
 
 
-def test_fallback_without_compiler(capsys, monkeypatch):
+def test_fallback_without_compiler(hidden, capsys, monkeypatch):
     """One line and a smaller picture; the line of a cache that others can write is one of its own."""
-    hide_compilers(monkeypatch)
     Path("shared").mkdir()
     Path("shared").chmod(0o777)
     monkeypatch.setenv("BLYSK_CACHE", "shared")

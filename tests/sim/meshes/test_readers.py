@@ -1,6 +1,5 @@
 """Readers of each format: spellings that are read, files that are refused, references, and damage."""
 
-import importlib.util
 import io
 import struct
 
@@ -174,9 +173,8 @@ def test_gltf_features_that_would_load_wrongly(tmp_path):
     check_refused(path, "a mesh has no data", content=(document, buffer))
 
 
-def test_draco_without_its_decoder(tmp_path, monkeypatch):
-    find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda n: None if n == "DracoPy" else find(n))
+def test_draco_without_its_decoder(tmp_path, uninstalled):
+    uninstalled("DracoPy")
     reason = "the decoder DracoPy is not installed; pip install 'blysk[draco]'"
     check_refused(tmp_path / "a.glb", reason, content=draco_gltf())
 
