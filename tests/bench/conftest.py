@@ -23,9 +23,27 @@ from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.speed.web_speed import OPTIONS, find_chromium
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
+from blysk.sim.cli.main import main
 
 DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn_product"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
+
+
+@pytest.fixture
+def refused(capsys, tmp_path, monkeypatch):
+    """Run ``blysk`` with bad input in an empty folder: status 2, one line, and no file is left."""
+
+    def refused(*arguments, line):
+        monkeypatch.chdir(tmp_path)
+        before = sorted(tmp_path.rglob("*"))
+        assert main([*arguments]) == 2
+        output, errors = capsys.readouterr()
+        assert output == ""
+        assert errors.startswith(f"blysk: {line}")
+        assert errors.count("\n") == 1
+        assert sorted(tmp_path.rglob("*")) == before
+
+    return refused
 
 
 @pytest.fixture(scope="module")

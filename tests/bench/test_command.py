@@ -53,12 +53,6 @@ def test_help_has_an_example(name, capsys):
         (["pages", ".", "--unit", "x"], "--unit x: unknown unit; use one of "),
     ],
 )
-def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_bad_input_is_one_line(arguments, line, refused, tmp_path):
     (tmp_path / "file").touch()
-    assert main(arguments) == 2
-    output, errors = capsys.readouterr()
-    assert output == ""
-    assert errors.startswith(f"blysk: {line}")
-    assert errors.count("\n") == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    refused(*arguments, line=line)

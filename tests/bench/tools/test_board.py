@@ -65,15 +65,8 @@ def pattern_on(board):
         ),
     ],
 )
-def test_bad_input_is_one_line(arguments, message, capsys, tmp_path, monkeypatch):
-    """Nothing is written."""
-    monkeypatch.chdir(tmp_path)
-    assert main(["board", *arguments]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith("blysk: ")
-    assert told.count("\n") == 1
-    assert message in told
-    assert list(tmp_path.iterdir()) == []
+def test_bad_input_is_one_line(arguments, message, refused):
+    refused("board", *arguments, line=message)
 
 
 def test_missing_tools_and_loader_are_named(capsys, monkeypatch):

@@ -59,11 +59,6 @@ def test_cores_that_take_triangles(calls, cache, capsys, monkeypatch):
     assert placed == [GeometryUnit, RenderUnit]
 
 
-def test_triangles_go_to_one_pipeline(capsys):
-    assert main(["fpga", "--top", "render", "--pipes", "2"]) == 2
-    assert capsys.readouterr().err.startswith("blysk: --pipes 2: triangles go to one pipeline")
-
-
 def test_table():
     def place(seed, fmax):
         return Place(seed, fmax, "a", f"b.{seed}", 4.0, 3.25, {})
@@ -174,44 +169,38 @@ def test_designs():
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["--pipes", "3"], "blysk: --pipes 3: no such number; give one of 1, 2, 4, 8"),
-        (["--unit", "gpq", "--pipes", "2"], "blysk: --pipes: is for the pipeline; leave it out, or --unit"),
+        (["--top", "render", "--pipes", "2"], "--pipes 2: triangles go to one pipeline"),
+        (["--by-unit", "--seeds", "2"], "--seeds: nothing is placed; leave it out, or --by-unit\n"),
+        (["--pipes", "3"], "--pipes 3: no such number; give one of 1, 2, 4, 8"),
+        (["--unit", "gpq", "--pipes", "2"], "--pipes: is for the pipeline; leave it out, or --unit"),
         (
             ["--setups", "2"],
-            "blysk: --setups 2: spans need no triangle setup; leave it out, or --top geometry",
+            "--setups 2: spans need no triangle setup; leave it out, or --top geometry",
         ),
-        (["--seeds", "0"], "blysk: --seeds 0: out of range; give a whole number from 1 to 100"),
-        (["--jobs", "no"], "blysk: --jobs no: not a whole number; give"),
-        (["--unit", "fuse"], "blysk: --unit fuse: unknown unit; use gradient_setup, halfway_vector, "),
-        (["--unit", "gpq", "--method", "chord"], "blysk: --method: is for the pipeline; leave it out, or"),
-        (["--unit", "gpq", "--every-method"], "blysk: --every-method: is for the pipeline; leave it out"),
-        (["--method", "chord", "--every-method"], "blysk: --method: is one of every method; leave it out"),
-        (["--family", "ice40"], "blysk: --family ice40: unknown family; use one of ecp5, nexus"),
-        (["--method", "none"], "blysk: --method none: unknown method; use one of"),
-        (["--model", "phong"], "blysk: --model phong: the pipeline finds N.H, not R.V; use one of"),
-        (["--json", "nowhere/x"], "blysk: nowhere/x: cannot be written, there is no folder nowhere; make"),
+        (["--seeds", "0"], "--seeds 0: out of range; give a whole number from 1 to 100"),
+        (["--jobs", "no"], "--jobs no: not a whole number; give"),
+        (["--unit", "fuse"], "--unit fuse: unknown unit; use gradient_setup, halfway_vector, "),
+        (["--unit", "gpq", "--method", "chord"], "--method: is for the pipeline; leave it out, or"),
+        (["--unit", "gpq", "--every-method"], "--every-method: is for the pipeline; leave it out"),
+        (["--method", "chord", "--every-method"], "--method: is one of every method; leave it out"),
+        (["--family", "ice40"], "--family ice40: unknown family; use one of ecp5, nexus"),
+        (["--method", "none"], "--method none: unknown method; use one of"),
+        (["--model", "phong"], "--model phong: the pipeline finds N.H, not R.V; use one of"),
+        (["--json", "nowhere/x"], "nowhere/x: cannot be written, there is no folder nowhere; make"),
     ],
 )
-def test_bad_input_is_one_line(arguments, line, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["fpga", *arguments]) == 2
-    output, errors = capsys.readouterr()
-    assert output == ""
-    assert errors.startswith(line)
-    assert errors.count("\n") == 1
+def test_bad_input_is_one_line(arguments, line, refused):
+    refused("fpga", *arguments, line=line)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("which", [(0,), (1,), (0, 1)])
-def test_missing_tools_are_one_line_that_names_the_extra(which, family, capsys, monkeypatch):
+def test_missing_tools_are_one_line_that_names_the_extra(which, family, refused, monkeypatch):
     # Whether or not they are installed here.
     missing = [("pyosys", FAMILIES[family].package)[k] for k in which]
     monkeypatch.setattr(place_and_route, "version_of", lambda package: None if package in missing else "1")
-    assert main(["fpga", "--unit", "gpq", "--family", family]) == 2
-    output, errors = capsys.readouterr()
-    assert output == ""
     text = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed"
-    assert errors == f"blysk: fpga: {text}; pip install 'blysk[fpga]'\n"
+    refused("fpga", "--unit", "gpq", "--family", family, line=f"fpga: {text}; pip install 'blysk[fpga]'\n")
 
 
 @pytest.mark.long

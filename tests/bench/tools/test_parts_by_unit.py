@@ -75,8 +75,3 @@ def test_command(tmp_path, capsys):
     units = json.loads(path.read_text())["units"]["diffuse"]
     total = sum_parts({unit: Parts(**parts) for unit, parts in units.items()})
     assert lines[-1].split() == ["diffuse", *map(str, astuple(total))]
-
-
-def test_nothing_is_placed(capsys):
-    assert main(["fpga", "--by-unit", "--seeds", "2"]) == 2
-    assert capsys.readouterr().err == "blysk: --seeds: nothing is placed; leave it out, or --by-unit\n"
