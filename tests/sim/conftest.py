@@ -1,6 +1,10 @@
-"""A cache of compiled models of each test's own."""
+"""A cache of compiled models and a folder of temporary files of each test's own."""
+
+import tempfile
 
 import pytest
+
+from blysk.sim.engines.cache import private_folder
 
 
 @pytest.fixture
@@ -10,3 +14,14 @@ def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("BLYSK_CACHE", str(folder))
     monkeypatch.delenv("CXX", raising=False)
     return folder
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    private_folder.cache_clear()
+    yield folder
+    private_folder.cache_clear()

@@ -112,7 +112,6 @@ def test_quick_tasks():
     assert place_and_route.measure not in {one.function for one in chosen}
     (view,) = {json.dumps(s["view"]) for s in of_frames(chosen)}
     assert len(teapot(json.loads(view)["triangles"]).faces) == 992
-    json.dumps([one.settings for one in chosen])
 
 
 def test_full_tasks(monkeypatch):
@@ -378,14 +377,7 @@ def test_smaller_pictures_keep_the_largest_error():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "name",
-    [
-        "chord-local/cosquad",
-        pytest.param("angular-published/cosquad", marks=pytest.mark.long),
-        pytest.param("chord/blinn", marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize("name", ["chord-local/cosquad", "angular-published/cosquad", "chord/blinn"])
 def test_command_makes_the_point_again(found, name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     point = found[f"teapot/{name}/100"]

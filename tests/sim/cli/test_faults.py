@@ -18,14 +18,12 @@ import pytest
 
 from blysk.bench.store import Task, results_of
 from blysk.sim.engines import cxxrtl
-from blysk.sim.engines.cache import cache_folder, private_folder
-from blysk.sim.engines.engine import CompilerMissing
 from blysk.sim.errors import InputError
 from blysk.sim.frames.picture import write_image
 from blysk.sim.frames.workers import local_executor
 from blysk.sim.output import check_writable, write_json
 
-from ..engines.scale import BEATS, entries, scaled, script, start
+from ..engines.scale import BEATS, entries, left_in, scaled, script, start
 from .commandline import PROGRAM, wait
 
 THREE = (3 * BEATS).tolist()
@@ -35,17 +33,6 @@ pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals, users and permissions"),
     pytest.mark.usefixtures("cache"),
 ]
-
-
-@pytest.fixture
-def temporary(tmp_path, monkeypatch):
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setenv("TMPDIR", str(folder))
-    monkeypatch.setattr(tempfile, "tempdir", None)
-    private_folder.cache_clear()
-    yield folder
-    private_folder.cache_clear()
 
 
 @pytest.fixture
@@ -75,33 +62,7 @@ def an_ordinary_user():
         os.setresuid(0, 0, 0)
 
 
-def left_in(*folders):
-    return [path for folder in folders if folder.exists() for path in folder.rglob("*") if path.is_file()]
-
-
 # The compiler.
-
-
-def test_killed_compiler(cache, temporary, tmp_path, monkeypatch):
-    """It dies with half of the library written."""
-    text = 'case "$1" in --version) echo 1.0; exit 0;; esac; for last; do :; done; '
-    path = script(tmp_path, "killed", text + 'head -c 5000 "$0" > "$last"; kill -9 $$')
-    monkeypatch.setenv("CXX", path)
-    with pytest.raises(CompilerMissing) as caught:
-        scaled()
-    reason = f"no working C++ compiler ({path} ends with signal 9: no message): "
-    assert str(caught.value).startswith(reason)
-    assert left_in(cache, temporary) == []
-    monkeypatch.delenv("CXX")
-    assert scaled() == THREE
-
-
-def test_compiler_that_makes_nothing(cache, temporary, tmp_path, monkeypatch):
-    path = script(tmp_path, "lazy", "echo 1.0")
-    monkeypatch.setenv("CXX", path)
-    with pytest.raises(CompilerMissing, match=re.escape(f"no working C++ compiler ({path} makes nothing): ")):
-        scaled()
-    assert left_in(cache, temporary) == []
 
 
 def test_killed_while_compiling(cache, temporary, tmp_path):
@@ -185,21 +146,6 @@ def open_folder():
     folder.chmod(0o755)
     yield folder
     shutil.rmtree(folder)
-
-
-def test_read_only_cache(open_folder, monkeypatch):
-    folder = open_folder / "cache"
-    folder.mkdir(mode=0o500)
-    if not os.geteuid():
-        os.chown(folder, NOBODY, NOBODY)
-    monkeypatch.setenv("BLYSK_CACHE", str(folder))
-    private_folder.cache_clear()
-    with an_ordinary_user(), pytest.warns(RuntimeWarning, match="cannot be written: compiled models are"):
-        chosen = cache_folder()
-    assert chosen != folder
-    assert chosen.stat().st_mode & 0o777 == 0o700
-    shutil.rmtree(chosen)
-    private_folder.cache_clear()
 
 
 def test_forbidden_output(open_folder):

@@ -1,10 +1,12 @@
-"""Small components of many kinds, and one that breaks the rules of a stream."""
+"""Small components of many kinds, one that breaks the rules of a stream, and runs of both engines."""
 
 import numpy as np
 from amaranth.hdl import Module, Mux, Signal, signed, unsigned
 from amaranth.lib import data, stream
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
+
+from blysk.sim.engines.simulate import simulate
 
 PAIR = data.StructLayout({"x": unsigned(16), "y": signed(18)})
 
@@ -205,3 +207,22 @@ class Faulty(Component):
             with m.If(free & ~self.i.valid & (age == 20) & ~again):
                 m.d.sync += [self.o.valid.eq(1), again.eq(1)]
         return m
+
+
+def assert_equal(first, second):
+    assert first.beats.dtype == second.beats.dtype
+    np.testing.assert_array_equal(first.beats, second.beats)
+    np.testing.assert_array_equal(first.cycles, second.cycles)
+    np.testing.assert_array_equal(first.input_cycles, second.input_cycles)
+    assert first.total_cycles == second.total_cycles
+    assert first.status == second.status
+
+
+def both(component, beats, count, **options):
+    """A run of both engines, which agree."""
+    slow, fast = (
+        simulate(component, beats, count=count, engine=engine, **options) for engine in ("pysim", "cxxrtl")
+    )
+    assert (slow.engine, fast.engine) == ("pysim", "cxxrtl")
+    assert_equal(slow, fast)
+    return fast

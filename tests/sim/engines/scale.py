@@ -44,6 +44,11 @@ def entries(folder, suffix=".model"):
     return sorted(path for path in folder.iterdir() if path.suffix == suffix)
 
 
+def left_in(*folders):
+    """Files in folders, which may not be there."""
+    return [path for folder in folders if folder.exists() for path in folder.rglob("*") if path.is_file()]
+
+
 def script(folder, name, text):
     path = folder / name
     path.write_text(f"#!/bin/sh\n{text}\n")

@@ -9,26 +9,20 @@ from amaranth.lib.wiring import Component, In, Out
 from blysk.sim.engines.engine import CompilerMissing, Ports, SimulationError
 from blysk.sim.engines.simulate import simulate
 
-from .components import ALL, PAIR, Accumulator, Expander, Faulty, Lookup, Plain, Register, pairs, refused
-
-
-def assert_equal(first, second):
-    assert first.beats.dtype == second.beats.dtype
-    np.testing.assert_array_equal(first.beats, second.beats)
-    np.testing.assert_array_equal(first.cycles, second.cycles)
-    np.testing.assert_array_equal(first.input_cycles, second.input_cycles)
-    assert first.total_cycles == second.total_cycles
-    assert first.status == second.status
-
-
-def both(component, beats, count, **options):
-    """A run of both engines, which agree."""
-    slow, fast = (
-        simulate(component, beats, count=count, engine=engine, **options) for engine in ("pysim", "cxxrtl")
-    )
-    assert (slow.engine, fast.engine) == ("pysim", "cxxrtl")
-    assert_equal(slow, fast)
-    return fast
+from .components import (
+    ALL,
+    PAIR,
+    Accumulator,
+    Expander,
+    Faulty,
+    Lookup,
+    Plain,
+    Register,
+    assert_equal,
+    both,
+    pairs,
+    refused,
+)
 
 
 def stall_patterns(seed):

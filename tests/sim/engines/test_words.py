@@ -9,9 +9,9 @@ from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
 
 from blysk.sim.engines import words
-from blysk.sim.engines.simulate import simulate
 from blysk.sim.engines.words import plain_words
 
+from .components import both
 from .test_guards import Few, generated
 
 
@@ -92,12 +92,7 @@ def test_as_in_pysim(monkeypatch, width, long):
     numbers[:, :60] = rng.choice(np.array([0, 1, 3, (1 << 64) - 1, 1 << 63, 1 << 31], np.uint64), (2, 60))
     numbers[1, 40:80] = numbers[0, 40:80]
     beats = {"a": numbers[0], "b": numbers[1], "c": rng.integers(0, 128, 200)}
-    component, stalls = Operations(width), {"output_stalls": rng.random(97) < 0.3}
-    fast, slow = (
-        simulate(component, beats, count=200, engine=name, **stalls) for name in ("cxxrtl", "pysim")
-    )
-    assert np.array_equal(fast.beats, slow.beats)
-    assert np.array_equal(fast.cycles, slow.cycles)
+    both(Operations(width), beats, 200, output_stalls=rng.random(97) < 0.3)
 
 
 def test_templates_are_gone(monkeypatch):

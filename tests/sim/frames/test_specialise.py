@@ -80,7 +80,7 @@ def test_everything_is_needed():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("style", ["throughput", pytest.param("compact", marks=pytest.mark.long)])
+@pytest.mark.parametrize("style", ["throughput", "compact"])
 def test_no_specular_path(style):
     scene = scene_of(replace(CLAY, specular=(0, 0, 0)))
     special = fitted(scene, full_of(scene, style=style))
