@@ -107,10 +107,8 @@ def test_permission_denied(tmp_path, monkeypatch, denied):
     monkeypatch.setattr(os, "access", lambda item, mode: Path(item) != target)
     with pytest.raises(InputError) as caught:
         check_writable(path)
-    assert (
-        str(caught.value)
-        == f"{path}: cannot be written, permission denied; choose a folder that you may write to"
-    )
+    reason = "cannot be written, permission denied; choose a folder that you may write to"
+    assert str(caught.value) == f"{path}: {reason}"
 
 
 def test_check_writes_nothing(tmp_path):
@@ -130,10 +128,8 @@ def test_full_disk(tmp_path):
 
     with pytest.raises(InputError) as caught:
         fill()
-    assert (
-        str(caught.value)
-        == f"{path}: cannot be written, the disk is full; free some space or choose another disk"
-    )
+    reason = "cannot be written, the disk is full; free some space or choose another disk"
+    assert str(caught.value) == f"{path}: {reason}"
     assert [item.name for item in tmp_path.iterdir()] == ["a"]
     assert path.read_text() == "old"
 

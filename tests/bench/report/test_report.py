@@ -7,7 +7,6 @@ import os
 import re
 import sys
 from concurrent.futures import Executor, Future
-from html.parser import HTMLParser
 
 import pytest
 from click.testing import CliRunner
@@ -19,41 +18,9 @@ from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task
 from blysk.sim.errors import InputError
 
+from ..reader import Reader
+
 ABOUT = about(True, [], ["points"])
-
-
-class Reader(HTMLParser):
-    """Tags, ids, addresses, and the cells of each table, of a page."""
-
-    VOID = frozenset({"meta", "img", "br", "input", "link"})
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.ids, self.addresses, self.tables, self.figure = [], [], [], {}, ""
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        attrs = dict(attrs)
-        self.ids += [attrs["id"]] if "id" in attrs else []
-        self.addresses += [attrs[name] for name in ("src", "href") if name in attrs]
-        if tag == "figure":
-            self.figure = attrs.get("id", "")
-        elif tag == "tr":
-            self.tables.setdefault(self.figure, []).append([])
-        elif tag in ("td", "th") and self.tables:
-            list(self.tables.values())[-1][-1].append("")
-        if tag not in self.VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-        if tag == "figure":
-            self.figure = ""
-
-    def handle_data(self, data):
-        if self.open and {"td", "th"} & set(self.open):
-            list(self.tables.values())[-1][-1][-1] += data
 
 
 @pytest.mark.parametrize(

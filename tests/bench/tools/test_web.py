@@ -4,7 +4,6 @@ import base64
 import json
 import re
 import zlib
-from html.parser import HTMLParser
 from importlib import resources
 
 import numpy as np
@@ -20,6 +19,8 @@ from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.probes import probes_of
 from blysk.sim.errors import InputError
+
+from ..reader import Reader
 
 pytest.importorskip("ziglang", reason="ziglang is not installed")
 
@@ -198,44 +199,17 @@ def site(tmp_path, work, results):
     return folder
 
 
-class Addresses(HTMLParser):
-    """What a page asks for or leads to, its scripts, and its tags that stay open."""
-
-    VOID = frozenset({"meta", "img", "br", "input", "link", "hr"})
-
-    def __init__(self, text):
-        super().__init__()
-        self.found, self.open, self.ids, self.data = [], [], [], ""
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        attrs = dict(attrs)
-        self.found += [attrs[name] for name in ("src", "href") if name in attrs]
-        self.ids += [attrs["id"]] if "id" in attrs else []
-        if tag not in self.VOID:
-            self.open.append((tag, attrs))
-
-    def handle_endtag(self, tag):
-        if tag not in self.VOID:
-            assert self.open.pop()[0] == tag
-
-    def handle_data(self, data):
-        if self.open and self.open[-1][1].get("id") == "site":
-            self.data += data
-
-
 def test_files_of_the_site(site):
     mark = json.loads((site / "site.json").read_text())
     there = sorted(path.relative_to(site).as_posix() for path in site.rglob("*") if path.is_file())
     assert there == sorted([*mark["files"], "site.json"])
     assert {"index.html", "modules/chord-cosquad.js", "models/blinn.js", "spans/square-1-1.js"} <= set(there)
-    page = Addresses((site / "index.html").read_text())
+    page = Reader((site / "index.html").read_text())
     assert len(page.ids) == len(set(page.ids))
     text = " ".join((site / "index.html").read_text().split())
     *lower, highest = web_data.BANDS
     assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
-    data = json.loads(page.data)
+    data = json.loads(page.texts["site"])
     assert list(data["designs"]) == ["chord-cosquad", "linear-exp"]
     assert data["start"] == {**web_data.START, "method": "chord", "model": "cosquad"}
     assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2]
@@ -332,7 +306,7 @@ def test_documents_in_the_site(tmp_path, work, results):
     assert '<a href="index.html">up</a> <a href="https://a.example">web</a>' in unit
     assert '<div class="scroll"><table>' in (site / "blocks" / "index.html").read_text()
     assert (site / "blocks" / "p.svg").read_text() == "<svg/>"
-    links = Addresses((site / "index.html").read_text()).found
+    links = Reader((site / "index.html").read_text()).addresses
     assert {"guide/index.html", "blocks/index.html"} <= set(links)
 
 
@@ -354,7 +328,7 @@ def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
     assert not any(' style="' in text for text in pages.values())
     assert '<td class="right">' in pages[site / "theory" / "units.html"]
     for path, text in pages.items():
-        for address in Addresses(text).found:
+        for address in Reader(text).addresses:
             if re.match(r"[a-z]+:", address):
                 continue
             file, _, anchor = address.partition("#")

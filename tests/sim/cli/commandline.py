@@ -7,11 +7,20 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from blysk.golden.reference.lighting import Light, Material
+
 PROGRAM = [sys.executable, "-c", "import sys; from blysk.sim.cli.main import main; sys.exit(main())"]
 
 SMALL = ["teapot", "--triangles", "500", "--size", "64x48"]
 
 TINY = ["teapot", "--triangles", "100", "--size", "16x12"]
+
+DEFAULTS = {
+    "material": Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50),
+    "lights": [Light((-0.5, 0.8, 0.7))],
+    "background": (int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255),
+}
+"""Of a scene that nothing is said of."""
 
 ERROR_NAMES = ["max_lsb", "p999_lsb", "rmse_lsb", "psnr_db"]
 

@@ -11,14 +11,13 @@ import pytest
 
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.cli.main import main
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.mesh import load_mesh
 
 from ..engines.scale import script
-from .commandline import CORNERS, ERROR_NAMES, SMALL, TINY, files, picture
+from .commandline import CORNERS, DEFAULTS, ERROR_NAMES, SMALL, TINY, files, picture
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -59,15 +58,12 @@ def rendered(tmp_path_factory):
 
 def test_picture_is_the_simulated_frame(rendered):
     mesh = load_mesh("teapot", triangles=500).mesh
-    gray = int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255
     scene = Scene(
         mesh=mesh,
         camera=Camera.framing(mesh.vertices, (0.4, 0.5, 1), "perspective", 64 / 48),
         width=64,
         height=48,
-        material=Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50),
-        lights=[Light((-0.5, 0.8, 0.7))],
-        background=gray,
+        **DEFAULTS,
     )
     expected = FrameSimulator(preset("chord", "blinn")).render(scene).image
     folder, _ = rendered

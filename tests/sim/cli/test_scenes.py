@@ -9,13 +9,12 @@ import trimesh
 
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.cli.main import main
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.mesh import load_mesh
 
-from .commandline import picture
+from .commandline import DEFAULTS, picture
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -127,9 +126,7 @@ def test_position_of_the_camera(capsys):
             camera=Camera((1, 2, 3), place, projection="perspective", near=0.001),
             width=64,
             height=48,
-            material=Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50),
-            lights=[Light((-0.5, 0.8, 0.7))],
-            background=(int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255),
+            **DEFAULTS,
         )
         assert np.array_equal(FrameSimulator(preset("linear", "cosquad")).render(scene).image, expected)
     # --view takes the place of the file's position.

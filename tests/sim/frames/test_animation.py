@@ -181,18 +181,6 @@ def assert_the_same(frame, expected):
         assert frame.figures[name]["rmse_lsb"] == getattr(comparison, name).rmse_lsb
 
 
-@pytest.mark.long
-def test_frames_of_processes_are_those_drawn_singly(animation, cameras, singly):
-    order = [3, 0, 4, 2, 1]
-    children = set(multiprocessing.active_children())
-    with process_executor(animation, 2) as executor:
-        assert (executor.workers, executor.name) == (2, "2 processes")
-        frames = dict(render_frames(executor, [cameras[index] for index in order]))
-    assert set(multiprocessing.active_children()) == children
-    for place, index in enumerate(order):
-        assert_the_same(frames[place], singly[index])
-
-
 def test_processes_end_with_the_block(animation, cameras):
     children = set(multiprocessing.active_children())
 
@@ -241,11 +229,17 @@ def scheduler():
 
 
 @pytest.mark.long
-def test_frames_of_a_cluster_are_those_drawn_singly(animation, cameras, singly, scheduler):
-    order = [4, 1, 0, 3, 2]
-    with dask_executor(animation, scheduler.scheduler_address) as executor:
+@pytest.mark.parametrize("who", ["processes", "cluster"])
+def test_frames_are_those_drawn_singly(animation, cameras, singly, request, who):
+    """By two workers, in an order of its own; no process is left."""
+    order = [3, 0, 4, 2, 1]
+    address = who == "cluster" and request.getfixturevalue("scheduler").scheduler_address
+    children = set(multiprocessing.active_children())
+    with dask_executor(animation, address) if address else process_executor(animation, 2) as executor:
         assert executor.workers == 2
+        assert executor.name == "2 processes" or address
         frames = dict(render_frames(executor, [cameras[index] for index in order]))
+    assert set(multiprocessing.active_children()) == children
     for place, index in enumerate(order):
         assert_the_same(frames[place], singly[index])
 

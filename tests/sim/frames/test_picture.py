@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from blysk.sim.errors import InputError
 from blysk.sim.frames.picture import check_image_path, write_comparison, write_image
+
+from ..cli.commandline import picture as read
 
 
 def frames(height, width, seed=4):
@@ -15,11 +16,6 @@ def frames(height, width, seed=4):
     golden = rng.random((height, width, 3))
     simulated = np.clip(np.rint(255 * golden) + rng.integers(-3, 4, golden.shape), 0, 255).astype(np.uint8)
     return simulated, golden
-
-
-def read(path):
-    with Image.open(path) as image:
-        return np.asarray(image)
 
 
 def find(picture, panel):
