@@ -58,6 +58,9 @@ def test_objects_and_materials_weld_to_one(tmp_path):
         ("v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3", "all its vertices are at one point"),
         ("v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3", "none of its faces has an area"),
         (CORNERS + "v 9 9 9", "it has no faces"),
+        # Of the first trimesh makes points, of the second an IndexError.
+        ("v 0 0 0\nv 1 0 0\nl 1 2", "it has no faces"),
+        (CORNERS + "f 1 2 4", "entry 4 of a list of 3"),
         (CORNERS + "f 0 1 2", "vertex index 0"),
         (CORNERS + "f 1 2 3\nf 1 2", "fewer than 3 corners"),
         (CORNERS + "f 1 2 -9", "has the index -9, with 3 v before it"),
@@ -77,16 +80,6 @@ def test_relative_indices_count_from_their_face(tmp_path):
     mesh = load(tmp_path / "a.obj", text).mesh
     third = mesh.vertices[mesh.faces[0][2]]
     assert sorted(mesh.vertices[mesh.faces[1]].tolist()) == sorted([[5, 0, 0], [6, 0, 0], third.tolist()])
-
-
-def test_what_trimesh_makes_of_bad_obj_files(tmp_path):
-    """The facts behind two refusals: an `IndexError`, and points in place of lines."""
-    path = tmp_path / "a.obj"
-    check_refused(path, "entry 4 of a list of 3", content=CORNERS + "f 1 2 4\n")
-    with pytest.raises(IndexError):
-        trimesh.load_scene(str(path))
-    check_refused(path, "it has no faces", content="v 0 0 0\nv 1 0 0\nl 1 2\n")
-    assert isinstance(next(iter(trimesh.load_scene(str(path)).geometry.values())), trimesh.PointCloud)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
