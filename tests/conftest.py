@@ -1,4 +1,4 @@
-"""What all tests share: the order of their groups, a limit of time, interrupts, compiled models, normals."""
+"""What all tests share: the order of their groups, a limit of time, interrupts, compiled models."""
 
 import importlib.util
 import os
@@ -11,7 +11,6 @@ from datetime import date
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
@@ -137,19 +136,3 @@ def uninstalled(monkeypatch):
         )
 
     return uninstalled
-
-
-@pytest.fixture(scope="session")
-def normal_pairs():
-    """Make pairs of unit normals, uniform over the sphere, a given angle apart."""
-
-    def normal_pairs(rng, count, angle):
-        left = rng.normal(size=(count, 3))
-        left /= np.linalg.norm(left, axis=1, keepdims=True)
-        across = rng.normal(size=(count, 3))
-        across -= np.einsum("ij,ij->i", across, left)[:, None] * left
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        angle = np.radians(np.broadcast_to(angle, count))[:, None]
-        return left, left * np.cos(angle) + across * np.sin(angle)
-
-    return normal_pairs

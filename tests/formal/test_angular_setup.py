@@ -19,6 +19,7 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
+from blysk.sim.units.operands import pairs_at
 
 from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 from .prover import Harness
@@ -272,7 +273,7 @@ def test_registers_have_the_words_that_are_proved(angle):
     assert cut_by(AngularSetupUnit(AngularSetup(angle))) == CUTS | CUTS_BY_ANGLE[angle]
 
 
-def test_bounds_hold(monkeypatch, normal_pairs):
+def test_bounds_hold(monkeypatch):
     """The model's operands of x and y are within their bounds, and not far within."""
     rng, shares = np.random.default_rng(1), {}
 
@@ -289,7 +290,7 @@ def test_bounds_hold(monkeypatch, normal_pairs):
     note("_major", largest_major)
     note("_minor", largest_minor)
     for degrees in (0, 1e-4, 0.01, 1, 45, 90, 150, 179.9, 180):
-        left, right = normal_pairs(rng, 10_000, degrees)
+        left, right = pairs_at(rng, 10_000, degrees)
         vector = np.where(rng.random((len(left), 1)) < 0.5, left + right, left - right)
         vector = np.where(np.abs(vector).max(axis=1, keepdims=True) > 1e-9, vector, left)
         vector /= np.linalg.norm(vector, axis=1, keepdims=True)

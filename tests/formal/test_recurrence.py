@@ -9,6 +9,7 @@ from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.number.fixed import SQ, Fixed, Format
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, quantise
+from blysk.sim.units.operands import pairs_at
 
 from .bounds import unknown
 
@@ -166,7 +167,7 @@ def test_stated_start_values_keep_the_bound(interleave):
     assert 0.98 < share_at_start(unit, *start, *unit.coefficient(step)) <= 1
 
 
-def test_start_values_of_the_setup_keep_the_bound(normal_pairs):
+def test_start_values_of_the_setup_keep_the_bound():
     """Unit vectors to 90 degrees apart; and those one or two codes apart, whose A may be sqrt 2."""
     rng = np.random.default_rng(2)
     setup = RecurrenceSetup()
@@ -174,9 +175,9 @@ def test_start_values_of_the_setup_keep_the_bound(normal_pairs):
     lengths = np.r_[9, 10, 17, 100, 1000, 4095]
     shares = []
     for degrees in (*10.0 ** np.linspace(-4, 1, 11), 30, 60, 89.9):
-        left, right = (quantise(normals) for normals in normal_pairs(rng, 20_000, degrees))
+        left, right = (quantise(normals) for normals in pairs_at(rng, 20_000, degrees))
         near = rng.random((len(left), 1)) < 0.5
-        vector = np.where(near, left, quantise(normal_pairs(rng, len(left), 0.0)[0]))
+        vector = np.where(near, left, quantise(pairs_at(rng, len(left), 0.0)[0]))
         *start, out_of_range = setup.compute(
             *(Fixed(COMPONENT, codes) for codes in (left, right, vector)), rng.choice(lengths, len(left))
         )

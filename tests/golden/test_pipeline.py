@@ -12,6 +12,7 @@ from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector
+from blysk.sim.units.operands import pairs_at
 
 AMBIENT = 0.1
 UP = np.array([0.0, 0.0, 1.0])
@@ -265,10 +266,10 @@ def test_gated_spans_have_no_highlight(method, operand, model):
         ("recurrence-direct", "recurrence", 5.0, 10),
     ],
 )
-def test_published_methods_are_worse(published, method, degrees, factor, normal_pairs):
+def test_published_methods_are_worse(published, method, degrees, factor):
     """N.L against the curve of both, in float64: the mended method is so much nearer to it."""
     rng = np.random.default_rng(8)
-    left, right = (quantise(end) for end in normal_pairs(rng, 300, rng.uniform(0.5, degrees, 300)))
+    left, right = (quantise(end) for end in pairs_at(rng, 300, rng.uniform(0.5, degrees, 300)))
     vector = quantise(normalise(left[:1] + rng.normal(size=3) * ONE / 8))
     length = np.full(300, 40)
     span, place = pixels_of(length)

@@ -18,6 +18,7 @@ from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity, saturate
 from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.sim.units.operands import pairs_at
 
 from ..lists import FURTHER_MODELS, SPECULAR_MODELS
 
@@ -59,10 +60,10 @@ def error_bounds(model, exponent):
     return cosine, 0.5 + operands + 255 * (DIFFUSE * diffuse + SPECULAR * specular)
 
 
-def random_spans(rng, count, exponent, light, halfway, normal_pairs, largest=LARGEST_ANGLE):
+def random_spans(rng, count, exponent, light, halfway, largest=LARGEST_ANGLE):
     """Random normals; half of the spans pass near the highlight's peak, a tenth near the terminator."""
     angle = rng.uniform(0, largest, count)
-    left, right = normal_pairs(rng, count, angle)
+    left, right = pairs_at(rng, count, angle)
     near = count * 6 // 10
     aim = np.where(np.arange(near)[:, np.newaxis] < count // 2, halfway, 0)
     spread = np.where(np.arange(near) < count // 2, rng.uniform(0, 3 / np.sqrt(exponent), near), 1)
@@ -76,7 +77,7 @@ def random_spans(rng, count, exponent, light, halfway, normal_pairs, largest=LAR
     return left, right, rng.integers(1, 65, count)
 
 
-def sweep(rng, frames, count, model, exponent, normal_pairs):
+def sweep(rng, frames, count, model, exponent):
     """Errors in LSB of the well-posed pixels, how many others there are, and how many pixels saturate."""
     errors, ill_posed, full = [], 0, 0
     band, _ = error_bounds(model, exponent)
@@ -85,7 +86,7 @@ def sweep(rng, frames, count, model, exponent, normal_pairs):
     for _ in range(frames):
         light, viewer = normalise(rng.normal(size=(2, 3)))
         halfway = halfway_vector(light, viewer)
-        left, right, length = random_spans(rng, count, exponent, light, halfway, normal_pairs)
+        left, right, length = random_spans(rng, count, exponent, light, halfway)
         constants = FrameConstants(
             exponent,
             Intensity.color(np.full(3, AMBIENT)),
@@ -186,7 +187,7 @@ def chord_bound(model, exponent):
     return 0.5 + operands + 255 * (DIFFUSE * diffuse + SPECULAR * specular)
 
 
-def chord_frame(rng, count, exponent, normal_pairs):
+def chord_frame(rng, count, exponent):
     """Spans as wide as the chord method should be given, and what shading needs of them in float64.
 
     Returns the model's spans and vectors, N.L and u of each pixel by the fit, and the same of exactly
@@ -195,7 +196,7 @@ def chord_frame(rng, count, exponent, normal_pairs):
     light, viewer = normalise(rng.normal(size=(2, 3)))
     halfway = halfway_vector(light, viewer)
     angle = largest_span_angle(exponent)
-    left, right, length = random_spans(rng, count, exponent, light, halfway, normal_pairs, angle)
+    left, right, length = random_spans(rng, count, exponent, light, halfway, angle)
     zero = np.zeros(count, dtype=int)
     middle = quantise(normalise(left + right))
     spans = Spans(zero, zero, length, quantise(left), quantise(right), normal_middle=middle)
@@ -239,10 +240,10 @@ def chord_errors(frame, model, exponent, reference, diffuse, specular):
 FIT, NORMALISED = 0, 1
 
 
-def chord_sweep(rng, frames, count, model, exponent, normal_pairs):
+def chord_sweep(rng, frames, count, model, exponent):
     errors, ill_posed = [], 0
     for _ in range(frames):
-        frame = chord_frame(rng, count, exponent, normal_pairs)
+        frame = chord_frame(rng, count, exponent)
         error, well_posed = chord_errors(frame, model, exponent, FIT, DIFFUSE, SPECULAR)
         errors.append(error)
         ill_posed += np.count_nonzero(~well_posed)
@@ -268,11 +269,11 @@ METHOD_SWEEPS = {"quadratic": (sweep, check), "chord": (chord_sweep, check_chord
 @pytest.mark.parametrize("method", METHOD_SWEEPS)
 @pytest.mark.parametrize("model", ["cosquad", "cosquad_lin"])
 @pytest.mark.parametrize("exponent", MEASURED)
-def test_arithmetic_error(exponent, model, method, normal_pairs):
+def test_arithmetic_error(exponent, model, method):
     """Spans to 20 degrees, or the widest of the chord method, 1 to 64 pixels, 4e5 pixels a case."""
     rng = np.random.default_rng(exponent)
     run, hold = METHOD_SWEEPS[method]
-    errors, ill_posed, *full = run(rng, 3, 4200, model, exponent, normal_pairs)
+    errors, ill_posed, *full = run(rng, 3, 4200, model, exponent)
     assert len(errors) > 380_000
     assert all(count > 100 for count in full)
     hold(errors, ill_posed, model, exponent)
@@ -282,10 +283,10 @@ def test_arithmetic_error(exponent, model, method, normal_pairs):
 @pytest.mark.parametrize("method", METHOD_SWEEPS)
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
 @pytest.mark.parametrize("exponent", MEASURED)
-def test_arithmetic_error_of_ten_million_pixels(exponent, model, method, normal_pairs):
+def test_arithmetic_error_of_ten_million_pixels(exponent, model, method):
     rng = np.random.default_rng(exponent + 1)
     run, hold = METHOD_SWEEPS[method]
-    errors, ill_posed, *_ = run(rng, 62, 5000, model, exponent, normal_pairs)
+    errors, ill_posed, *_ = run(rng, 62, 5000, model, exponent)
     assert len(errors) > 9_900_000
     hold(errors, ill_posed, model, exponent)
     print(f"{method}, {model}, n = {exponent}: {errors.max():.3f} LSB, {ill_posed} at the terminator")
@@ -295,7 +296,7 @@ def test_arithmetic_error_of_ten_million_pixels(exponent, model, method, normal_
     "exponent",
     [1, 10, 100, 1000, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3, 5, 20, 50, 200, 500))],
 )
-def test_chord_method_against_normalised_interpolation(exponent, normal_pairs):
+def test_chord_method_against_normalised_interpolation(exponent):
     """Rounding, arithmetic and interpolation together: at most 1 LSB, every model, at half and full k_s.
 
     Of that rounding is 0.5, and the fit ``0.12 k_d + 0.25 k_s``.
@@ -303,7 +304,7 @@ def test_chord_method_against_normalised_interpolation(exponent, normal_pairs):
     rng = np.random.default_rng(exponent)
     worst = {}
     for _ in range(2):
-        frame = chord_frame(rng, 1500, exponent, normal_pairs)
+        frame = chord_frame(rng, 1500, exponent)
         for model in FITTED_MODELS:
             for diffuse, specular in ((0.5, 0.5), (0.0, 1.0)):
                 errors, _ = chord_errors(frame, model, exponent, NORMALISED, diffuse, specular)

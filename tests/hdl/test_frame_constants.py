@@ -25,6 +25,7 @@ from blysk.golden.reference.geometry import normalise
 from blysk.hdl.frame_constants import FrameConstantsUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.operands import pairs_at
 
 from .pixels import assert_pixels
 
@@ -199,9 +200,9 @@ def test_hold_keeps_a_write_waiting():
 # Behind the pipeline's write port.
 
 
-def random_spans(rng, lengths, normal_pairs):
+def random_spans(rng, lengths):
     lengths = np.asarray(lengths)
-    left, right = normal_pairs(rng, len(lengths), rng.uniform(0, 40, len(lengths)))
+    left, right = pairs_at(rng, len(lengths), rng.uniform(0, 40, len(lengths)))
     x, y = rng.integers(0, 4000, len(lengths)), rng.integers(0, 4096, len(lengths))
     return Spans(x, y, lengths, quantise(left), quantise(right))
 
@@ -310,7 +311,7 @@ def pixels_of(design, spans, constants):
         (150, 3, "chord"),
     ],
 )
-def test_constants_never_change_under_a_span(late_cycle, materials, method, normal_pairs):
+def test_constants_never_change_under_a_span(late_cycle, materials, method):
     """A second frame is written while spans of the first are inside, and while more are offered.
 
     What was taken before keeps the first frame's constants to its last pixel; what is taken after has the
@@ -320,7 +321,7 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method, norm
     rng = np.random.default_rng(late_cycle)
     design = preset(method, "cosquad", materials=materials)
     first, second = random_materials(rng, 1, materials), random_materials(rng, 1, materials)
-    spans = random_spans(rng, rng.integers(1, 12, 60), normal_pairs)
+    spans = random_spans(rng, rng.integers(1, 12, 60))
     spans = replace(spans, material=np.arange(60) // 10 % materials)
     cycles = 960 if materials == 1 else 1700
     driver = Driver(ShadingPipelineUnit(design))
@@ -359,11 +360,11 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method, norm
         (131, 2, "chord"),
     ],
 )
-def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method, normal_pairs):
+def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method):
     """Spans in the setup, in the FIFOs and half shaded: after a reset the pipeline does as from power-up."""
     rng = np.random.default_rng(reset_at)
     design = preset(method, "cosquad", materials=materials)
-    spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)], normal_pairs)
+    spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)])
     spans = replace(spans, material=np.arange(12) // 4 % materials)
     constants = random_materials(rng, 1, materials)
     writes = writes_of(constants)
@@ -375,7 +376,7 @@ def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method, no
         fresh.append(await fresh_driver.run(ctx, cycles, spans, writes, stalls=stalls))
 
     async def after_reset(ctx):
-        other = random_spans(rng, rng.integers(0, 30, 40), normal_pairs)
+        other = random_spans(rng, rng.integers(0, 30, 40))
         other = replace(other, material=rng.permutation(np.arange(40) // 4 % materials))
         unit = driver.unit
         await driver.run(ctx, reset_at, other, writes_of(random_materials(rng, 1, materials)))
@@ -395,11 +396,11 @@ def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method, no
     assert status == [[0, 0, 0], np.count_nonzero(spans.length == 0)]
 
 
-def test_reset_clears_the_constants(normal_pairs):
+def test_reset_clears_the_constants():
     """Black light and no ambient: a span after a reset without writes is black."""
     rng = np.random.default_rng(1)
     driver = Driver(ShadingPipelineUnit())
-    spans = random_spans(rng, [3], normal_pairs)
+    spans = random_spans(rng, [3])
     none = {"address": np.zeros(0, int), "data": np.zeros(0, int)}
     result = []
 
@@ -429,7 +430,7 @@ def run_pipeline(unit, spans, constants, count, **options):
     return simulate(unit, beats, count=count, write=writes_of(constants), **options)
 
 
-def test_cost_of_a_material_change(normal_pairs):
+def test_cost_of_a_material_change():
     """A span of another material is taken 5 cycles after the last pixel of the span before it has left.
 
     Its first pixel comes `latency` cycles later, against 1 cycle without the change. An empty span of yet
@@ -440,7 +441,7 @@ def test_cost_of_a_material_change(normal_pairs):
     unit = ShadingPipelineUnit(design)
     lengths = np.array([20, 20, 20, 20, 0, 20, 0, 20, 20, 0, 0, 20])
     material = np.array([0, 0, 1, 2, 2, 1, 2, 1, 0, 1, 2, 0])
-    spans = replace(random_spans(rng, lengths, normal_pairs), material=material)
+    spans = replace(random_spans(rng, lengths), material=material)
     constants = random_materials(rng, 1, 3)
     pixels = design.compute(spans, constants)
     run = run_pipeline(unit, spans, constants, len(pixels.x), engine="pysim")
@@ -465,12 +466,12 @@ def test_cost_of_a_material_change(normal_pairs):
 
 
 @pytest.mark.long
-def test_indices_of_no_material_change_nothing(normal_pairs):
+def test_indices_of_no_material_change_nothing():
     """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits."""
     rng = np.random.default_rng(35)
     design = preset(model="cosquad", method="linear", materials=3)
     unit = ShadingPipelineUnit(design)
-    spans = random_spans(rng, rng.integers(1, 9, 12), normal_pairs)
+    spans = random_spans(rng, rng.integers(1, 9, 12))
     spans = replace(spans, material=np.arange(12) // 4)
     constants = random_materials(rng, 1, 4)
     pixels = design.compute(spans, constants[:3])

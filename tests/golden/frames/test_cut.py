@@ -13,6 +13,7 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
+from blysk.sim.units.operands import pairs_at
 
 from .cuts import angles, line_at, origins, raster_of
 
@@ -21,10 +22,10 @@ EPSILON = 2.0**-53
 
 
 @pytest.fixture
-def out_of_range(normal_pairs):
+def out_of_range():
     """Spans of 0 to 179.9 degrees and 1 to 60 pixels, and what they are cut to."""
     rng = np.random.default_rng(11)
-    left, right = map(normalise, normal_pairs(rng, 5000, rng.uniform(0, 179.9, 5000)))
+    left, right = map(normalise, pairs_at(rng, 5000, rng.uniform(0, 179.9, 5000)))
     raster = raster_of(rng, left, right, rng.integers(1, 60, 5000, endpoint=True))
     return raster, *cut_by_angle(raster, MAX_SPAN_ANGLE)
 
@@ -84,9 +85,9 @@ def quantised(raster):
     return quantise_spans(raster, np.zeros(1 + raster.triangle.max(initial=0), dtype=np.int64))
 
 
-def test_narrow_spans_are_untouched(normal_pairs):
+def test_narrow_spans_are_untouched():
     rng = np.random.default_rng(12)
-    left, right = normal_pairs(rng, 2000, rng.uniform(0, 44.999999, 2000))
+    left, right = pairs_at(rng, 2000, rng.uniform(0, 44.999999, 2000))
     raster = raster_of(rng, left, right, rng.integers(1, 30, 2000))
     cut, count = cut_by_angle(raster, MAX_SPAN_ANGLE)
     assert count == 0
@@ -118,7 +119,7 @@ def test_opposite_normals(length):
         assert np.array_equal(cut.normal_right[-1], -left[0])
 
 
-def test_the_pipeline_flags_no_span_after_the_cut(normal_pairs):
+def test_the_pipeline_flags_no_span_after_the_cut():
     rng = np.random.default_rng(15)
     angle = np.concatenate(
         [
@@ -129,7 +130,7 @@ def test_the_pipeline_flags_no_span_after_the_cut(normal_pairs):
             np.full(1000, 180.0),
         ]
     )
-    left, right = normal_pairs(rng, len(angle), angle)
+    left, right = pairs_at(rng, len(angle), angle)
     raster = raster_of(rng, left, right, rng.integers(1, 12, len(angle), endpoint=True))
 
     def flagged(raster):
@@ -161,13 +162,13 @@ def test_quantised_ends():
 
 @pytest.mark.parametrize("materials", [2, 7, 1000])
 @pytest.mark.parametrize("cut", [False, True])
-def test_sorted_spans_are_a_permutation(normal_pairs, materials, cut):
+def test_sorted_spans_are_a_permutation(materials, cut):
     """Every span and fragment once, with all that belongs to it, in the given order within a material.
 
     x and the pixel are not read: they hold the numbers that spans and fragments had before.
     """
     rng = np.random.default_rng(17)
-    left, right = map(normalise, normal_pairs(rng, 3000, rng.uniform(0, 90, 3000)))
+    left, right = map(normalise, pairs_at(rng, 3000, rng.uniform(0, 90, 3000)))
     raster = raster_of(rng, left, right, rng.integers(1, 30, 3000))
     if cut:
         raster, _ = cut_by_angle(raster, MAX_SPAN_ANGLE)
@@ -203,9 +204,9 @@ def test_sorted_spans_are_a_permutation(normal_pairs, materials, cut):
     assert np.array_equal(ordered.offset, np.arange(len(ordered.span)) - start[ordered.span])
 
 
-def test_spans_in_order_are_untouched(normal_pairs):
+def test_spans_in_order_are_untouched():
     rng = np.random.default_rng(18)
-    raster = raster_of(rng, *map(normalise, normal_pairs(rng, 100, 5.0)), 3)
+    raster = raster_of(rng, *map(normalise, pairs_at(rng, 100, 5.0)), 3)
     assert sort_by_material(raster, np.zeros(1000, int)) is raster
     raster = replace(raster, triangle=np.sort(raster.triangle))
     assert sort_by_material(raster, np.arange(1000) // 100) is raster
@@ -213,9 +214,9 @@ def test_spans_in_order_are_untouched(normal_pairs):
     assert len(sort_by_material(empty, np.arange(1000)).length) == 0
 
 
-def test_spans_have_the_material_of_their_triangle(normal_pairs):
+def test_spans_have_the_material_of_their_triangle():
     rng = np.random.default_rng(19)
-    raster = raster_of(rng, *map(normalise, normal_pairs(rng, 100, 5.0)), 3)
+    raster = raster_of(rng, *map(normalise, pairs_at(rng, 100, 5.0)), 3)
     material = rng.integers(0, 9, 1000)
     for given in (raster, sort_by_material(raster, material)):
         assert np.array_equal(quantise_spans(given, material).material, material[given.triangle])

@@ -18,13 +18,14 @@ from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
+from blysk.sim.units.operands import pairs_at
 
 from .cuts import METHOD, ONE_VALUE, angles, exact_operands, material, origins, raster_of
 
 EXPONENTS = (1, 2, 10, 50, 100, 300, 1000)
 
 
-def lit_spans(rng, normal_pairs, count, angle, longest, spread, lights=2):
+def lit_spans(rng, count, angle, longest, spread, lights=2):
     """Spans anywhere under distant lights, each of one of the exponents; half near the H of a light."""
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     faces = len(EXPONENTS)
@@ -36,7 +37,7 @@ def lit_spans(rng, normal_pairs, count, angle, longest, spread, lights=2):
     scene = Scene(
         mesh, camera, 64, 64, tuple(material(n) for n in EXPONENTS), tuple(Light(tuple(way)) for way in ways)
     )
-    left, right = map(normalise, normal_pairs(rng, count, angle))
+    left, right = map(normalise, pairs_at(rng, count, angle))
     raster = raster_of(rng, left, right, rng.integers(1, longest, count, endpoint=True), spread)
     raster = replace(raster, triangle=rng.integers(0, faces, count).astype(np.int32))
     near = normalise(ways + normalise(np.asarray(camera.viewer)))[rng.integers(0, lights, count)]
@@ -98,12 +99,12 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_errors_of_the_chord_method_are_in_the_budgets(case, normal_pairs):
+def test_errors_of_the_chord_method_are_in_the_budgets(case):
     """Every pixel of random true spans, n 1 to 1000: fit, arithmetic, rounding of N and H; no flag at all."""
     angle, longest, spread = CASES[case]
     rng = np.random.default_rng(len(case))
     count = 3000 if longest < 1000 else 150
-    scene, raster = lit_spans(rng, normal_pairs, count, rng.uniform(0, angle, count), longest, spread)
+    scene, raster = lit_spans(rng, count, rng.uniform(0, angle, count), longest, spread)
     cut, spans_cut = cut_by_error(scene, raster, ChordInterpolator())
     assert spans_cut == np.count_nonzero(np.bincount(origins(raster, cut)[0]) > 1)
     assert 0 < spans_cut <= count
@@ -129,11 +130,11 @@ def test_errors_of_the_chord_method_are_in_the_budgets(case, normal_pairs):
 
 
 @pytest.mark.parametrize("case", ["narrow", "wide"])
-def test_flags_before_the_cut(case, normal_pairs):
+def test_flags_before_the_cut(case):
     """Some of the uncut spans are flagged, or wide; of those of up to three pixels none is wide."""
     angle, longest, spread = CASES[case]
     rng = np.random.default_rng(3)
-    scene, raster = lit_spans(rng, normal_pairs, 2000, rng.uniform(5, angle, 2000), longest, spread)
+    scene, raster = lit_spans(rng, 2000, rng.uniform(5, angle, 2000), longest, spread)
     operands, wide = chord_operands(scene, raster)
     assert wide.any()
     assert not wide[raster.length < 4].any()
@@ -142,10 +143,10 @@ def test_flags_before_the_cut(case, normal_pairs):
 
 
 @pytest.mark.parametrize("method", ["linear", "quadratic", "angular", "chord", "chord-local"])
-def test_cut_by_error_of_every_method(method, normal_pairs):
+def test_cut_by_error_of_every_method(method):
     """No part is over the method's angle; one or two pixels stay; the curve is right at its quarters."""
     rng = np.random.default_rng(7)
-    scene, raster = lit_spans(rng, normal_pairs, 1500, rng.uniform(0, 90, 1500), 50, 0.2)
+    scene, raster = lit_spans(rng, 1500, rng.uniform(0, 90, 1500), 50, 0.2)
     interpolator = METHODS[method]
     cut, count = cut_by_error(scene, raster, interpolator)
     assert count > 100
@@ -169,10 +170,10 @@ def test_cut_by_error_of_every_method(method, normal_pairs):
     assert error.max() <= METHOD.HIGHLIGHT_BUDGET * 1.1
 
 
-def test_cut_spans_chooses(normal_pairs):
+def test_cut_spans_chooses():
     """By error for methods with a fit, by angle alone for those that hold at every angle."""
     rng = np.random.default_rng(8)
-    scene, raster = lit_spans(rng, normal_pairs, 300, rng.uniform(0, 120, 300), 30, 0.2)
+    scene, raster = lit_spans(rng, 300, rng.uniform(0, 120, 300), 30, 0.2)
     for method, interpolator in METHODS.items():
         design = preset(method, "cosquad", lights=2, materials=len(EXPONENTS))
         found, count = cut_spans(scene, raster, design)

@@ -18,6 +18,7 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantis
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import CURVES, interpolate
 from blysk.golden.reference.geometry import normalise
+from blysk.sim.units.operands import pairs_at
 
 STEP = 2.0**-17
 ONE_VALUE = float(ONE_SQUARED.values)
@@ -40,13 +41,13 @@ NORMAL_STEPS = {
 }
 
 
-def spans(rng, normal_pairs, count=2000, angle=40.0, longest=64):
-    left, right = normal_pairs(rng, count, rng.uniform(0, angle, count))
+def spans(rng, count=2000, angle=40.0, longest=64):
+    left, right = pairs_at(rng, count, rng.uniform(0, angle, count))
     return left, right, rng.integers(1, longest, count, endpoint=True)
 
 
-def vectors(rng, normal_pairs, lights):
-    return tuple(normal_pairs(rng, lights, 0.0)[0] for _ in range(2))
+def vectors(rng, lights):
+    return tuple(pairs_at(rng, lights, 0.0)[0] for _ in range(2))
 
 
 def compute(interpolator, left, right, length, direction, halfway):
@@ -67,12 +68,12 @@ def places(length):
 
 
 @pytest.mark.parametrize("method", FROM_NORMALS)
-def test_formats(method, normal_pairs):
+def test_formats(method):
     rng = np.random.default_rng(1)
     interpolator = METHODS[method]
     assert interpolator.CURVE in CURVES
-    left, right, length = spans(rng, normal_pairs, 50, 10.0)
-    operands = compute(interpolator, left, right, length, *vectors(rng, normal_pairs, 3))
+    left, right, length = spans(rng, 50, 10.0)
+    operands = compute(interpolator, left, right, length, *vectors(rng, 3))
     assert operands.cosine.format == interpolator.COSINE_FORMAT
     assert operands.highlight.format == Specular(operand=interpolator.operand).operand_format
     shape = (length.sum(), 3)
@@ -82,11 +83,11 @@ def test_formats(method, normal_pairs):
 
 
 @pytest.mark.parametrize("method", NORMAL_STEPS)
-def test_normals(method, normal_pairs):
+def test_normals(method):
     """Each component against the method's curve in float64, `exact_normals`."""
     rng = np.random.default_rng(2)
     interpolator = METHODS[method]
-    left, right, length = spans(rng, normal_pairs)
+    left, right, length = spans(rng)
     normals, out_of_range = interpolator.normals(*end_words(interpolator, left, right), length)
     assert not out_of_range.any()
     span, t = places(length)
@@ -99,13 +100,13 @@ def test_normals(method, normal_pairs):
 
 @pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
 @pytest.mark.parametrize("method", NORMAL_METHODS)
-def test_products_are_those_of_the_normals(method, operand, normal_pairs):
+def test_products_are_those_of_the_normals(method, operand):
     """Exact integers: N.L and N.H whole, the chord cut to 25 fraction bits."""
     rng = np.random.default_rng(3)
     interpolator = type(METHODS[method])(**{**METHODS[method].__dict__, "operand": operand})
     assert interpolator.uses_chord == (operand == "one_minus_cosine")
-    left, right, length = spans(rng, normal_pairs, 300, 20.0)
-    direction, halfway = vectors(rng, normal_pairs, 2)
+    left, right, length = spans(rng, 300, 20.0)
+    direction, halfway = vectors(rng, 2)
     # A light near the spans: u is under 1/2, where the chord is exact.
     halfway = left[:2]
     operands = compute(interpolator, left, right, length, direction, halfway)
@@ -121,11 +122,11 @@ def test_products_are_those_of_the_normals(method, operand, normal_pairs):
     np.testing.assert_array_equal(operands.highlight.codes[near], square[near] >> 10)
 
 
-def test_angular_operands(normal_pairs):
+def test_angular_operands():
     """``1 - cos`` along the great circle: the devices' bounds, and what rounding moves a vector, `MOVED`."""
     rng = np.random.default_rng(5)
-    left, right, length = spans(rng, normal_pairs)
-    direction, halfway = vectors(rng, normal_pairs, 2)
+    left, right, length = spans(rng)
+    direction, halfway = vectors(rng, 2)
     operands = compute(METHODS["angular"], left, right, length, direction, halfway)
     span, t = places(length)
     normals = interpolate("slerp", left[span], right[span], t)
@@ -139,12 +140,12 @@ def test_angular_operands(normal_pairs):
 
 @pytest.mark.parametrize("method", FROM_NORMALS)
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
-def test_stiff_equal_normals(method, length, normal_pairs):
+def test_stiff_equal_normals(method, length):
     """Angle 0: every pixel of a span is as its first."""
     rng = np.random.default_rng(length)
-    left, _ = normal_pairs(rng, 3, 0.0)
+    left, _ = pairs_at(rng, 3, 0.0)
     lengths = np.full(3, length)
-    operands = compute(METHODS[method], left, left, lengths, *vectors(rng, normal_pairs, 1))
+    operands = compute(METHODS[method], left, left, lengths, *vectors(rng, 1))
     assert not operands.out_of_range.any()
     for values in (operands.cosine, operands.highlight):
         values = values.codes.reshape(3, length)
@@ -154,11 +155,11 @@ def test_stiff_equal_normals(method, length, normal_pairs):
 # The recurrence as drawn drifts away from its end; its own tests say how far.
 @pytest.mark.parametrize("method", FROM_NORMALS)
 @pytest.mark.parametrize("angle", [1e-4, 1.0, 14.0])
-def test_stiff_ends(method, angle, normal_pairs):
+def test_stiff_ends(method, angle):
     """The first and the last pixel have the normals of the ends, whatever the length."""
     rng = np.random.default_rng(7)
-    left, right = normal_pairs(rng, 200, angle)
-    direction, halfway = vectors(rng, normal_pairs, 1)
+    left, right = pairs_at(rng, 200, angle)
+    direction, halfway = vectors(rng, 1)
     ends = np.stack([left @ direction[0], right @ direction[0]], axis=1)
     for length in (2, 3, 16, 1000):
         operands = compute(METHODS[method], left, right, np.full(200, length), direction, halfway)
@@ -185,19 +186,19 @@ def test_widest_span():
         ("recurrence", 89.98, 90.1),
     ],
 )
-def test_flag(method, narrow, out_of_range, normal_pairs):
+def test_flag(method, narrow, out_of_range):
     rng = np.random.default_rng(8)
     for angle, flagged in ((narrow, False), (out_of_range, True)):
-        left, right = normal_pairs(rng, 200, angle)
-        operands = compute(METHODS[method], left, right, np.full(200, 2), *vectors(rng, normal_pairs, 1))
+        left, right = pairs_at(rng, 200, angle)
+        operands = compute(METHODS[method], left, right, np.full(200, 2), *vectors(rng, 1))
         assert (operands.out_of_range == flagged).all()
 
 
-def test_flag_of_linear_normals(normal_pairs):
+def test_flag_of_linear_normals():
     """A component of the difference of 1 or more."""
     rng = np.random.default_rng(9)
-    left, right = normal_pairs(rng, 2000, rng.uniform(0, 180, 2000))
-    operands = compute(METHODS["linear"], left, right, np.full(2000, 2), *vectors(rng, normal_pairs, 1))
+    left, right = pairs_at(rng, 2000, rng.uniform(0, 180, 2000))
+    operands = compute(METHODS["linear"], left, right, np.full(2000, 2), *vectors(rng, 1))
     difference = quantise(right) - quantise(left)
     far = np.any((difference < COMPONENT.min_code) | (difference > COMPONENT.max_code), axis=1)
     np.testing.assert_array_equal(operands.out_of_range, far)

@@ -8,6 +8,7 @@ from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, quantise, values
+from blysk.sim.units.operands import pairs_at
 
 
 def operands_of(interpolator, left, right, length, direction, halfway):
@@ -31,14 +32,14 @@ def errors(interpolator, left, right, length, direction, halfway):
 
 
 @pytest.mark.parametrize("lights", [1, 2])
-def test_operands_keep_the_bound(normal_pairs, lights):
+def test_operands_keep_the_bound(lights):
     """Spans of all lengths and angles in one call, each against its own bound."""
     rng = np.random.default_rng(1)
     degrees = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 100), rng.uniform(0, 90, 280)]
-    left, right = (quantise(v) for v in normal_pairs(rng, 400, degrees))
+    left, right = (quantise(v) for v in pairs_at(rng, 400, degrees))
     length = rng.integers(1, 60, 400)
     length[::40] = [1, 2, 3, 4, 5, 8, 9, 2049, 4094, 4095]
-    direction, halfway = (quantise(normal_pairs(rng, lights, 0.0)[0]) for _ in range(2))
+    direction, halfway = (quantise(pairs_at(rng, lights, 0.0)[0]) for _ in range(2))
     interpolator = RecurrenceInterpolator()
     worst, found = errors(interpolator, left, right, length, direction, halfway)
     assert found.cosine.shape == found.highlight.shape == (length.sum(), lights)
@@ -47,11 +48,11 @@ def test_operands_keep_the_bound(normal_pairs, lights):
     assert np.all(worst <= interpolator.setup.error(length, np.radians(degrees)) + 2.0**-16)
 
 
-def test_spans_do_not_depend_on_each_other(normal_pairs):
+def test_spans_do_not_depend_on_each_other():
     rng = np.random.default_rng(2)
-    left, right = (quantise(v) for v in normal_pairs(rng, 40, rng.uniform(0, 100, 40)))
+    left, right = (quantise(v) for v in pairs_at(rng, 40, rng.uniform(0, 100, 40)))
     length = np.r_[rng.integers(1, 40, 38), 500, 1]
-    vectors = [quantise(normal_pairs(rng, 2, 0.0)[0]) for _ in range(2)]
+    vectors = [quantise(pairs_at(rng, 2, 0.0)[0]) for _ in range(2)]
     whole = operands_of(RecurrenceInterpolator(), left, right, length, *vectors)
     ends = np.cumsum(length)
     for k in range(40):
@@ -63,12 +64,12 @@ def test_spans_do_not_depend_on_each_other(normal_pairs):
         assert single.out_of_range == whole.out_of_range[k]
 
 
-def test_agrees_with_the_angular_method(normal_pairs):
+def test_agrees_with_the_angular_method():
     """The same curve, found in another way."""
     rng = np.random.default_rng(3)
-    left, right = (quantise(v) for v in normal_pairs(rng, 300, rng.uniform(0, 45, 300)))
+    left, right = (quantise(v) for v in pairs_at(rng, 300, rng.uniform(0, 45, 300)))
     length = rng.integers(1, 100, 300)
-    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    vectors = [quantise(pairs_at(rng, 1, 0.0)[0]) for _ in range(2)]
     found, other = (
         operands_of(interpolator, left, right, length, *vectors)
         for interpolator in (RecurrenceInterpolator(), AngularInterpolator())
@@ -77,11 +78,11 @@ def test_agrees_with_the_angular_method(normal_pairs):
     assert np.abs(found.highlight.values - other.highlight.values).max() < 5e-5
 
 
-def test_direct_form_is_unstable(normal_pairs):
+def test_direct_form_is_unstable():
     """As drawn, in the same words: harmless in short spans, useless in long ones."""
     rng = np.random.default_rng(4)
-    left, right = (quantise(v) for v in normal_pairs(rng, 100, 10.0))
-    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    left, right = (quantise(v) for v in pairs_at(rng, 100, 10.0))
+    vectors = [quantise(pairs_at(rng, 1, 0.0)[0]) for _ in range(2)]
     for length, least, most in ((8, 0, 1e-4), (256, 1e-3, 0.05), (2000, 0.02, 3)):
         lengths = np.full(100, length)
         direct, stable = (
@@ -92,10 +93,10 @@ def test_direct_form_is_unstable(normal_pairs):
         assert stable < 3e-5
 
 
-def test_wide_spans_are_flagged(normal_pairs):
+def test_wide_spans_are_flagged():
     rng = np.random.default_rng(5)
-    left, right = (quantise(v) for v in normal_pairs(rng, 5, [0, 45, 89.99, 90.02, 180]))
-    vectors = [quantise(normal_pairs(rng, 1, 0.0)[0]) for _ in range(2)]
+    left, right = (quantise(v) for v in pairs_at(rng, 5, [0, 45, 89.99, 90.02, 180]))
+    vectors = [quantise(pairs_at(rng, 1, 0.0)[0]) for _ in range(2)]
     found = operands_of(RecurrenceInterpolator(), left, right, np.full(5, 3), *vectors)
     np.testing.assert_array_equal(found.out_of_range, [False, False, False, True, True])
 

@@ -18,6 +18,7 @@ from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import interpolate
+from blysk.sim.units.operands import pairs_at
 
 STEP = COMPONENT.step
 ONE_VALUE = float(ONE_SQUARED.values)
@@ -181,9 +182,9 @@ def test_stiff_light_behind_and_at_the_viewer(method, degrees):
     assert not specular.compute(found.highlight[:, 0], np.zeros(33, bool), 3).codes.any()
 
 
-def scaled_spans(rng, normal_pairs, count, scales):
+def scaled_spans(rng, count, scales):
     """Unit ends, 0 to 44 degrees apart, times their lengths; no component is over 0.95."""
-    left, right = normal_pairs(rng, 4 * count, rng.uniform(0, 44, 4 * count))
+    left, right = pairs_at(rng, 4 * count, rng.uniform(0, 44, 4 * count))
     inside = np.maximum(np.abs(left), np.abs(right)).max(axis=1) < 0.95
     ends = [end[inside][:count] for end in (left, right)]
     return [
@@ -193,15 +194,15 @@ def scaled_spans(rng, normal_pairs, count, scales):
 
 @pytest.mark.parametrize("scales", [(1 - 1 / 256,) * 2, (1 + 1 / 256,) * 2, (1 - 1 / 256, 1 + 1 / 256)])
 @pytest.mark.parametrize("method", NAMES)
-def test_stiff_normals_of_wrong_length(method, scales, normal_pairs):
+def test_stiff_normals_of_wrong_length(method, scales):
     """1 +- 1/256 at either end: the curve goes through the ends as they are, and the bound holds about it.
 
     `renormalise` gives unit normals, of any such ends. The bisection makes every middle of a level unit
     again, but not the ends, so that it is within the excess of them.
     """
     rng, length = np.random.default_rng(5), np.full(300, 9)
-    left, right = scaled_spans(rng, normal_pairs, 300, scales)
-    vector = quantise(normal_pairs(rng, 1, 0.0)[0])[0]
+    left, right = scaled_spans(rng, 300, scales)
+    vector = quantise(pairs_at(rng, 1, 0.0)[0])[0]
     cosine, highlight, found = operands(method, left, right, length, vector)
     exact = reference(method, left, right, length, vector[np.newaxis].repeat(300, 0))
     largest = bound(method, 9, 44) * (1 + 1 / 256)
