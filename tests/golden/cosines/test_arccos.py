@@ -107,12 +107,6 @@ def test_square_of_the_angle_by_the_squared_chord():
     percent(least_relative_error(basis, (2 * np.arcsin(np.sqrt(q) / 2)) ** 2), "0.0079")
 
 
-def test_short_cosine_costs_angle():
-    angle = np.radians(1.0)
-    worst = np.arccos(np.cos(angle) - 2.0**-17) - angle
-    percent(worst / angle, "2.5")
-
-
 @pytest.mark.parametrize("table", ARCCOS_TABLES)
 def test_every_operand(table):
     """The arithmetic error within its bound, the model error as stated, together within their sum."""

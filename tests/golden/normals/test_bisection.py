@@ -7,7 +7,6 @@ import pytest
 
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax, reciprocal_root
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.sim.units.normals.bisection import factor_of
 from blysk.sim.units.operands import (
@@ -188,54 +187,6 @@ def test_stiff_angles_flag(angle, max_angle):
 )
 def test_model_error(parameters, first_step, error):
     assert f"{parameters.model_error(first_step):.1e}" == error
-
-
-def test_published_polynomials():
-    def errors(function, coefficients, low, high):
-        return largest_error(function, np.array(coefficients), low, high)
-
-    z = (np.sqrt(2), 2.0)
-    assert errors(reciprocal_root, [0.64, -0.07], *z) == pytest.approx((1.1e-3, 0.00217), abs=5e-5)
-    assert errors(reciprocal_root, [0.681, -0.119, 0.014], *z) == pytest.approx((1.0e-3, 0.002), abs=5e-6)
-    fit = minimax(reciprocal_root, *z, 1)
-    assert fit == pytest.approx([0.64004095, -0.07032614], abs=2e-8)
-    assert largest_error(reciprocal_root, fit, *z) == pytest.approx((6.1e-4, 0.00122), abs=5e-6)
-    fit = minimax(reciprocal_root, *z, 2)
-    assert fit == pytest.approx([0.68084977, -0.1189218, 0.0142535], abs=1e-7)
-    assert largest_error(reciprocal_root, fit, *z) == pytest.approx((2.0e-5, 4.0e-5), abs=5e-7)
-
-    def h(r):
-        return half_angle_factor(1 - r)
-
-    fit = minimax(h, 0, 1, 2)
-    assert fit == pytest.approx([0.70519, -0.310337, 0.107064], abs=1e-6)
-    assert largest_error(h, fit, 0, 1) == pytest.approx((1.92e-3, 0.00383), abs=5e-6)
-    published = errors(h, [0.707, -0.341, 0.193, -0.059], 0, 1)
-    assert published == pytest.approx((6.1e-4, 0.00093), abs=5e-6)
-    fit = minimax(h, 0, 1, 3)
-    assert fit == pytest.approx([0.70681854, -0.34255322, 0.19682175, -0.06137531], abs=2e-7)
-    assert largest_error(h, fit, 0, 1) == pytest.approx((2.88e-4, 0.00058), abs=5e-6)
-
-    fit = minimax(half_angle_factor, 0, 1, 3, {0: 0.5})
-    assert fit[1:] == pytest.approx([0.13069871, 0.01734779, 0.05873483], abs=2e-7)
-    assert largest_error(half_angle_factor, fit, 0, 1)[0] == pytest.approx(3.3e-4, abs=5e-6)
-    for terms, coefficients, error in (
-        (2, [0.12188202, 0.06503349], 1.5e-4),
-        (3, [0.12534066, 0.04302247, 0.03132254], 9.0e-6),
-    ):
-        fit = minimax(half_angle_factor, 0, 0.5, terms, {0: 0.5})
-        # The note's three terms are a little off the optimum: 9.06e-6, where this fit has 9.02e-6.
-        assert fit[1:] == pytest.approx(coefficients, abs=5e-6)
-        assert largest_error(half_angle_factor, fit, 0, 0.5)[0] == pytest.approx(error, rel=0.04)
-    for terms, coefficients, error in (
-        (2, [0.06205092, 0.01405506], 2.5e-5),
-        (3, [0.0625277, 0.01144775, 0.00317987], 7.9e-7),
-    ):
-        domain = (0, 2 - np.sqrt(2))
-        fit = minimax(lambda v: reciprocal_root(2 - v), *domain, terms, {0: 0.5})
-        assert fit[1:] == pytest.approx(coefficients, abs=5e-6)
-        found = largest_error(lambda v: reciprocal_root(2 - v), fit, *domain)[0]
-        assert found == pytest.approx(error, rel=0.03)
 
 
 @pytest.mark.parametrize(
