@@ -84,13 +84,6 @@ def test_light_opposite_the_viewer(exponent):
     np.testing.assert_array_equal(shade(-UP, -UP, 2, constants).color, round(255 * 0.6))
 
 
-def test_second_lobe_is_dark():
-    """n = 20 at 60 degrees: the parabola is 16, the highlight 0."""
-    constants = constants_of([(UP, 0.0, 1.0)], 20, ambient=0)
-    assert not shade(tilted(60), tilted(60), 3, constants).color.any()
-    assert shade(tilted(20), tilted(20), 3, constants).color.all()
-
-
 def test_highlight_wholly_inside_a_span():
     """n = 1000: both ends are dark, the peak is where the curve passes it."""
     constants = constants_of([(UP, 0.0, 1.0)], 1000, ambient=0)
@@ -119,13 +112,6 @@ def test_ambient_only():
         np.testing.assert_array_equal(shade(UP, tilted(20), 5, constants).color, expected)
 
 
-def test_coefficients_over_one_saturate():
-    constants = constants_of([(UP, 0.6, 0.5)])
-    channel = shade(tilted(-20), tilted(20), 41, constants).color[:, 0]
-    assert channel[20] == 255
-    assert channel[0] < 255
-
-
 @pytest.mark.parametrize(("angle", "out_of_range"), [(0, 0), (1e-4, 0), (45, 0), (45.01, 1), (180, 1)])
 def test_spans_out_of_range_are_counted(angle, out_of_range):
     assert shade(UP, tilted(angle), 5, constants_of([(UP, 0.5, 0.5)])).out_of_range_spans == out_of_range
@@ -140,10 +126,6 @@ def test_empty_spans_give_nothing():
 
 
 def test_bad_arguments_are_refused():
-    with pytest.raises(ValueError, match=r"^method must be one of .*quadratic.*, not 'unknown'$"):
-        preset(model="cosquad", method="unknown")
-    with pytest.raises(ValueError, match=r"^model must be one of cosquad, .*, blinn, .*, ggx, not 'phong'$"):
-        preset(model="phong")
     with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
         preset("quadratic", "cosquad", operand="sine")
     for method in ("angular", "chord"):

@@ -173,6 +173,7 @@ def test_widest_span():
         for exponent in (1, 10, 1000):
             widest = method.widest_span(exponent)
             assert widest == (30 if name.startswith("chord") else method.MAX_ANGLE)
+    assert METHODS["renormalise"].widest_span(1000) == 180
     assert largest_span_angle(1) == largest_span_angle(5) == 15.0
     assert abs(largest_span_angle(64) - 10.0) < 1e-12
     assert abs(largest_span_angle(1000) - 20 / 1000 ** (1 / 6)) < 1e-12

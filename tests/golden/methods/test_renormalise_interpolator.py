@@ -100,13 +100,6 @@ def test_operand_error():
         )
 
 
-def test_it_has_no_gate_and_cuts_no_span():
-    assert not METHOD.serves_gate
-    assert not METHOD.CUT_BY_ERROR
-    assert METHOD.takes_line
-    assert METHOD.widest_span(1000) == 180
-
-
 def torus(around, along, radius=0.45):
     """A coarse torus about the y axis with the exact normals of its vertices."""
     u, v = np.meshgrid(*(np.arange(n) * (2 * np.pi / n) for n in (around, along)), indexing="ij")

@@ -6,6 +6,7 @@ import pytest
 from blysk.golden.reference.geometry import Mesh
 
 VERTICES = np.eye(3)
+NO_MATERIAL = "material must be an index of 0 or more for each of the 1 faces"
 
 
 @pytest.mark.parametrize(
@@ -18,8 +19,12 @@ VERTICES = np.eye(3)
         ({"faces": np.array([[0, 1, -1]])}, "faces must index the 3 vertices"),
         ({"vertices": np.full((3, 3), np.inf)}, "vertices and normals must be finite"),
         ({"normals": np.full((3, 3), np.nan)}, "vertices and normals must be finite"),
-        ({"material": np.zeros(2, int)}, "material must be an index of 0 or more for each of the 1 faces"),
-        ({"material": np.array([-1])}, "material must be an index of 0 or more for each of the 1 faces"),
+        ({"material": np.zeros(2, int)}, NO_MATERIAL),
+        (
+            {"material": np.zeros((1, 1), int)},
+            NO_MATERIAL,
+        ),
+        ({"material": np.array([-1])}, NO_MATERIAL),
     ],
 )
 def test_bad_arrays_are_refused(given, message):

@@ -253,11 +253,6 @@ def test_stiff_opposite_normals_have_no_middle():
             assert (image[0, 1] == 0).all()
 
 
-def test_stiff_normals_that_are_no_numbers_are_refused():
-    with pytest.raises(ValueError, match=r"^vertices and normals must be finite$"):
-        Mesh(np.eye(3), np.array([[0, 1, 2]]), np.full((3, 3), np.nan))
-
-
 @pytest.mark.parametrize("shading", SHADINGS)
 def test_stiff_normals_of_no_length(shading):
     """Vertex normals 0 give the face's own where normals are interpolated, the ambient term at a vertex."""
@@ -386,12 +381,3 @@ def test_materials_that_fit_a_mesh():
         Scene(ball(), camera, 4, 4, [], LIGHTS)
     with pytest.raises(TypeError, match="a scene's materials must be Material, not str"):
         Scene(mesh, camera, 4, 4, [MATERIAL, "red"], LIGHTS)
-
-
-@pytest.mark.parametrize("material", [np.zeros(3, int), np.full(144, -1), np.zeros((144, 1), int)])
-def test_materials_of_faces_that_are_none(material):
-    mesh = ball()
-    assert len(mesh.faces) == 144
-    assert np.array_equal(mesh.material, np.zeros(144))
-    with pytest.raises(ValueError, match="material must be an index of 0 or more for each of the 144 faces"):
-        replace(mesh, material=material)
