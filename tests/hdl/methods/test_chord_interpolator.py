@@ -8,23 +8,18 @@ from functools import cache
 
 import numpy as np
 import pytest
-from amaranth.hdl import ResetInserter, Signal, Value
-from amaranth.sim import Simulator
 
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.number.spans import pixels_of
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
-from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.methods.chord_interpolator import RECORD as CHORD
 from blysk.sim.units.methods.chord_interpolator import gated
 from blysk.sim.units.methods.local_chord_interpolator import RECORD as LOCAL
-from blysk.sim.units.record import Case, first
 
-from ...checks import assert_beats_equal, words_of
+from ...checks import assert_beats_equal, resets, words_of
 
 
 def chord(lights=1, **options):
@@ -163,90 +158,12 @@ def test_waiting_output_holds_the_input(make):
     np.testing.assert_array_equal(after, 530 + np.arange(len(after)))
 
 
-# Flags and resets.
-
-
-def drive(unit, case, ready, cycles, reset_at=()):
-    """Pixels, cycles of each flag, by cycle, in Amaranth's simulator; resets at some cycles.
-
-    After a reset the spans begin again.
-    """
-    words = words_of(unit.i, case.beats)
-    constants = None
-    if case.constants is not None:
-        (row,) = pack(unit.constants.shape(), single(case.constants))
-        constants = int.from_bytes(row.astype("<u4").tobytes(), "little")
-    reset, runs = Signal(), []
-
-    async def bench(context):
-        if constants is not None:
-            context.set(Value.cast(unit.constants).as_unsigned(), constants)
-        taken, flags, sent = [], {"out_of_range": 0, "wide": 0}, 0
-        for cycle in range(cycles):
-            context.set(reset, cycle in reset_at)
-            context.set(unit.i.valid, sent < len(words))
-            context.set(Value.cast(unit.i.payload).as_unsigned(), words[min(sent, len(words) - 1)])
-            context.set(unit.o.ready, ready(cycle))
-            if cycle in reset_at:
-                runs.append((taken, flags))
-                taken, flags, sent = [], {"out_of_range": 0, "wide": 0}, 0
-            else:
-                sent += context.get(unit.i.valid & unit.i.ready)
-                if context.get(unit.o.valid & unit.o.ready):
-                    taken.append(context.get(Value.cast(unit.o.payload).as_unsigned()))
-                for name in flags:
-                    if name in unit.signature.members:
-                        flags[name] += context.get(getattr(unit, name))
-            await context.tick()
-        runs.append((taken, flags))
-
-    simulator = Simulator(ResetInserter(reset)(unit))
-    simulator.add_clock(1e-6)
-    simulator.add_testbench(bench)
-    simulator.run()
-    return runs
-
-
-def single(beat):
-    """One beat of constants."""
-    if isinstance(beat, dict):
-        return {name: single(value) for name, value in beat.items()}
-    return np.asarray(beat)[np.newaxis]
-
-
 @pytest.mark.parametrize("make", [chord, local])
 def test_reset_in_mid_span_leaves_nothing(make):
     """Resets at every stage of a span, also between its three normals: the spans then come as at first."""
-    unit = make()
-    length = np.tile([5, 1, 2, 3], 3)
-    case = case_of(make, unit, length)
-    expected = words_of(unit.o, RECORDS[make].expect(unit, case))
-    starts, gap = [], 110
-    resets = [gap * k + offset for k, offset in enumerate((1, 2, 3, 4, 5, 14, 17, 28, 30, 42, 47, 52), 1)]
-    runs = drive(unit, case, lambda cycle: True, resets[-1] + 200, resets)
-    assert len(runs) == len(resets) + 1
-    for taken, _ in runs:
-        # A run that was cut short has the first pixels of all.
-        assert taken == expected[: len(taken)]
-        starts.append(len(taken))
-    assert starts[-1] == len(expected)
-    assert all(count == len(expected) for count in starts[1:])
-
-
-def test_flags_are_high_once_a_span():
-    """As often as the model flags spans, under stalls; spans of one or two pixels are not flagged."""
-    unit = chord()
-    rng = np.random.default_rng(3)
-    case = CHORD.stimuli["limits"].make(unit, rng, 60)
-    wide = CHORD.stimuli["spans"].make(unit, rng, 500)
-    case = Case(
-        {name: np.concatenate([first(case.beats[name], 60), wide.beats[name][:40]]) for name in case.beats},
-        case.constants,
-    )
-    case.beats["length"][:] = rng.integers(1, 6, len(case.beats["length"]))
-    status = CHORD.status(unit, case)
-    assert min(status.values()) > 5
-    ready = rng.random(3000) < 0.6
-    ((taken, flags),) = drive(unit, case, lambda cycle: int(ready[cycle]), 1200)
-    assert len(taken) == pixels_of(case.beats["length"])[0].size
-    assert flags == status
+    unit, count = make(), 12
+    case = case_of(make, unit, np.tile([5, 1, 2, 3], 4))
+    befores = (1, 2, 3, 4, 5, 14, 17, 28, 30, 42, 47, 52)
+    found, *others = resets(unit, case, befores, cycles=110, count=count)
+    assert [word for _, word in found] == words_of(unit.o, RECORDS[make].expect(unit, case.first(count)))
+    assert all(other == found for other in others)
