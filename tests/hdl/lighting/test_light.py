@@ -1,25 +1,11 @@
 # amaranth: UnusedElaboratable=no
-"""Light unit: cycles of lit and dark beats, terms at the terminator; `tests.test_units` does the rest."""
+"""Light unit: cycles of lit and dark beats; `tests.test_units` has its terms."""
 
 import numpy as np
 import pytest
 
-from blysk.hdl.lighting.light import LightUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.lighting.light import RECORD
-
-
-def test_terms_at_the_terminator():
-    """The highlight, however bright, comes and goes with N.L: 0, one code more and less, any one bit."""
-    unit = LightUnit()
-    run = next(RECORD.runs(unit, "terminator"))
-    cosine = run.case.beats["cosine"]
-    lit = cosine > 0
-    assert np.count_nonzero(lit) == 34
-    found = simulate(unit, run.case.beats, count=run.count, constants=run.case.constants, engine="pysim")
-    np.testing.assert_array_equal(found.beats["specular"], lit * (2**17 - 2))
-    rounded = np.minimum(cosine + 2**16 >> 17, 2**17 - 1)
-    np.testing.assert_array_equal(found.beats["diffuse"], lit * rounded)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
-from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
+from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.light_products import LightProductsUnit
 from blysk.sim.units.methods.light_products import RECORD
@@ -31,20 +31,6 @@ def test_products_are_exact_integers(operand, stimulus):
         square = np.where(far, halved, np.square(difference).sum(axis=-1))
         exact = np.minimum(square >> 10, Specular.ARGUMENT_FORMAT.max_code)
     np.testing.assert_array_equal(found["highlight"], exact)
-
-
-def test_chord_is_that_of_vectors():
-    """Half a squared chord is 1 - N.H, in float64, within its bound."""
-    unit = LightProductsUnit(LinearInterpolator(operand="one_minus_cosine"), 3)
-    case = next(RECORD.runs(unit, "normals")).case
-    kept = np.abs(np.linalg.norm(case.beats / ONE, axis=-1) - 1) < COMPONENT.step
-    normals, halfway = case.beats[kept] / ONE, case.constants["halfway"][[0, 2]] / ONE
-    found = RECORD.expect(unit, case)["highlight"][kept][:, [0, 2]] * Specular.ARGUMENT_FORMAT.step
-    # Halving cuts half a step of each difference, counted |N - H| times; the codes' lengths are within half a
-    # step of 1; the last cut.
-    bound = 2 * np.sqrt(3) * COMPONENT.step + COMPONENT.step + 2.0**-25
-    error = np.abs(found - ONE_SQUARED.values * (1 - normals @ halfway.T)).max()
-    assert bound / 8 < error <= bound + 2 * (1 - ONE_SQUARED.values)
 
 
 @pytest.mark.long
