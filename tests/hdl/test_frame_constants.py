@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from amaranth.hdl import Module, ResetInserter, Signal, Value
+from amaranth.hdl import ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
 from blysk.golden.frame_constants import (
@@ -17,17 +17,16 @@ from blysk.golden.frame_constants import (
     FrameConstants,
     writes_of,
 )
-from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.number.unit_vector import ONE, quantise
-from blysk.golden.pipeline import Spans
+from blysk.golden.number.unit_vector import ONE
 from blysk.golden.presets import preset
-from blysk.golden.reference.geometry import normalise
 from blysk.hdl.frame_constants import FrameConstantsUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.operands import pairs_at
+from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.units.pipeline_spans import any_constants, any_spans
 
-from .pixels import assert_pixels
+from ..checks import assert_beats_equal, words_of
 
 
 def run_bench(m, bench):
@@ -37,18 +36,10 @@ def run_bench(m, bench):
     simulator.run()
 
 
-def random_constants(rng, lights):
-    vectors = quantise(normalise(rng.normal(size=(2, lights, 3))))
-    colors = Intensity.color(rng.uniform(0, 0.6, (2, lights, 3)))
-    return FrameConstants(
-        int(rng.integers(1, 30)), Intensity.color(rng.uniform(0, 0.2, 3)), *vectors, *colors
-    )
-
-
 # The registers alone.
 
 
-def words_of(constants, lights):
+def words_by_address(constants, lights):
     """Where each address's word is in the output: (fields to it, width, signed)."""
     words = {}
     for name, (first, count) in FIELDS_OF_A_FRAME.items():
@@ -74,7 +65,7 @@ def test_every_address_writes_its_constant_and_no_other(lights):
     """All 512 addresses, in random order, twice: a word is seen two cycles later, every other one stays."""
     rng = np.random.default_rng(lights)
     unit = FrameConstantsUnit(lights)
-    words = words_of(unit.constants, lights)
+    words = words_by_address(unit.constants, lights)
     assert len(words) == 4 + 12 * lights
     # The words cover the output: nothing is left that no address writes.
     assert sum(len(word) for word in words.values()) == len(Value.cast(unit.constants))
@@ -106,7 +97,7 @@ def test_every_address_writes_its_materials_constant_and_no_other(lights):
     rng = np.random.default_rng(10 + lights)
     materials = 3
     unit = FrameConstantsUnit(lights, materials)
-    words = words_of(unit.constants, lights)
+    words = words_by_address(unit.constants, lights)
     of_frame = [(light + 1) * LIGHT_STRIDE + k for light in range(lights) for k in range(6)]
 
     async def bench(ctx):
@@ -151,27 +142,6 @@ def test_numbers_of_materials_out_of_range(materials):
         FrameConstantsUnit(1, materials)
 
 
-def test_writes_of_a_frame_give_its_constants():
-    """The beats of `FrameConstants.writes`, read back by name."""
-    given = random_constants(np.random.default_rng(3), 2)
-    unit = FrameConstantsUnit(2)
-    writes = given.writes()
-
-    async def bench(ctx):
-        for address, data in zip(writes["address"].tolist(), writes["data"].tolist(), strict=True):
-            await write(ctx, unit, address, data)
-        await ctx.tick()
-        constants = unit.constants
-        assert ctx.get(constants.exponent) == given.exponent
-        assert [ctx.get(Value.cast(constants.ambient[k])) for k in range(3)] == given.ambient.tolist()
-        for name in FIELDS_OF_A_LIGHT:
-            for light in range(2):
-                codes = [ctx.get(Value.cast(constants.lights[light][name][k])) for k in range(3)]
-                assert codes == getattr(given, name)[light].tolist()
-
-    run_bench(unit, bench)
-
-
 def test_hold_keeps_a_write_waiting():
     unit = FrameConstantsUnit(1)
 
@@ -200,30 +170,8 @@ def test_hold_keeps_a_write_waiting():
 # Behind the pipeline's write port.
 
 
-def random_spans(rng, lengths):
-    lengths = np.asarray(lengths)
-    left, right = pairs_at(rng, len(lengths), rng.uniform(0, 40, len(lengths)))
-    x, y = rng.integers(0, 4000, len(lengths)), rng.integers(0, 4096, len(lengths))
-    return Spans(x, y, lengths, quantise(left), quantise(right))
-
-
-def part(spans, start, stop):
-    fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-    return Spans(*(getattr(spans, f)[start:stop] for f in fields))
-
-
-def random_materials(rng, lights, materials):
-    """Constants of several materials under the same lights, the exponents and colours far apart."""
-    first = random_constants(rng, lights)
-    return [
-        replace(
-            random_constants(rng, lights),
-            exponent=1 + 40 * index,
-            direction=first.direction,
-            halfway=first.halfway,
-        )
-        for index in range(materials)
-    ]
+ALL_ONES = (1 << 27) - 1
+"""Address and data of a write that is not offered."""
 
 
 class Driver:
@@ -231,18 +179,14 @@ class Driver:
 
     PIXEL = ("x", "y", "r", "g", "b", "last")
 
-    def __init__(self, unit):
-        self.unit = unit
-        self.several = unit.parameters.materials > 1
-        self.module = Module()
-        self.reset = Signal()
-        self.module.submodules.unit = ResetInserter(self.reset)(unit)
+    def __init__(self, design):
+        self.unit, self.reset = ShadingPipelineUnit(design), Signal()
+        self.module = ResetInserter(self.reset)(self.unit)
 
-    def normals(self, spans):
-        """Of both ends, and of the middle where the method takes one."""
-        middle = self.unit.parameters.interpolator.TAKES_MIDDLE
-        ends = {"left": spans.normal_left, "right": spans.normal_right}
-        return ends | ({"middle": spans.middle} if middle else {})
+    async def restart(self, ctx):
+        ctx.set(self.reset, 1)
+        await ctx.tick()
+        ctx.set(self.reset, 0)
 
     async def run(self, ctx, cycles, spans, writes, late=None, stalls=(False,)):
         """Writes, then spans; ``late = (cycle, writes)`` offers more writes from that cycle on.
@@ -250,32 +194,20 @@ class Driver:
         Returns the pixels with their cycles, the cycles of spans taken, and those of writes taken.
         """
         unit = self.unit
-        queue = list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
+        words, queue = words_of(unit.i, beats_of(unit, spans)), words_of(unit.write, writes)
+        first = len(queue)
         pixels, span_cycles, write_cycles = [], [], []
-        total = len(queue)
         for clock in range(cycles):
             if late and clock == late[0]:
-                queue += zip(late[1]["address"].tolist(), late[1]["data"].tolist(), strict=True)
-                total = len(queue)
+                queue += words_of(unit.write, late[1])
             writing = len(write_cycles) < len(queue)
-            address, data = queue[len(write_cycles)] if writing else (511, 2**18 - 1)
             ctx.set(unit.write.valid, writing)
-            ctx.set(unit.write.payload, {"address": address, "data": data})
+            word = queue[len(write_cycles)] if writing else -1
+            ctx.set(Value.cast(unit.write.payload).as_unsigned(), word & ALL_ONES)
             # The first frame's writes come before its spans; a late one beside them.
-            offered = len(span_cycles) < len(spans) and (len(write_cycles) >= len(writes["address"]))
-            index = len(span_cycles)
+            offered = len(span_cycles) < len(words) and len(write_cycles) >= first
             if offered:
-                ctx.set(
-                    unit.i.payload,
-                    {
-                        **{name: int(getattr(spans, name)[index]) for name in ("x", "y", "length")},
-                        **{
-                            f"normal_{place}": [c * 2.0**-17 for c in normals[index].tolist()]
-                            for place, normals in self.normals(spans).items()
-                        },
-                        **({"material": int(spans.material[index])} if self.several else {}),
-                    },
-                )
+                ctx.set(Value.cast(unit.i.payload).as_unsigned(), words[len(span_cycles)])
             ctx.set(unit.i.valid, offered)
             stalled = stalls[clock % len(stalls)]
             ctx.set(unit.o.ready, not stalled)
@@ -288,7 +220,7 @@ class Driver:
             await ctx.tick()
         ctx.set(unit.write.valid, 0)
         ctx.set(unit.i.valid, 0)
-        assert len(write_cycles) == total or cycles < 200
+        assert len(write_cycles) == len(queue) or cycles < 200
         return pixels, span_cycles, write_cycles
 
 
@@ -320,11 +252,11 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
     """
     rng = np.random.default_rng(late_cycle)
     design = preset(method, "cosquad", materials=materials)
-    first, second = random_materials(rng, 1, materials), random_materials(rng, 1, materials)
-    spans = random_spans(rng, rng.integers(1, 12, 60))
+    spans = any_spans(rng, design, rng.integers(1, 12, 60))
     spans = replace(spans, material=np.arange(60) // 10 % materials)
+    first, second = (any_constants(rng, design, spans) for _ in range(2))
     cycles = 960 if materials == 1 else 1700
-    driver = Driver(ShadingPipelineUnit(design))
+    driver = Driver(design)
     result = []
 
     async def bench(ctx):
@@ -338,9 +270,9 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
     late_writes = write_cycles[len(writes_of(first)["address"]) :]
     before = sum(clock < late_writes[0] for clock in span_cycles)
     assert 0 < before < len(spans) == len(span_cycles)
-    expected = pixels_of(design, part(spans, 0, before), first)
+    expected = pixels_of(design, spans[:before], first)
     last_clock = pixels[len(expected) - 1][0]
-    expected += pixels_of(design, part(spans, before, None), second)
+    expected += pixels_of(design, spans[before:], second)
     assert [pixel for _, pixel in pixels] == expected
     # No span comes between the offer of the writes and the last of them, and no write before the last pixel.
     assert not any(late_cycle <= clock <= late_writes[-1] for clock in span_cycles)
@@ -364,43 +296,37 @@ def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method):
     """Spans in the setup, in the FIFOs and half shaded: after a reset the pipeline does as from power-up."""
     rng = np.random.default_rng(reset_at)
     design = preset(method, "cosquad", materials=materials)
-    spans = random_spans(rng, np.r_[40, rng.integers(0, 12, 11)])
+    spans = any_spans(rng, design, np.r_[40, rng.integers(0, 12, 11)])
     spans = replace(spans, material=np.arange(12) // 4 % materials)
-    constants = random_materials(rng, 1, materials)
-    writes = writes_of(constants)
+    other = any_spans(rng, design, rng.integers(0, 30, 40))
+    other = replace(other, material=rng.permutation(np.arange(40) // 4 % materials))
+    constants = any_constants(rng, design, spans)
     cycles = 330 if materials == 1 else 600
     stalls = (rng.random(31) < 0.2).tolist()
-    fresh, again, status = [], [], []
+    driver, runs, status = Driver(design), [], []
 
-    async def from_power_up(ctx):
-        fresh.append(await fresh_driver.run(ctx, cycles, spans, writes, stalls=stalls))
-
-    async def after_reset(ctx):
-        other = random_spans(rng, rng.integers(0, 30, 40))
-        other = replace(other, material=rng.permutation(np.arange(40) // 4 % materials))
+    async def bench(ctx):
         unit = driver.unit
-        await driver.run(ctx, reset_at, other, writes_of(random_materials(rng, 1, materials)))
-        ctx.set(driver.reset, 1)
-        await ctx.tick()
-        ctx.set(driver.reset, 0)
+        runs.append(await driver.run(ctx, cycles, spans, writes_of(constants), stalls=stalls))
+        await driver.restart(ctx)
+        await driver.run(ctx, reset_at, other, writes_of(any_constants(rng, design, other)))
+        await driver.restart(ctx)
         status.append([ctx.get(unit.status[n]) for n in ("out_of_range_spans", "empty_spans", "overrun")])
         assert ctx.get(unit.o.valid) == 0
-        again.append(await driver.run(ctx, cycles, spans, writes, stalls=stalls))
+        runs.append(await driver.run(ctx, cycles, spans, writes_of(constants), stalls=stalls))
         status.append(ctx.get(unit.status.empty_spans))
 
-    fresh_driver, driver = Driver(ShadingPipelineUnit(design)), Driver(ShadingPipelineUnit(design))
-    run_bench(fresh_driver.module, from_power_up)
-    run_bench(driver.module, after_reset)
+    run_bench(driver.module, bench)
+    fresh, again = runs
     assert again == fresh
-    assert [pixel for _, pixel in again[0][0]] == pixels_of(design, spans, constants)
+    assert [pixel for _, pixel in again[0]] == pixels_of(design, spans, constants)
     assert status == [[0, 0, 0], np.count_nonzero(spans.length == 0)]
 
 
 def test_reset_clears_the_constants():
     """Black light and no ambient: a span after a reset without writes is black."""
-    rng = np.random.default_rng(1)
-    driver = Driver(ShadingPipelineUnit())
-    spans = random_spans(rng, [3])
+    design = preset(model="cosquad")
+    driver, spans = Driver(design), any_spans(np.random.default_rng(1), design, np.array([3]))
     none = {"address": np.zeros(0, int), "data": np.zeros(0, int)}
     result = []
 
@@ -409,9 +335,7 @@ def test_reset_clears_the_constants():
             1, np.full(3, 2**17 - 1), *[np.array([[0, 0, ONE]])] * 2, *[np.full((1, 3), 999)] * 2
         )
         result.append(await driver.run(ctx, 150, spans, bright.writes()))
-        ctx.set(driver.reset, 1)
-        await ctx.tick()
-        ctx.set(driver.reset, 0)
+        await driver.restart(ctx)
         result.append(await driver.run(ctx, 150, spans, none))
 
     run_bench(driver.module, bench)
@@ -424,10 +348,13 @@ def test_reset_clears_the_constants():
 # Several materials in the pipeline.
 
 
-def run_pipeline(unit, spans, constants, count, **options):
-    fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-    beats = {name: getattr(spans, name) for name in fields}
-    return simulate(unit, beats, count=count, write=writes_of(constants), **options)
+def shade(unit, spans, constants, engine):
+    """Pixels of the materials that there are equal the model's."""
+    pixels = pixel_beats(unit.parameters.compute(spans, constants[: unit.parameters.materials]))
+    options = {"count": len(pixels["x"]), "write": writes_of(constants), "engine": engine}
+    run = simulate(unit, beats_of(unit, spans), **options)
+    assert_beats_equal(run.beats, pixels)
+    return run
 
 
 def test_cost_of_a_material_change():
@@ -441,11 +368,8 @@ def test_cost_of_a_material_change():
     unit = ShadingPipelineUnit(design)
     lengths = np.array([20, 20, 20, 20, 0, 20, 0, 20, 20, 0, 0, 20])
     material = np.array([0, 0, 1, 2, 2, 1, 2, 1, 0, 1, 2, 0])
-    spans = replace(random_spans(rng, lengths), material=material)
-    constants = random_materials(rng, 1, 3)
-    pixels = design.compute(spans, constants)
-    run = run_pipeline(unit, spans, constants, len(pixels.x), engine="pysim")
-    assert_pixels(run, pixels)
+    spans = replace(any_spans(rng, design, lengths), material=material)
+    run = shade(unit, spans, any_constants(rng, design, spans), "pysim")
     first = np.cumsum(lengths) - lengths
     # Clocks from the last pixel of the span before: to the next span taken, to its first pixel.
     waits = {
@@ -471,9 +395,8 @@ def test_indices_of_no_material_change_nothing():
     rng = np.random.default_rng(35)
     design = preset(model="cosquad", method="linear", materials=3)
     unit = ShadingPipelineUnit(design)
-    spans = random_spans(rng, rng.integers(1, 9, 12))
+    spans = any_spans(rng, design, rng.integers(1, 9, 12))
     spans = replace(spans, material=np.arange(12) // 4)
-    constants = random_materials(rng, 1, 4)
-    pixels = design.compute(spans, constants[:3])
+    constants = any_constants(rng, replace(design, materials=4), spans)
     for engine in ("auto", "pysim"):
-        assert_pixels(run_pipeline(unit, spans, constants, len(pixels.x), engine=engine), pixels)
+        shade(unit, spans, constants, engine)
