@@ -12,7 +12,6 @@ from amaranth.sim import Simulator
 
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.reference.lobes import BECKMANN, GGX
 from blysk.golden.reference.reflection import BLINN
 from blysk.hdl.core.fixed import FixedShape
@@ -21,6 +20,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.lobe import LobeMemory, LobeUnit, lobe_write_shape
 from blysk.hdl.lighting.specular import highlight_shape
 from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.lighting.lobe import RECORD
 
 OPERANDS = ("cosine", "one_minus_cosine")
 CHORD = "one_minus_cosine"
@@ -28,28 +28,11 @@ LOBE = Lobe(operand=CHORD)
 CASES = ((BLINN, 1), (BLINN, 20), (BLINN, 1000), (BECKMANN, 0.3), (BECKMANN, 1), (GGX, 0.05), (GGX, 1))
 
 
-def operands(parameters, seed, count=600):
-    """Ends of every step, codes of every octave, and the ends of the word."""
-    rng, format = np.random.default_rng(seed), parameters.operand_format
-    bits = parameters.fraction_bits
-    knots = np.ldexp(parameters.knots, bits).astype(np.int64)
-    u = np.r_[knots, knots - 1, (2.0 ** (bits - rng.uniform(-1, bits, count))).astype(np.int64)]
-    if parameters.operand == "cosine":
-        one = ONE_SQUARED.codes.item()
-        low = rng.integers(0, 1 << 34 - bits, len(u)) if bits < 34 else 0
-        codes = one - (u << 34 - bits) - low
-        ends = [one, one - 1, one + 1, one + 10**6, 0, 1, -1, -one, one - (1 << 34), format.min_code]
-    else:
-        codes, ends = u, [0, 1, 2, format.max_code - 1, 1 << bits, (1 << bits) + 1]
-    codes = rng.permutation(np.r_[ends, format.max_code, codes])
-    return np.clip(codes, format.min_code, format.max_code)
-
-
-def beats_of(parameters, codes, table, seed=0):
-    """Input beats, a tenth of them dark, and the model's terms."""
-    dark = np.random.default_rng(seed).random(len(codes)) < 0.1
-    expected = parameters.compute(Fixed(parameters.operand_format, codes), dark, table).codes
-    return {"operand": codes, "dark": dark.astype(np.uint8)}, expected
+def beats_of(unit, table, seed=0):
+    """Beats of the record, at the ends of every step, a tenth of them dark; and the model's terms."""
+    beats = RECORD.stimuli["highlights"].make(unit, np.random.default_rng(seed), 1300).beats
+    operand = Fixed(unit.parameters.operand_format, beats["operand"])
+    return beats, unit.parameters.compute(operand, beats["dark"], table).codes
 
 
 def writes_of(*writes):
@@ -74,7 +57,7 @@ def test_banks(fixed, interval):
         order = [3, 0, 4, 2, 1]
         write = writes_of(tables[0].writes(2), *(tables[bank].writes(bank) for bank in order))
     for bank, table in enumerate(tables):
-        beats, expected = beats_of(parameters, operands(parameters, bank), table, bank)
+        beats, expected = beats_of(unit, table, bank)
         check(unit, beats, expected, write=write, constants={"bank": bank})
 
 
@@ -93,7 +76,7 @@ def test_writes_that_are_lost():
             old, values=Fixed(old.values.format, np.r_[new.values.codes[:49], old.values.codes[49:]])
         )
         for k in range(3):
-            beats, expected = beats_of(parameters, operands(parameters, k), half if k == 1 else old)
+            beats, expected = beats_of(unit, half if k == 1 else old, k)
             if k == 1:
                 # The last word written leads to the new table's value; that of the old one is behind it.
                 entry, _ = parameters.address(Fixed(LOBE.argument_format, beats["operand"] & (2**25 - 1)))
@@ -108,7 +91,7 @@ def test_writes_go_on_while_the_unit_stands_still():
     parameters = replace(LOBE, banks=2)
     first, second = parameters.table(20), replace(parameters, model=GGX).table(0.2)
     unit = LobeUnit(parameters)
-    codes = operands(parameters, 1)[:40]
+    codes = beats_of(unit, first)[0]["operand"][:40]
     writes = second.writes(1)
     found = []
 
@@ -217,7 +200,7 @@ def test_two_units_share_a_memory(intervals, fixed):
     rng = np.random.default_rng(8)
     beats, expected = {}, {}
     for name, seed in (("first", 1), ("second", 2)):
-        beats[name], expected[name] = beats_of(LOBE, operands(LOBE, seed), table, seed)
+        beats[name], expected[name] = beats_of(both.units[0], table, seed)
     count = len(expected["first"])
     for share in (0.0, 0.5, 0.9):
         stalls = {"output_stalls": rng.random(1009) < share, "input_stalls": rng.random(997) < 0.2}
@@ -235,7 +218,8 @@ def test_two_units_share_a_memory(intervals, fixed):
 def test_dark_beats_do_not_toggle(operand):
     """Of beats that are dark or behind, only the input's and the first registers change."""
     parameters = Lobe(operand=operand)
-    unit = LobeUnit(parameters, tables=[parameters.table(20)])
+    table = parameters.table(20)
+    unit = LobeUnit(parameters, tables=[table])
     fragment = Fragment.get(unit, None)
     ((path, _, _),) = [part for part in fragment.subfragments if part[1] == "datapath"]
     registers = {
@@ -248,7 +232,7 @@ def test_dark_beats_do_not_toggle(operand):
     del registers["one_minus_cosine"]
     seen = []
     rng = np.random.default_rng(3)
-    codes = operands(parameters, 4)
+    codes = beats_of(unit, table)[0]["operand"]
     behind = codes[codes <= 0] if operand == "cosine" else codes[codes >= 1 << 25]
     lit = codes[codes > 0] if operand == "cosine" else codes[codes < 1 << 25]
 
