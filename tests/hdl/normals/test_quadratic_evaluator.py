@@ -5,7 +5,6 @@ import pytest
 
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from blysk.golden.number.spans import pixels_of
-from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.normals.quadratic_evaluator import RECORD, spans_of
@@ -45,13 +44,6 @@ def test_short_spans_come_seven_cycles_apart(unit):
     # The polynomial takes a pixel in every cycle (horner: every second, counted from a pixel inside).
     late = run.cycles - (run.input_cycles[span] + unit.latency + unit.cycles_per_pixel * index)
     assert np.all((late >= 0) & (late < unit.cycles_per_pixel))
-
-
-@pytest.mark.long
-def test_parts(unit):
-    cost = cost_of(unit)
-    assert cost.multiplier_count == {"direct": 7, "horner": 3}[unit.parameters.form]
-    assert cost.rom_bits == 2048 * 18
 
 
 def test_reset_in_mid_span(unit):

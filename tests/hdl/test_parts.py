@@ -1,0 +1,141 @@
+# amaranth: UnusedElaboratable=no
+"""Times and parts of units at every interval, as their texts state them; defaults, and what they refuse.
+
+`tests.test_units` holds the units against their models. Parts of their usual structures are baselines.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import pytest
+
+from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.difference_setup import DifferenceSetup
+from blysk.hdl.cosines.angular_setup import AngularSetupUnit
+from blysk.hdl.cosines.arccos import ArccosUnit
+from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.half_chord import HalfChordUnit
+from blysk.hdl.cosines.span_limit import SpanLimitUnit
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
+from blysk.hdl.lighting.power import PowerUnit
+from blysk.hdl.normals.bisection import BisectionUnit
+from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
+from blysk.hdl.normals.line_setup import LineSetupUnit
+from blysk.hdl.normals.middle_normal import MiddleNormalUnit
+from blysk.hdl.normals.renormaliser import RenormaliserUnit
+
+
+class Stated(NamedTuple):
+    """What the text of a unit states: its default interval and its largest one, ``None`` if there is none.
+
+    ``multipliers`` and ``latencies`` are those at the intervals 1, 2, ...; ``rom_bits`` those of its tables.
+    """
+
+    make: Callable
+    default: int
+    largest: int | None
+    multipliers: list[int]
+    latencies: list[int] | None = None
+    rom_bits: int | None = None
+
+
+TO_45, LINE_TO_45, PUBLISHED = Bisection(2, 45), Bisection(1, 45), DifferenceSetup(as_published=True)
+STATED = {
+    "angular setup, half chord": Stated(
+        partial(AngularSetupUnit, AngularSetup("half_chord")),
+        *(6, 26, [26, 13, 9, 7, 6, 5], [53, 54, 55, 58, 58, 59]),
+    ),
+    "angular setup, arccos": Stated(
+        partial(AngularSetupUnit, AngularSetup("arccos")),
+        *(6, 21, [23, 13, 9, 8, 7, 6], [53, 54, 56, 59, 59, 58]),
+    ),
+    "half chord": Stated(HalfChordUnit, 6, 6, [6, 3, 2, 2, 2, 1], [25, 28, 26, 27, 26, 32]),
+    "middle normal": Stated(
+        *(MiddleNormalUnit, 6, 9, [9, 5, 3, 3, 2, 2, 2, 2, 1], [26, 28, 29, 28, 30, 34, 30, 28, 39])
+    ),
+    "bisection": Stated(
+        *(BisectionUnit, 6, 9, [9, 5, 3, 3, 2, 2, 2, 2, 1], [23, 25, 26, 24, 29, 27, 25, 25, 38])
+    ),
+    "bisection to 45 degrees": Stated(
+        partial(BisectionUnit, TO_45), 5, 8, [8, 4, 3, 2, 2, 2, 2, 1], [20, 22, 23, 25, 24, 23, 23, 29]
+    ),
+    "bisection to 45 degrees by a line": Stated(
+        partial(BisectionUnit, LINE_TO_45), 4, 7, [7, 4, 3, 2, 2, 2, 1], [17, 19, 20, 21, 19, 20, 25]
+    ),
+    "difference setup": Stated(
+        DifferenceSetupUnit, 7, 7, [7, 4, 3, 2, 2, 2, 1], [17, 18, 18, 20, 21, 21, 24], 2048 * 17
+    ),
+    "difference setup as published": Stated(
+        partial(DifferenceSetupUnit, PUBLISHED),
+        *(9, 9, [9, 5, 3, 3, 2, 2, 2, 2, 1], [20, 21, 23, 22, 25, 23, 22, 22, 29], 2048 * 17),
+    ),
+    "difference setup of lines": Stated(
+        partial(DifferenceSetupUnit, order=1), 3, 7, [3, 2, *[1] * 5], [11, 13, *[14] * 5], 2048 * 17
+    ),
+    "line setup": Stated(LineSetupUnit, 4, None, [9, 5, 3, 3, 2, 2, 2, 2, 1], None, 2048 * 24),
+    "highlight gate": Stated(
+        *(HighlightGateUnit, 6, 15, [15, 8, 5, 4, 3, 3, 3, *[2] * 7, 1]),
+        [19, 23, 23, 24, 20, 21, 23, 28, 30, 31, 27, 24, 25, 25, 47],
+    ),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", STATED)
+def test_times_and_parts(name):
+    """At every interval; no multiplier has more than 18 bits."""
+    stated = STATED[name]
+    intervals = range(1, len(stated.multipliers) + 1)
+    units = [stated.make(initiation_interval=interval) for interval in intervals]
+    assert [unit.initiation_interval for unit in units] == list(intervals)
+    assert stated.latencies in (None, [unit.latency for unit in units])
+    costs = [cost_of(unit) for unit in units]
+    assert [cost.multiplier_count for cost in costs] == stated.multipliers
+    assert all(max(pair) <= 18 for cost in costs for pair in cost.multipliers)
+    assert stated.rom_bits is None or {cost.rom_bits for cost in costs} == {stated.rom_bits}
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_intervals(name):
+    """The default, and what is no interval."""
+    make, default, largest, *_ = STATED[name]
+    assert make().initiation_interval == default
+    message, none = "interval must be at least 1", [0, -1]
+    if largest is not None:
+        message, none = f"initiation_interval must be 1 to {largest}", [*none, 1.5, 2.5, largest + 1]
+    for interval in none:
+        with pytest.raises(ValueError, match=f"^{message}, not {interval}$"):
+            make(initiation_interval=interval)
+
+
+@pytest.mark.parametrize("bits", [1, 13])
+@pytest.mark.parametrize("make", [ChordSetupUnit, DifferenceSetupUnit, LineSetupUnit])
+def test_lengths_that_no_table_is_made_for(make, bits):
+    with pytest.raises(ValueError, match=rf"^length_bits must be 2 to 12, not {bits}$"):
+        make(length_bits=bits)
+
+
+@pytest.mark.parametrize(("make", "form"), [(ArccosUnit, "fast"), (PowerUnit, "drawn")])
+def test_unknown_form(make, form):
+    with pytest.raises(ValueError, match=rf"^form must be 'pipelined' or 'sequential', not '{form}'$"):
+        make(form=form)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("unit", "times", "multipliers", "rom_bits"),
+    [(RenormaliserUnit(), (16, 1), 8, 64 * 48), (SpanLimitUnit(), (10, 3), 1, 0)],
+    ids=["renormaliser", "span_limit"],
+)
+def test_times_and_parts_of_one_structure(unit, times, multipliers, rom_bits):
+    cost = cost_of(unit)
+    assert (unit.latency, unit.initiation_interval) == times
+    assert (cost.multiplier_count, cost.constant_multipliers, cost.rom_bits) == (multipliers, 0, rom_bits)
+    assert all(max(pair) <= 18 for pair in cost.multipliers)
+
+
+def test_span_limit_without_highlights_has_no_constants():
+    assert "constants" not in SpanLimitUnit(highlights=False).signature.members
