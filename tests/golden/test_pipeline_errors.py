@@ -18,6 +18,7 @@ from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity, saturate
 from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.sim.units.cosines.chord_setup import parabola
 from blysk.sim.units.operands import pairs_at
 
 from ..lists import FURTHER_MODELS, SPECULAR_MODELS
@@ -141,12 +142,6 @@ FITTED_MODELS = ("cosquad", "cosquad7", "cosquad_lin", "exp")
 FITTED_MODELS += tuple(model for model in FURTHER_MODELS if model.startswith("lyon"))
 
 
-def fitted(values, t):
-    """The quadratic through values at 0, 1/2 and 1."""
-    left, middle, right = values
-    return (2 * right - 4 * middle + 2 * left) * t**2 + (4 * middle - right - 3 * left) * t + left
-
-
 def chord_cosine_bound(exponent):
     """Bound of the error of N.L against the same fit in float64.
 
@@ -208,7 +203,7 @@ def chord_frame(rng, count, exponent):
         return n @ light, ((n - halfway) ** 2).sum(axis=-1) / 2
 
     three = zip(*(of(n) for n in (left, normalise(left + right), right)), strict=True)
-    fit = [fitted([value[span] for value in values], t) for values in three]
+    fit = [parabola(np.stack(values, axis=-1)[span], t) for values in three]
     return spans, (quantise(light), quantise(halfway)), fit, of(normals)
 
 

@@ -18,8 +18,11 @@ from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import _sample, beats_of
+from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.units.lighting.highlight_gate import spans_about
 from blysk.sim.units.operands import component_words, sphere
+
+from ..checks import assert_beats_equal
 
 DESIGNS = {
     "chord": preset("chord", "blinn"),
@@ -33,17 +36,15 @@ DESIGNS = {
 }
 
 
-QUICK = ("materials, lights, gate",)
-
-
-def colors(beats):
-    return np.stack([beats[channel] for channel in "rgb"], axis=-1)
+def shade(unit, spans, write, expected, **stalls):
+    """Pixels that are those of the model."""
+    expected = pixel_beats(expected)
+    options = {"count": len(expected["x"]), "write": write, "engine": "auto", **stalls}
+    assert_beats_equal(simulate(unit, beats_of(unit, spans), **options).beats, expected)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "design", [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in DESIGNS]
-)
+@pytest.mark.parametrize("design", DESIGNS)
 def test_equals_model(design):
     design = DESIGNS[design]
     unit = ShadingPipelineUnit(design)
@@ -52,16 +53,7 @@ def test_equals_model(design):
     rng = np.random.default_rng(7)
     stalls = {"input_stalls": rng.random(997) < 0.4, "output_stalls": rng.random(1009) < 0.4}
     for options in ({}, stalls):
-        run = simulate(
-            unit,
-            beats_of(unit, spans),
-            count=len(pixels.x),
-            write=writes_of(constants),
-            engine="auto",
-            **options,
-        )
-        np.testing.assert_array_equal(colors(run.beats), pixels.color)
-        np.testing.assert_array_equal(run.beats["x"], pixels.x)
+        shade(unit, spans, writes_of(constants), pixels, **options)
 
 
 def test_a_frame_loads_its_own_tables():
@@ -79,8 +71,7 @@ def test_a_frame_loads_its_own_tables():
     write = {name: np.concatenate([beats[name] for beats in writes]) for name in writes[0]}
     pixels, before = design.compute(spans, second), design.compute(spans, first)
     assert (pixels.color != before.color).any()
-    run = simulate(unit, beats_of(unit, spans), count=len(pixels.x), write=write, engine="auto")
-    np.testing.assert_array_equal(colors(run.beats), pixels.color)
+    shade(unit, spans, write, pixels)
 
 
 def test_gate_by_threshold():

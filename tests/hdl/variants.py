@@ -5,11 +5,11 @@ import pytest
 __all__ = ["mostly_long"]
 
 
-def mostly_long(cases, quick):
-    """Arguments of a parametrised test; all but one case belong to the long run."""
+def mostly_long(cases, *quick):
+    """Arguments of a parametrised test; all but the quick cases belong to the long run."""
     return [
         case
-        if case == quick
+        if case in quick
         else pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
         for case in cases
     ]

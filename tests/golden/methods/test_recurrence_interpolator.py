@@ -93,14 +93,6 @@ def test_direct_form_is_unstable():
         assert stable < 3e-5
 
 
-def test_wide_spans_are_flagged():
-    rng = np.random.default_rng(5)
-    left, right = (quantise(v) for v in pairs_at(rng, 5, [0, 45, 89.99, 90.02, 180]))
-    vectors = [quantise(pairs_at(rng, 1, 0.0)[0]) for _ in range(2)]
-    found = operands_of(RecurrenceInterpolator(), left, right, np.full(5, 3), *vectors)
-    np.testing.assert_array_equal(found.out_of_range, [False, False, False, True, True])
-
-
 def test_refuses_a_form():
     with pytest.raises(ValueError, match=r"^form must be one of reinsch, direct, not 'sine'$"):
         RecurrenceInterpolator("sine")

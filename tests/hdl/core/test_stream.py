@@ -115,9 +115,10 @@ def streams(source_shape, sink_shape):
     )
 
 
-def test_connect_refuses_a_moved_binary_point():
+@pytest.mark.parametrize("join", [connect, connect_slice])
+def test_a_moved_binary_point_is_refused(join):
     with pytest.raises(TypeError, match=r"^payload is SQ\(1, 17\) on one side, SQ\(2, 16\) on the other$"):
-        connect(Module(), *streams(SQ(1, 17), SQ(2, 16)))
+        join(Module(), *streams(SQ(1, 17), SQ(2, 16)))
 
 
 @pytest.mark.parametrize("shape", [SQ(1, 7), struct(a=SQ(1, 3), b=unsigned(4)), unsigned(8)])
@@ -159,11 +160,6 @@ class Registers(wiring.Component):
         for source, sink in itertools.pairwise(streams):
             connect_slice(m, source, sink)
         return m
-
-
-def test_registers_refuse_a_moved_binary_point():
-    with pytest.raises(TypeError, match=r"^payload is SQ\(1, 17\) on one side, SQ\(2, 16\) on the other$"):
-        connect_slice(Module(), *streams(SQ(1, 17), SQ(2, 16)))
 
 
 @pytest.mark.parametrize("cycles", [1, 3])

@@ -49,7 +49,7 @@ def test_halves_of_the_record_are_halves(unit):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("lights", [1, 2, pytest.param(16, marks=pytest.mark.long)])
+@pytest.mark.parametrize("lights", [1, 2, 16])
 def test_compact_costs_one_multiplier(lights):
     cost = cost_of(CompactIntensityUnit(Intensity(lights)))
     assert cost.multipliers == {(17, 17): 1}

@@ -16,6 +16,7 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.lighting.specular import expect, highlights
 
 from ...lists import FURTHER_MODELS, SPECULAR_MODELS
+from ..variants import mostly_long
 
 MODELS = SPECULAR_MODELS + FURTHER_MODELS
 
@@ -36,13 +37,8 @@ TIMING = {
 }
 
 
-def quick(models, chosen):
-    """Models, of which only the chosen ones are in the short run."""
-    return [pytest.param(m, marks=[pytest.mark.long] * (m not in chosen)) for m in models]
-
-
 @pytest.mark.long
-@pytest.mark.parametrize("model", quick(TIMING, ("cosquad", "as_published")))
+@pytest.mark.parametrize("model", TIMING)
 def test_times_and_multipliers_at_every_interval(model):
     products, *latencies = TIMING[model]
     as_published = model == "as_published"
@@ -75,7 +71,7 @@ def test_cost_of_coscos():
         assert cost.rom_bits == 1024 * (17 + 27 * slopes) + 128 * 36 + 64 * 33
 
 
-@pytest.mark.parametrize("model", quick(MODELS, ("cosquad_lin", "cosquad_q", "exp")))
+@pytest.mark.parametrize("model", mostly_long(MODELS, "cosquad_lin", "cosquad_q", "exp"))
 def test_slopes_of_every_exponent(model):
     """Every word that a unit needs of an exponent against the model's tables, two cycles after it.
 
@@ -117,7 +113,7 @@ def test_shared_slope_saves_the_prom(model, tables, interval):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("model", quick(("cosquad", "cosquad_q", "lyon3", "exp"), ("exp",)))
+@pytest.mark.parametrize("model", ["cosquad", "cosquad_q", "lyon3", "exp"])
 def test_fixed_exponent_costs_less(model):
     """No PROM, and one multiplier less: that of the slope is by a constant. No cycle more."""
     parameters = Specular(REFLECTION_MODELS[model])
