@@ -23,7 +23,7 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.units.operands import pairs_at
 from blysk.sim.units.pipeline import RECORD, case_of
-from blysk.sim.units.pipeline_spans import any_constants, any_spans, ends_for, operands_of
+from blysk.sim.units.pipeline_spans import any_constants, any_spans, operands_of
 
 from ..checks import assert_beats_equal
 from ..lists import KINDS
@@ -249,50 +249,6 @@ def test_methods_with_models(method, model):
     spans = any_spans(rng, design, np.r_[1, 2, 3, 16, 0, rng.integers(1, 41, 19)])
     unit, constants = ShadingPipelineUnit(design), any_constants(rng, design, spans)
     shade(unit, spans, constants, engine="pysim", output_stalls=rng.random(101) < 0.3)
-
-
-# Next to either side of the largest angle that each method serves. Linear normals of 45 degrees differ by
-# less than 1 in every component, of 120 degrees by 1.7 in length: by 1 in some.
-@pytest.mark.parametrize(
-    ("method", "in_range", "out_of_range", "flagged"),
-    [
-        ("linear", 45.0, 140.0, 20),
-        # Ends that are opposite meet at 0 in the middle of spans of three pixels alone.
-        ("renormalise", 179.0, 180.0, 9),
-        pytest.param("bisection", 89.99, 90.1, 50, marks=pytest.mark.long),
-        ("quadratic", 44.99, 45.1, 50),
-        pytest.param("quadratic-horner", 44.99, 45.1, 50, marks=pytest.mark.long),
-        pytest.param("angular", 150.0, 180.0, 50, marks=pytest.mark.long),
-    ],
-)
-def test_spans_out_of_range_are_counted(method, in_range, out_of_range, flagged):
-    rng = np.random.default_rng(9)
-    design = preset(method, "cosquad")
-    left, right = pairs_at(rng, 100, np.repeat([in_range, out_of_range], 50))
-    left, right = quantise(left), quantise(right)
-    if out_of_range == 180.0:
-        right[50:] = -left[50:]
-    spans = Spans(np.zeros(100, int), np.zeros(100, int), rng.integers(1, 4, 100), left, right)
-    constants = any_constants(rng, design, spans)
-    for part in (slice(50), slice(50, None)):
-        pixels = design.compute(ends_for(design, spans)[part], constants)
-        assert pixels.out_of_range_spans >= flagged if part.start else not pixels.out_of_range_spans
-    found = shade(ShadingPipelineUnit(design), spans, constants, engine="pysim")
-    assert flagged <= found.status["out_of_range_spans"] <= 50
-
-
-def test_wide_spans_of_the_chord_method_are_counted():
-    """Spans of 30 degrees are wide, whatever the light, and narrower ones where they have a highlight."""
-    rng = np.random.default_rng(12)
-    design = preset("chord", "cosquad")
-    left, right = pairs_at(rng, 100, np.repeat([9.9, 30.2], 50))
-    left, right = quantise(left), quantise(right)
-    spans = Spans(np.zeros(100, int), np.zeros(100, int), np.full(100, 4), left, right)
-    (constants,) = any_constants(rng, design, spans)
-    constants = replace(constants, exponent=63)
-    assert design.compute(spans[:50], constants).wide_spans == 0
-    found = shade(ShadingPipelineUnit(design), spans, [constants], engine="pysim")
-    assert found.status["wide_spans"] == 50
 
 
 @pytest.mark.parametrize(("x", "flagged"), [(4086, 0), (4087, 1)])
