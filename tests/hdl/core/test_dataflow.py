@@ -78,15 +78,6 @@ def copies(g, a, b, n):
     }
 
 
-@pytest.mark.parametrize("interval", INTERVALS)
-def test_copies_hold_values(interval):
-    beats = beats_of(np.random.default_rng(interval))
-    unit = GraphUnit(interval, copies)
-    assert unit.latency == 14 + (interval > 1)
-    expected = {"a": beats["a"], "n": beats["n"], "total": beats["a"] + beats["b"]}
-    verify(unit, beats, expected)
-
-
 def products(g, a, b, n):
     """``a b``, ``b^2``, their product cut to operands, and ``a b`` again after all of it."""
     ab, bb = g.multiply("ab", a, b), g.multiply("bb", b, b)
@@ -97,19 +88,6 @@ def products(g, a, b, n):
         "fourth": FixedShape(SQ(2, 30)),
         "mixed": FixedShape(SQ(2, 27)),
     }
-
-
-@pytest.mark.parametrize("interval", INTERVALS)
-def test_products(interval):
-    beats = beats_of(np.random.default_rng(interval))
-    a, b = (Fixed(OPERAND, beats[name]) for name in "ab")
-    ab, bb = a * b, b * b
-    fourth = ab.truncate(15).saturate(SQ(1, 15)) * bb.truncate(15).saturate(SQ(1, 15))
-    mixed = fourth.truncate(10).saturate(SQ(1, 10)) * a
-    unit = GraphUnit(interval, products)
-    expected = {"ab": ab.codes, "fourth": fourth.codes, "mixed": mixed.codes}
-    verify(unit, beats, expected)
-    assert cost_of(GraphUnit(interval, products)).multiplier_count == -(-4 // interval)
 
 
 def table(g, a, b, n):
@@ -124,13 +102,6 @@ def table(g, a, b, n):
         "total": unsigned(11),
         "late": unsigned(11),
     }
-
-
-@pytest.mark.parametrize("interval", INTERVALS)
-def test_look_up(interval):
-    beats = beats_of(np.random.default_rng(interval))
-    total = beats["n"] ** 2 + beats["n"]
-    verify(GraphUnit(interval, table), beats, {"square": beats["n"] ** 2, "total": total, "late": total})
 
 
 def shifts(g, a, b, n):
@@ -154,18 +125,56 @@ def shifts(g, a, b, n):
     }
 
 
-@pytest.mark.parametrize("interval", INTERVALS)
-def test_operator_of_three_registers(interval):
-    beats = beats_of(np.random.default_rng(interval))
-    amount = beats["n"] & 15
+def late_and_early(g, a, b, n):
+    """A piece read after one register and after both; a wire that is copied in place of its word."""
+
+    def make(register, x, y):
+        first = register(x + y, "first")
+        return first, register((first + x).wrap(SQ(3, 17)), "second")
+
+    functional_unit = g.share("adder", (FixedShape(OPERAND), FixedShape(OPERAND)), 2, make)
+    early = g.use(functional_unit, "early", (a, b), lambda *ab: ab, lambda results: results[0], latency=1)
+    low = g.wire("low", lambda a: Value.cast(a)[:5], a)
+    late = g.register("late", lambda low, n: low ^ n, low, n, since=12)
+    again = g.use(
+        functional_unit, "again", (a, b), lambda *ab: ab, lambda results: results[0], latency=1, since=11
+    )
+    return {"early": early, "late": late, "again": again}, {
+        "early": FixedShape(SQ(2, 17)),
+        "late": unsigned(5),
+        "again": FixedShape(SQ(2, 17)),
+    }
+
+
+def functions_of(a, b, n):
+    """What the results of each graph should be, of the inputs."""
+    x, y = Fixed(OPERAND, a), Fixed(OPERAND, b)
+    fourth = (x * y).truncate(15).saturate(SQ(1, 15)) * (y * y).truncate(15).saturate(SQ(1, 15))
+    mixed = fourth.truncate(10).saturate(SQ(1, 10)) * x
 
     def shifted(value):
-        value = value >> amount
+        value = value >> (n & 15)
         return np.where(value < 0, -1, value)
 
-    unit = GraphUnit(interval, shifts)
-    expected = {"twice": shifted(shifted(beats["a"])), "again": shifted(shifted(beats["b"]))}
-    verify(unit, beats, expected)
+    return {
+        copies: {"a": a, "n": n, "total": a + b},
+        products: {"ab": (x * y).codes, "fourth": fourth.codes, "mixed": mixed.codes},
+        table: {"square": n**2, "total": n**2 + n, "late": n**2 + n},
+        shifts: {"twice": shifted(shifted(a)), "again": shifted(shifted(b))},
+        late_and_early: {"early": a + b, "late": a & 31 ^ n, "again": a + b},
+    }
+
+
+@pytest.mark.parametrize("interval", INTERVALS)
+@pytest.mark.parametrize("graph", [copies, products, table, shifts, late_and_early])
+def test_graphs_equal_their_functions(graph, interval):
+    beats = beats_of(np.random.default_rng(interval))
+    unit = GraphUnit(interval, graph)
+    verify(unit, beats, functions_of(**beats)[graph])
+    if graph is copies:
+        assert unit.latency == 14 + (interval > 1)
+    if graph is products:
+        assert cost_of(GraphUnit(interval, products)).multiplier_count == -(-4 // interval)
 
 
 WORD = 18
@@ -279,36 +288,7 @@ def test_multiplier_bits():
     assert MULTIPLIER_BITS == 18
 
 
-# Words that come later than they could, wiring, and dot products.
-
-
-def late_and_early(g, a, b, n):
-    """A piece read after one register and after both; a wire that is copied in place of its word."""
-
-    def make(register, x, y):
-        first = register(x + y, "first")
-        return first, register((first + x).wrap(SQ(3, 17)), "second")
-
-    functional_unit = g.share("adder", (FixedShape(OPERAND), FixedShape(OPERAND)), 2, make)
-    early = g.use(functional_unit, "early", (a, b), lambda *ab: ab, lambda results: results[0], latency=1)
-    low = g.wire("low", lambda a: Value.cast(a)[:5], a)
-    late = g.register("late", lambda low, n: low ^ n, low, n, since=12)
-    again = g.use(
-        functional_unit, "again", (a, b), lambda *ab: ab, lambda results: results[0], latency=1, since=11
-    )
-    return {"early": early, "late": late, "again": again}, {
-        "early": FixedShape(SQ(2, 17)),
-        "late": unsigned(5),
-        "again": FixedShape(SQ(2, 17)),
-    }
-
-
-@pytest.mark.parametrize("interval", INTERVALS)
-def test_late_words_and_early_results(interval):
-    beats = beats_of(np.random.default_rng(interval))
-    total = beats["a"] + beats["b"]
-    expected = {"early": total, "late": beats["a"] & 31 ^ beats["n"], "again": total}
-    verify(GraphUnit(interval, late_and_early), beats, expected)
+# Dot products.
 
 
 @pytest.mark.parametrize("shared", [False, True])
