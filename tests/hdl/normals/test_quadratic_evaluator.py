@@ -1,4 +1,4 @@
-"""Quadratic evaluators: their cycles, and resets; `tests.test_units` has their results."""
+"""Quadratic evaluators: their cycles; `tests.test_units` has their results."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,6 @@ from blysk.golden.number.spans import pixels_of
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.normals.quadratic_evaluator import RECORD, spans_of
-
-from ...checks import resets
 
 SHORTEST = {"direct": 7, "horner": 4}
 """Pixels of spans between which there is no gap."""
@@ -44,10 +42,3 @@ def test_short_spans_come_seven_cycles_apart(unit):
     # The polynomial takes a pixel in every cycle (horner: every second, counted from a pixel inside).
     late = run.cycles - (run.input_cycles[span] + unit.latency + unit.cycles_per_pixel * index)
     assert np.all((late >= 0) & (late < unit.cycles_per_pixel))
-
-
-def test_reset_in_mid_span(unit):
-    case = spans_of(np.random.default_rng(4), np.array([3, 60]))
-    found, *others = resets(unit, case, [1, 5, 14, 18, 40, 70], 40, 1)
-    assert [cycle for cycle, _ in found] == [unit.latency + unit.cycles_per_pixel * k for k in range(3)]
-    assert all(other == found for other in others)

@@ -1,0 +1,60 @@
+"""Units that make pixels of spans one by one: cycles and resets; `tests.test_units` has their results."""
+
+import numpy as np
+import pytest
+
+from blysk.golden.number.spans import pixels_of
+from blysk.sim.engines.simulate import simulate
+from blysk.sim.units.cosines import highlight_cosine, recurrence
+from blysk.sim.units.normals import difference_accumulator, quadratic_evaluator
+
+from ..checks import assert_beats_equal, resets
+from .variants import mostly_long
+
+HIGHLIGHT_COSINE = (highlight_cosine, highlight_cosine.RECORD.default)
+ACCUMULATOR = (difference_accumulator, difference_accumulator.RECORD.default)
+EVALUATORS = [(quadratic_evaluator, form) for form in ("direct", "horner")]
+RECURRENCES = [(recurrence, variant) for variant in recurrence.MEASURED]
+"""Modules of records, and variants."""
+
+QUICK = (HIGHLIGHT_COSINE, ACCUMULATOR, RECURRENCES[0])
+
+
+def ids(value):
+    return value if isinstance(value, str) else value.RECORD.name
+
+
+def case_of(module, unit, lengths):
+    """Spans of these lengths; some records make them for a unit."""
+    of_unit = () if module in (highlight_cosine, quadratic_evaluator) else (unit,)
+    return module.spans_of(*of_unit, np.random.default_rng(1), np.asarray(lengths))
+
+
+@pytest.mark.parametrize(
+    ("module", "variant"), mostly_long([HIGHLIGHT_COSINE, ACCUMULATOR, *RECURRENCES], *QUICK), ids=ids
+)
+def test_pixels_come_without_gaps(module, variant):
+    """One value in every cycle, or as many cycles later as a pixel takes; an empty span takes a cycle."""
+    unit = module.RECORD.variants[variant].unit()
+    interval = getattr(unit, "cycles_per_pixel", 1)
+    lengths = np.r_[1, 2, 3, 16, 1, 1, 4095 if interval == 1 else 400, 0, 5, 0, 0, 1]
+    case = case_of(module, unit, lengths)
+    run = simulate(unit, case.beats, count=lengths.sum(), engine="auto")
+    assert_beats_equal(run.beats, module.RECORD.expect(unit, case))
+    taken = np.where(lengths > 0, interval * (lengths - 1) + 1, 1)
+    np.testing.assert_array_equal(run.input_cycles, np.cumsum(taken) - taken)
+    span, index = pixels_of(lengths)
+    np.testing.assert_array_equal(run.cycles, run.input_cycles[span] + unit.latency + interval * index)
+
+
+@pytest.mark.parametrize(
+    ("module", "variant"), [HIGHLIGHT_COSINE, ACCUMULATOR, *EVALUATORS, *RECURRENCES], ids=ids
+)
+def test_reset_in_mid_span(module, variant):
+    """In each cycle of a pixel and of interleaved states, and to the last pixel of a span of 60."""
+    unit = module.RECORD.variants[variant].unit()
+    interval = getattr(unit, "cycles_per_pixel", 1)
+    befores = (1, 2, 3, 4, 5, 6, 9, 14, 18, 31, 40, 59, 60, 61, 70)
+    found, *others = resets(unit, case_of(module, unit, [6, 60]), befores, cycles=45, count=1)
+    assert [cycle for cycle, _ in found] == [unit.latency + interval * k for k in range(6)]
+    assert all(other == found for other in others)
