@@ -5,25 +5,9 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.number.unit_vector import quantise
-from blysk.golden.pipeline import Spans
 from blysk.golden.pixel_pipelines import PIPES, PixelPipelines
 from blysk.golden.presets import preset
-from blysk.golden.reference.geometry import normalise
-
-
-def frame(rng, count=300):
-    """Spans on any scanline, some of them empty, and constants of one light."""
-    normals = normalise(rng.normal(size=(count, 3)))
-    right = normalise(normals + rng.normal(scale=0.1, size=(count, 3)))
-    length = rng.integers(0, 9, count)
-    spans = Spans(
-        rng.integers(0, 60, count), rng.integers(0, 40, count), length, quantise(normals), quantise(right)
-    )
-    vectors = (quantise(normalise(rng.normal(size=(1, 3)))) for _ in range(2))
-    colors = rng.integers(0, 255 * 64, (2, 1, 3))
-    return spans, FrameConstants(20, rng.integers(0, 2000, 3), *vectors, *colors)
+from blysk.sim.units.pipeline_spans import any_constants, any_spans
 
 
 def rows(pixels):
@@ -33,8 +17,9 @@ def rows(pixels):
 @pytest.mark.parametrize("pipes", PIPES)
 def test_pipelines_together_give_the_pixels_of_one(pipes):
     """In the order of the spans within each scanline; and the counts are sums."""
-    several = PixelPipelines(preset(model="cosquad"), pipes)
-    spans, constants = frame(np.random.default_rng(pipes))
+    rng, design = np.random.default_rng(pipes), preset(model="cosquad", y_bits=5)
+    several, spans = PixelPipelines(design, pipes), any_spans(rng, design, rng.integers(0, 9, 300))
+    constants = any_constants(rng, design, spans)
     one, each = several.compute(spans, constants), several.compute_each(spans, constants)
     assert len(each) == pipes
     for pipe, pixels in enumerate(each):
