@@ -16,7 +16,9 @@ from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
+from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.cosines.half_chord import HalfChordUnit
+from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.cosines.span_limit import SpanLimitUnit
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
@@ -109,6 +111,50 @@ def test_intervals(name):
     for interval in none:
         with pytest.raises(ValueError, match=f"^{message}, not {interval}$"):
             make(initiation_interval=interval)
+
+
+OF_LIGHTS = {
+    ChordValuesUnit: {
+        **{(1, 1): (6, 9), (1, 3): (2, 11), (1, 6): (1, 13)},
+        **{(2, 1): (12, 9), (2, 3): (4, 11), (3, 6): (4, 14)},
+    },
+    # Not always as few as there are products: beats may come at any distance, and a multiplier serves those
+    # that are less than an interval apart.
+    ChordSetupUnit: {
+        **{(1, 1): (6, 18), (1, 2): (3, 21), (1, 3): (2, 21), (1, 4): (2, 20), (1, 6): (2, 20)},
+        **{(1, 9): (1, 21), (1, 18): (1, 21), (2, 3): (5, 21), (2, 9): (2, 24), (3, 18): (1, 31)},
+    },
+    RecurrenceSetupUnit: {
+        **{(1, 1): (46, 112, 18), (1, 2): (23, 121, 9), (1, 4): (12, 126, 5)},
+        **{(1, 8): (6, 138, 3), (1, 46): (1, 225, 1), (2, 4): (20, 130, 9)},
+    },
+}
+"""Multipliers and latency, and shifters if there are any, of numbers of lights and intervals."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("make", "lights", "interval"), [(make, *key) for make, stated in OF_LIGHTS.items() for key in stated]
+)
+def test_times_and_parts_of_lights(make, lights, interval):
+    """All multipliers are of 18 bits, none of them by a constant."""
+    unit = make(None, lights, initiation_interval=interval)
+    multipliers, latency, *shifters = OF_LIGHTS[make][lights, interval]
+    cost = cost_of(unit)
+    assert (unit.multipliers, unit.latency) == (multipliers, latency)
+    assert not shifters or [unit.shifters] == shifters
+    assert (cost.multipliers, cost.constant_multipliers) == ({(18, 18): multipliers}, 0)
+    if make is ChordValuesUnit:
+        dark = ChordValuesUnit(None, lights, initiation_interval=interval, highlights=False)
+        assert -(-3 * lights // interval) <= cost_of(dark).multiplier_count == dark.multipliers <= multipliers
+        assert interval > 1 or dark.multipliers == 3 * lights
+
+
+@pytest.mark.parametrize("make", [ChordSetupUnit, RecurrenceSetupUnit])
+@pytest.mark.parametrize("interval", [0, -1])
+def test_intervals_of_units_of_lights(make, interval):
+    with pytest.raises(ValueError, match=rf"^interval must be at least 1, not {interval}$"):
+        make(initiation_interval=interval)
 
 
 @pytest.mark.parametrize("bits", [1, 13])
