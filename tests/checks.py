@@ -80,7 +80,7 @@ def assert_equals_model(unit, run, engine="auto"):
 
 
 def resets(unit, case: Case, befores, cycles, count=6):
-    """Cycles from the first input, and payloads, of the outputs after power-up and after resets.
+    """Cycles from the first input, and payloads, of the outputs: after power-up, and the same after resets.
 
     The first beats are answered; others are inside on the reset.
     """
@@ -142,7 +142,9 @@ def resets(unit, case: Case, befores, cycles, count=6):
     simulator.add_clock(1e-6)
     simulator.add_testbench(bench)
     simulator.run()
-    return found
+    fresh, *others = found
+    assert all(other == fresh for other in others)
+    return fresh
 
 
 def words_of(port, beats) -> list[int]:

@@ -55,6 +55,5 @@ def test_reset_in_mid_span(module, variant):
     unit = module.RECORD.variants[variant].unit()
     interval = getattr(unit, "cycles_per_pixel", 1)
     befores = (1, 2, 3, 4, 5, 6, 9, 14, 18, 31, 40, 59, 60, 61, 70)
-    found, *others = resets(unit, case_of(module, unit, [6, 60]), befores, cycles=45, count=1)
+    found = resets(unit, case_of(module, unit, [6, 60]), befores, cycles=45, count=1)
     assert [cycle for cycle, _ in found] == [unit.latency + interval * k for k in range(6)]
-    assert all(other == found for other in others)

@@ -19,6 +19,5 @@ def test_reset_in_mid_power():
     unit = RECORD.variants["sequential, of a chord"].unit()
     case = next(RECORD.runs(unit, "highlights")).case
     case = Case(first(case.beats, 6), case.constants)
-    found, *others = resets(unit, case, (1, 2, 3, 7, 24, 42, 43, 44, 45), cycles=140, count=3)
+    found = resets(unit, case, (1, 2, 3, 7, 24, 42, 43, 44, 45), cycles=140, count=3)
     assert [cycle for cycle, _ in found] == [44, 44 + 42, 44 + 84]
-    assert all(other == found for other in others)

@@ -164,6 +164,5 @@ def test_reset_in_mid_span_leaves_nothing(make):
     unit, count = make(), 12
     case = case_of(make, unit, np.tile([5, 1, 2, 3], 4))
     befores = (1, 2, 3, 4, 5, 14, 17, 28, 30, 42, 47, 52)
-    found, *others = resets(unit, case, befores, cycles=110, count=count)
+    found = resets(unit, case, befores, cycles=110, count=count)
     assert [word for _, word in found] == words_of(unit.o, RECORDS[make].expect(unit, case.first(count)))
-    assert all(other == found for other in others)
