@@ -99,16 +99,6 @@ def test_levels_are_the_fewest(threshold):
     assert (levels.min(), levels.max()) == (0, parameters.depth)
 
 
-def test_sagitta_is_never_under():
-    psi = np.radians(np.linspace(1e-3, 90, 5001))
-    q = (1 - np.cos(psi)) / 4
-    for k in range(9):
-        # 1 - cos x = 2 sin^2(x/2) keeps its digits.
-        ratio = (q + q * q) / 4**k / (2 * np.sin(psi / 2 ** (k + 2)) ** 2)
-        assert ratio.min() >= 1 - 1e-9
-        assert ratio.max() <= 1.0671
-
-
 @pytest.mark.parametrize("threshold", [2.0**-10, 2.0**-14])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90])
 def test_stiff_ends_are_exact(threshold, angle):
