@@ -127,7 +127,7 @@ class Stimulus:
     limit : int or None
         Number of cycles after which the run ends in any case (``LIMIT``).
     write_after : int64 array, shape (writes,), or None
-        Number of input beats taken before each write is offered, in increasing order; ``None`` for 0.
+        Number of input beats taken before each write is offered, never decreasing; ``None`` for 0.
     """
 
     input: np.ndarray

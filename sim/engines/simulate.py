@@ -114,7 +114,7 @@ def _places(write_after, writes: int, beats: int) -> np.ndarray:
         raise ValueError(f"write_after must be {writes} integers, not {after.dtype} {after.shape}")
     after = after.astype(np.int64)
     if writes and (after[0] < 0 or after[-1] > beats or np.any(np.diff(after) < 0)):
-        raise ValueError(f"write_after must increase, from 0 up to the number of beats, {beats}")
+        raise ValueError(f"write_after must not decrease, and be 0 to {beats}, the number of beats")
     return after
 
 
@@ -193,7 +193,7 @@ def simulate(
     write : structured array or mapping, optional
         Beats for the ``write`` stream, delivered before the first input beat.
     write_after : int array, optional
-        Number of input beats that are taken before each write is offered, in increasing order. The next input
+        Number of input beats that are taken before each write is offered; it never decreases. The next input
         beats are offered beside a write that is not before the first: the component has to take the write
         first if the beats depend on it.
     engine : str

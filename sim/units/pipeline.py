@@ -48,7 +48,7 @@ from blysk.sim.units.pipeline_spans import (
     spans_near_terminator,
     tabled,
 )
-from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant, first, once
+from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant, first, once, together
 
 __all__ = ["DESIGNS", "LONG_DESIGNS", "RECORD", "case_of", "spans_of"]
 
@@ -124,11 +124,6 @@ def spans_of(beats) -> Spans:
     return Spans(*of_span, *normals, *further)
 
 
-def _together(parts):
-    """Beats of several mappings in a row."""
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
 @once
 def _frames_of(unit, case):
     """Pixels by frames: the spans between writes, each with what is written up to there."""
@@ -145,7 +140,7 @@ def _frames_of(unit, case):
 
 
 def _expect(unit, case):
-    return _together([pixel_beats(pixels) for pixels in _frames_of(unit, case)])
+    return together([pixel_beats(pixels) for pixels in _frames_of(unit, case)])
 
 
 def _status(unit, case):
@@ -167,7 +162,7 @@ def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     # Tables have an order of their own.
     kept = np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS))
     parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
-    return Case(beats_of(unit, ends_for(unit.parameters, spans)), write=_together([*parts, write]))
+    return Case(beats_of(unit, ends_for(unit.parameters, spans)), write=together([*parts, write]))
 
 
 def _spans(unit, rng, count):
@@ -326,11 +321,11 @@ def _frames(unit, rng, count):
         if writes and rng.random() < 0.6:
             write = [_disordered(rng, write[0], rng.choice([0.3, 1.0, 1.0]))]
         frames.append(frame)
-        writes.append(_together(write))
+        writes.append(together(write))
         after.append(after[-1] + len(frame))
     places = np.repeat(after[:-1], [len(write["data"]) for write in writes])
-    beats = _together([beats_of(unit, ends_for(design, frame)) for frame in frames])
-    return Case(beats, write=_together(writes), write_after=places)
+    beats = together([beats_of(unit, ends_for(design, frame)) for frame in frames])
+    return Case(beats, write=together(writes), write_after=places)
 
 
 def _counters(unit, rng, count):

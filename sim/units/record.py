@@ -6,7 +6,7 @@ units exists. To add a unit: its model in `golden`, its component in `hdl`, its 
 special about it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from typing import Any
@@ -29,6 +29,7 @@ __all__ = [
     "first",
     "length_of",
     "once",
+    "together",
 ]
 
 Beats = np.ndarray | Mapping[str, Any]
@@ -179,7 +180,7 @@ class Case:
     write : Beats, optional
         Beats of the stream ``write``.
     write_after : array, shape (writes,), optional
-        Number of input beats before each write, in increasing order; ``None``: all come before the first.
+        Number of input beats before each write, never decreasing; ``None``: all come before the first.
     """
 
     beats: Beats
@@ -400,6 +401,11 @@ def first(beats: Beats, count: int) -> Beats:
 def length_of(beats: Beats) -> int:
     """Number of beats."""
     return length_of(next(iter(beats.values()))) if isinstance(beats, Mapping) else len(beats)
+
+
+def together(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Beats of several mappings with the same fields, in a row."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def once(compute: Callable[[Component, Case], Any]) -> Callable[[Component, Case], Any]:

@@ -29,9 +29,13 @@ class Reader(HTMLParser):
         if tag not in self.VOID:
             self.open.append((tag, attrs.get("id")))
 
-    def handle_endtag(self, tag):
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
         if tag not in self.VOID:
-            assert self.open.pop()[0] == tag
+            self.handle_endtag(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop()[0] == tag
         if tag == "figure":
             self.figure = ""
 

@@ -13,7 +13,7 @@ from blysk.golden.reference.reflection import BLINN
 from blysk.hdl.lighting.lobe import LobeUnit
 from blysk.sim.units.lighting.specular import any_exponent
 from blysk.sim.units.operands import any_codes, exponents
-from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant, together
 
 __all__ = ["RECORD"]
 
@@ -72,8 +72,7 @@ def _case(unit, rng, count, tables):
     write = None
     if unit.tables is None:
         order = rng.permutation(len(tables)).tolist()
-        writes = [tables[bank].writes(bank) for bank in order]
-        write = {name: np.concatenate([beats[name] for beats in writes]) for name in ("value", "begins")}
+        write = together([tables[bank].writes(bank) for bank in order])
     constants = None
     if unit.parameters.banks > 1:
         constants = {"bank": int(rng.integers(unit.parameters.banks))}
@@ -115,8 +114,7 @@ def _tables(unit, rng, count):
         # Two values make a word, one none.
         {"value": np.r_[0, lost[:1], 0, lost[1:2]], "begins": [1, 0, 1, 0]},
     )
-    write = {name: np.concatenate([part[name] for part in parts]) for name in ("value", "begins")}
-    return replace(case, write=write)
+    return replace(case, write=together(parts))
 
 
 def _loaded(unit, case):

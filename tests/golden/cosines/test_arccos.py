@@ -107,6 +107,13 @@ def test_square_of_the_angle_by_the_squared_chord():
     percent(least_relative_error(basis, (2 * np.arcsin(np.sqrt(q) / 2)) ** 2), "0.0079")
 
 
+def test_short_cosine_costs_angle():
+    """Half a step of the operand is 2.5 % of an angle of 1 degree, before the unit begins."""
+    angle = np.radians(1.0)
+    worst = np.arccos(np.cos(angle) - Arccos.OPERAND_FORMAT.step / 2) - angle
+    percent(worst / angle, "2.5")
+
+
 @pytest.mark.parametrize("table", ARCCOS_TABLES)
 def test_every_operand(table):
     """The arithmetic error within its bound, the model error as stated, together within their sum."""

@@ -186,7 +186,8 @@ def test_widest_span():
         ("quadratic", 44.99, 45.1),
         ("angular", 149.99, 150.1),
         ("angular", 149.99, 180.0),
-        ("recurrence", 89.98, 90.1),
+        ("recurrence", 89.99, 90.02),
+        ("recurrence", 45.0, 180.0),
     ],
 )
 def test_flag(method, narrow, out_of_range):

@@ -20,10 +20,7 @@ NO_MATERIAL = "material must be an index of 0 or more for each of the 1 faces"
         ({"vertices": np.full((3, 3), np.inf)}, "vertices and normals must be finite"),
         ({"normals": np.full((3, 3), np.nan)}, "vertices and normals must be finite"),
         ({"material": np.zeros(2, int)}, NO_MATERIAL),
-        (
-            {"material": np.zeros((1, 1), int)},
-            NO_MATERIAL,
-        ),
+        ({"material": np.zeros((1, 1), int)}, NO_MATERIAL),
         ({"material": np.array([-1])}, NO_MATERIAL),
     ],
 )

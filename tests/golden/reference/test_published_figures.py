@@ -96,7 +96,7 @@ def test_octave_segments(degree, absolute, relative):
 
 
 def test_half_chord_keeps_its_precision():
-    """``psi = 2 arcsin(|N_r - N_l|/2)`` at 1 degree, where arccos of a cosine in 16 bits is 2.5 % off."""
+    """``psi = 2 arcsin(|N_r - N_l|/2)`` at 1 degree: what rounding of the ends costs, no more."""
     psi = math.radians(1)
     ends = quantise(np.array([[1.0, 0, 0], [math.cos(psi), math.sin(psi), 0]]))
     squared = Fixed(HalfChord.OPERAND_FORMAT, np.square(ends[1] - ends[0]).sum())
@@ -128,7 +128,8 @@ def test_growth_of_an_error_in_the_differences():
 
 def test_fractional_bits_of_the_differences():
     """For 2^-17 after 4095 pixels, half of it from each difference: 30 bits for the first, 41 the second."""
-    fraction_bits = DifferenceAccumulator().format.fraction_bits
-    assert fraction_bits > 41
+    budget, fraction_bits = 2.0**-18, DifferenceAccumulator().format.fraction_bits
+    for growth, bits in ((4095, 30), (4095**2 / 2, 41)):
+        assert round(-math.log2(budget / growth)) == bits < fraction_bits
     # The bound 2^-(F+1) (1 + T + T^2/2) of T steps.
     assert 2.0 ** -(fraction_bits + 1) * (1 + 4094 + 4094**2 / 2) < 2.0**-17

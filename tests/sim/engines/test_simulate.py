@@ -237,9 +237,9 @@ def test_arguments():
             simulate(refused(Register()), beats, **{"count": 2} | arguments)
     for places, message in (
         ([0.0, 1.0], r"write_after must be 2 integers, not float64 \(2,\)"),
-        ([-1, 0], "write_after must increase, from 0 up to the number of beats, 2"),
-        ([1, 0], "write_after must increase"),
-        ([0, 3], "write_after must increase"),
+        ([-1, 0], "write_after must not decrease, and be 0 to 2, the number of beats"),
+        ([1, 0], "write_after must not decrease"),
+        ([0, 3], "write_after must not decrease"),
     ):
         arguments = {"constants": 1, "write": np.array([1, 2]), "write_after": np.array(places)}
         with pytest.raises(ValueError, match=message):
