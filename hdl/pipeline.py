@@ -30,9 +30,9 @@ PORT_DESCRIPTIONS = {
     "i_x": "first pixel of the span, column",
     "i_y": "its row",
     "i_length": "pixels of the span; 0 gives none",
-    "i_normal_left": "unit normal at the first pixel centre, times 2^17 - 1",
+    "i_normal_left": "normal at the first pixel centre, see above",
     "i_normal_middle": "unit normal in the middle between them",
-    "i_normal_right": "unit normal at the last pixel centre",
+    "i_normal_right": "normal at the last pixel centre, see above",
     "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
     "i_factors": "codes of a, each light's that fades, at the same three pixels",
     "i_material": "index of the span's material",
@@ -53,9 +53,10 @@ PORT_DESCRIPTIONS = {
 
 
 def span_shape(parameters: Design) -> data.StructLayout:
-    """Shape of a raster span: first pixel, pixels, unit normals at the first and last pixel centre.
+    """Shape of a raster span: first pixel, pixels, and the normals that the method takes.
 
-    Without lights there are no normals; for a method that takes values these are in place of normals; with
+    These are unit normals at the first and last pixel centre, and in the middle for the chord method; or the
+    ends of the true line; or values of each light in place of normals. Without lights there are none. With
     several materials ``material`` is the index of the span's material.
 
     Parameters

@@ -1,4 +1,4 @@
-"""The report's section on errata: the documents' statements, the right ones, and computed evidence."""
+"""The report's section on errata: the documents' statements, what comes out, and computed evidence."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,11 +12,8 @@ from blysk.bench.report.errata_evidence import (
     energy,
     extrapolated_end,
     factor_claim,
-    factor_quadratic,
     flat_picture,
-    four_times,
     held_root,
-    highlight_loss,
     inverted_test,
     mirror,
     misprint,
@@ -25,11 +22,10 @@ from blysk.bench.report.errata_evidence import (
     quadratic_length,
     recurrence,
     root_claim,
-    root_digits,
-    scaled_twice,
+    root_least,
+    scaled_in_place,
     second_lobe,
     shortcut,
-    tangent,
     undefined_zone,
     worked_example,
     wrong_variable,
@@ -40,36 +36,54 @@ from blysk.bench.store import Task
 
 __all__ = [
     "ERRATA",
+    "KINDS",
     "OWN",
     "Erratum",
     "Unmatched",
     "evidence",
+    "matters",
     "section",
     "tasks",
 ]
 
 
+KINDS = {
+    "slip": "a slip in print, drawing or listing",
+    "figure": "a figure that does not come out of the printed digits",
+    "unclear": "not defined, or readable in two ways",
+    "reading": "perhaps marks lost when a machine read the text that we have, and no error of the authors",
+    "form": "no error: a form or a choice that is good in its range, and that our units replace",
+}
+"""What an entry is, and what it is not."""
+
+
 @dataclass(frozen=True)
 class Erratum:
-    """A wrong statement of a document, its correction, and evidence.
+    """A statement of a document that does not come out, or that the units replace; and evidence.
 
     Parameters
     ----------
     place : str
         Document and place.
+    kind : str
+        One of `KINDS`.
     published, right : str
-        The published statement, and the right one.
+        The published statement, and what comes out or replaces it.
     quantity : str
         Name of the computed quantity, with its unit.
     evidence : callable
         Computes the quantity twice: by the published and by the right statement.
+    matter : str, optional
+        What entries about the same matter share; an entry without is a matter of its own.
     """
 
     place: str
+    kind: str
     published: str
     right: str
     quantity: str
     evidence: Callable[[], Evidence]
+    matter: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,6 +111,7 @@ class Unmatched:
 ERRATA = {
     "arccos-misprint": Erratum(
         "[T] table 3.1, last row",
+        "slip",
         "74.547",
         "74.457",
         "error of the polynomial at x = 0.96, rad",
@@ -104,20 +119,23 @@ ERRATA = {
     ),
     "arccos-order": Erratum(
         "[T] table 3.1, columns A, B, C",
-        "coefficients in descending order",
-        "in ascending order: A + B x + C x^2",
+        "unclear",
+        "columns A, B, C, which A x^2 + B x + C would fit, too",
+        "A + B x + C x^2",
         "largest error on [0, 0.5], rad",
         order,
     ),
     "arccos-claim": Erratum(
         "[T] table 3.1, error",
-        "0.2 % at most",
+        "figure",
+        "0.2 %, read as that of every row",
         "more on [0.75, 0.96], by its own digits",
         "largest relative error on [0, 0.96]",
         arccos_claim,
     ),
     "arccos-one": Erratum(
-        "[T] 3.3",
+        "[T] 3.2",
+        "form",
         "a quadratic on [0.96, 1]",
         "sqrt(1 - x) times a polynomial, or the half chord: arccos has a root's slope at 1",
         "largest error on [0.96, 1], corrected, rad",
@@ -125,55 +143,42 @@ ERRATA = {
     ),
     "root-1": Erratum(
         "[T] 2.1, degree 1",
-        "0.64 - 0.07 z: 0.0005, 0.12 %",
-        "the published digits are not that good",
+        "figure",
+        "0.64 - 0.07 z: 0.12 %",
+        "0.12 % is that of the coefficients before they were rounded",
+        "largest relative error on [sqrt 2, 2]",
+        lambda: root_claim(1, 0.0012, relative=True),
+        "digits-2.1",
+    ),
+    "root-1-least": Erratum(
+        "[T] 2.1, degree 1",
+        "figure",
+        "0.0005",
+        "no line has less than 6.1e-4",
         "largest error on [sqrt 2, 2]",
-        lambda: root_claim(1, 0.0005),
+        root_least,
+        "digits-2.1",
     ),
     "root-2": Erratum(
         "[T] 2.1, degree 2",
+        "figure",
         "0.014 z^2 - 0.119 z + 0.681: 2e-5, 0.004 %",
-        "the published digits are not that good",
+        "both are those of the coefficients before they were rounded",
         "largest error on [sqrt 2, 2]",
         lambda: root_claim(2, 2e-5),
-    ),
-    "root-digits": Erratum(
-        "[T] 2.1, degree 2",
-        "coefficients of three digits",
-        "0.68084977 - 0.1189218 z + 0.0142535 z^2",
-        "largest error on [sqrt 2, 2]",
-        root_digits,
-    ),
-    "factor-2": Erratum(
-        "[T] 2.2, h of degree 2",
-        "0.36 %",
-        "no quadratic is that good",
-        "largest relative error, r from 0 to 1",
-        factor_quadratic,
+        "digits-2.1",
     ),
     "factor-3": Erratum(
         "[T] 2.2, h of degree 3",
+        "figure",
         "0.00038, 0.054 %",
-        "the published digits are not that good",
+        "both are those of the coefficients before they were rounded",
         "largest error, r from 0 to 1",
         factor_claim,
     ),
-    "flat-100": Erratum(
-        "[T] 2.2, h fitted over all r",
-        "least largest error",
-        "exact at r = 1, where neighbouring normals are",
-        "lost at a highlight's peak on a flat face, n = 100, LSB",
-        lambda: highlight_loss(100),
-    ),
-    "flat-1000": Erratum(
-        "[T] 2.2, h fitted over all r",
-        "least largest error",
-        "exact at r = 1, where neighbouring normals are",
-        "lost at a highlight's peak on a flat face, n = 1000, LSB",
-        lambda: highlight_loss(1000),
-    ),
     "second-lobe": Erratum(
         "[T] figure 3.6",
+        "slip",
         "the comparator is behind the square",
         "compare the base, before it is squared",
         "highlight at n = 20, gamma = 60 degrees",
@@ -181,55 +186,60 @@ ERRATA = {
     ),
     "shortcut-10": Erratum(
         "[T] 3.3",
-        "cos(psi/m) = (cos psi - 1)/m^2 + 1",
+        "form",
+        "cos(psi/m) = (cos psi - 1)/m^2 + 1, near for small psi",
         "4 sin^2(psi/2m)/2 for 1 - cos(psi/m)",
         "1 - cos(psi/m) over the exact one, psi = 10 degrees",
         lambda: shortcut(10),
+        "shortcut",
     ),
     "shortcut-60": Erratum(
         "[T] 3.3",
-        "cos(psi/m) = (cos psi - 1)/m^2 + 1",
+        "form",
+        "cos(psi/m) = (cos psi - 1)/m^2 + 1, near for small psi",
         "4 sin^2(psi/2m)/2 for 1 - cos(psi/m)",
         "1 - cos(psi/m) over the exact one, psi = 60 degrees",
         lambda: shortcut(60),
+        "shortcut",
     ),
     "recurrence-64": Erratum(
         "[T] figure 3.5",
-        "x(t+1) = 2 cos d x(t) - x(t-1)",
+        "form",
+        "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
         "Reinsch's form",
         "worst error: 64 pixels, 10 degrees, 16 fraction bits",
         lambda: recurrence(64, 10, 16),
+        "recurrence",
     ),
     "recurrence-256": Erratum(
         "[T] figure 3.5",
-        "x(t+1) = 2 cos d x(t) - x(t-1)",
+        "form",
+        "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
         "Reinsch's form",
         "worst error: 256 pixels, 60 degrees, 16 fraction bits",
         lambda: recurrence(256, 60, 16),
+        "recurrence",
     ),
     "recurrence-4095": Erratum(
         "[T] figure 3.5",
-        "x(t+1) = 2 cos d x(t) - x(t-1)",
+        "form",
+        "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
         "Reinsch's form",
         "worst error: 4095 pixels, 60 degrees, 24 fraction bits",
         lambda: recurrence(4095, 60, 24),
-    ),
-    "tangent": Erratum(
-        "[T] 3.2",
-        "tan lambda as a quotient",
-        "sums and differences of N_l·H and N_r·H over half-angle functions, and the angle of both",
-        "share of spans of equal normals, the usual case, whose N·H comes out",
-        tangent,
+        "recurrence",
     ),
     "worked-example": Erratum(
         "[T] 4.1, worked example",
-        "0.3445",
-        "0.577^10 was taken for 0.003",
+        "slip",
+        "0.3445, with 0.0015 for the highlight, as 0.577^10 = 0.003 would give",
+        "0.577^10 is 0.0041",
         "intensity",
         worked_example,
     ),
     "mnse": Erratum(
         "[T] 4.1, MNSE",
+        "form",
         "each error divided by its own pixel's distance from the mean",
         "sum of errors over sum of distances (NMSE)",
         "share of a flat picture's values with a defined figure",
@@ -237,6 +247,7 @@ ERRATA = {
     ),
     "inverted": Erratum(
         "[T] appendix В",
+        "slip",
         "Phong where normals are close",
         "Gouraud where they are close",
         "share of the triangles of a teapot of 992 that the test of normals gives to Gouraud",
@@ -244,6 +255,7 @@ ERRATA = {
     ),
     "extrapolated": Erratum(
         "[T] appendix Г, NormalVector",
+        "slip",
         "the end is extrapolated without the start vector",
         "N_l + g (N_r - N_l)",
         "error of the last normal, 10 degrees, 6 pixels",
@@ -251,34 +263,41 @@ ERRATA = {
     ),
     "scaled": Erratum(
         "[T] appendix Г, NormalVector",
-        "dN.x is scaled twice, dN.z never",
-        "each once",
-        "error of the last normal's components, 10 degrees, 6 pixels",
-        scaled_twice,
+        "slip",
+        "dN is scaled in place at every pixel, from i = 0 on; read as by i/(m - 1)",
+        "a scaled copy, dN itself kept",
+        "error of the last normal, 10 degrees, 6 pixels",
+        scaled_in_place,
     ),
     "variable": Erratum(
         "[T] appendix Д",
-        "P[1]*x in two channels",
+        "slip",
+        "P[1]*x in green",
         "P[1]*y",
-        "error at a corner whose value is given, intensities 0.2, 0.4, 0.9",
+        "error of green at a corner whose value is given, intensities 0.2, 0.4, 0.9",
         wrong_variable,
     ),
     "energy-phong": Erratum(
         "[C], Phong's normalising coefficient",
+        "reading",
         "(n+2)/2n",
         "(n+2)/(2 pi)",
         "reflected energy at n = 10, to be 1",
         lambda: energy("phong", 10),
+        "normalising",
     ),
     "energy-blinn": Erratum(
         "[C], Blinn's normalising coefficient",
+        "reading",
         "((n+2)(n+4))/(8n(2^(n/2)+n))",
         "((n+2)(n+4))/(8 pi (2^(-n/2)+n))",
         "reflected energy at n = 10, to be 1",
         lambda: energy("blinn", 10),
+        "normalising",
     ),
     "mirror": Erratum(
         "[C], mirror direction",
+        "reading",
         "R = 2 (L x N) x N - L",
         "R = 2 (L·N) N - L: products are scalar",
         "length of R, to be 1",
@@ -286,17 +305,11 @@ ERRATA = {
     ),
     "zone": Erratum(
         "[C], epicentre zone",
+        "unclear",
         "7.924 %, of a zone that is not defined",
         f"where Blinn's model is at least {ZONE}",
         "largest relative error of f2 in the zone",
         undefined_zone,
-    ),
-    "four-times": Erratum(
-        "[P], exponents of Blinn and Phong",
-        "about 4 times",
-        "4 at the peak alone, and more away from it",
-        "n/p at gamma = 40 degrees",
-        four_times,
     ),
 }
 """What the documents print, by name."""
@@ -330,6 +343,12 @@ OWN = {
 """Stated figures that do not come out, by name."""
 
 
+def matters() -> dict[str, int]:
+    """Number of different matters of `ERRATA` of each kind, in the order of `KINDS`."""
+    found = {(erratum.kind, erratum.matter or name) for name, erratum in ERRATA.items()}
+    return {kind: sum(one == kind for one, _ in found) for kind in KINDS}
+
+
 def evidence(own: bool) -> dict[str, list[float]]:
     """Compute the evidence of each entry.
 
@@ -359,13 +378,12 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     errata = Table(
         "errata",
         "Errata of the documents",
-        ("place", "published", "right", "computed", "as published", "as it should be"),
-        [
-            [erratum.place, erratum.published, erratum.right, erratum.quantity, *documents[name]]
-            for name, erratum in ERRATA.items()
-        ],
-        "Both figures are computed by this report, but for those that a document claims itself (an error, "
-        "an intensity, a ratio), which stand as published. Listings of [T] are as docs/theory/errata.md "
+        ("place", "kind", "published", "right", "computed", "as published", "as it should be"),
+        [[e.place, e.kind, e.published, e.right, e.quantity, *documents[name]] for name, e in ERRATA.items()],
+        "Kinds: "
+        + "; ".join(f"{kind}, {meaning}" for kind, meaning in KINDS.items())
+        + ". Both figures are computed by this report, but for those that a document claims itself (an "
+        "error, an intensity), which stand as published. Listings of [T] are as docs/theory/errata.md "
         "describes them.",
     )
     figures = Table(
@@ -375,9 +393,11 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         [[figure.what, figure.stated, figure.found, *own[name]] for name, figure in OWN.items()],
         "Computed in float64.",
     )
+    counted = matters()
     text = [
-        f"{len(ERRATA)} entries on what the documents print, each with a figure that anyone can compute "
-        "again: from what is published, and from what it should be. The units keep the published constants "
-        "as named variants, so that their effect shows in the other sections.",
+        f"{sum(counted.values())} matters in {len(ERRATA)} entries, each with a figure that anyone can "
+        "compute again: from what is published, and from what comes out or replaces it. Not every entry is "
+        f"an error: {counted['form']} matters are forms that are good in their range. The units keep the "
+        "published constants as named variants, so that their effect shows in the other sections.",
     ]
     return Section("errata", "Errata of the documents", text, [errata, figures], appendix=True)

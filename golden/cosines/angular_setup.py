@@ -26,9 +26,9 @@ SPAN_ANGLES = ("half_chord", "arccos")
 class AngularSetup:
     """``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` from ``N_l``, ``N_r`` and a fixed vector H.
 
-    [T] 3.1 takes psi from arccos and ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``. This becomes
-    0/0 as psi tends to 0, and most spans are narrow. Here, with ``a = N_l.H``, ``b = N_r.H`` and the angle
-    counted from the middle of the span,
+    [T] 3.1 takes psi from arccos. From it ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)`` would
+    follow, which becomes 0/0 as psi tends to 0, and most spans are narrow. Here, with ``a = N_l.H``,
+    ``b = N_r.H`` and the angle counted from the middle of the span,
 
     - ``cos gamma(t) = x cos((t - 1/2) psi) + y sin((t - 1/2) psi)``,
     - ``x = (a + b)/(2 cos(psi/2))`` and ``y = (b - a)/(2 sin(psi/2))``,
@@ -73,9 +73,8 @@ class AngularSetup:
     **By arccos**, as published: ``angle="arccos"`` takes psi from `Arccos` of ``r = N_l.N_r``, divided by
     `ONE_SQUARED` as ``r + r/2^16`` and rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians and
     converted to turns by a product with ``1/(2 pi)`` in UQ(-2, 19); ``psi/(m-1)`` reads the first 17 bits of
-    the product. x and y are those above (the published ``tan lambda`` is 0/0 for equal normals), so that only
-    the error of arccos is added: `arccos_error`. Largest error of cos gamma found, by the span angle in
-    degrees:
+    the product. x and y are those above, so that only the error of arccos is added: `arccos_error`. Largest
+    error of cos gamma found, by the span angle in degrees:
 
     ==================== ====== ====== ====== ======
     psi from             1e-4   1      10     45

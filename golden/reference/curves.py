@@ -16,7 +16,8 @@ def interpolate(curve: str, normal_left: np.ndarray, normal_right: np.ndarray, t
     With ``r = N_l·N_r`` and ``psi = arccos r``:
 
     - ``linear``: ``(1-t) N_l + t N_r``;
-    - ``normalised``: the same, divided by its length; methods are compared with this curve;
+    - ``normalised``: the same, divided by its length; of unit ends it is not the true curve of a surface
+      (docs/theory/interpolation.md#true-spans);
     - ``slerp``: ``(sin((1-t) psi) N_l + sin(t psi) N_r) / sin psi`` ([T] 2.1), computed as
       ``cos(t psi) N_l + sin(t psi) U``, with the unit vector U at right angles to N_l in the plane of both;
     - ``quadratic``: ``G t^2 + P t + Q`` through N_l, ``N_c = (N_l + N_r) / sqrt(2 (1 + r))`` at ``t = 1/2``

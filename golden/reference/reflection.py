@@ -129,8 +129,8 @@ class ReflectionModel:
         microfacets     see `MicrofacetModel`                integral of ``blinn`` with their S
         =============== ==================================== ==============================================
 
-        [C] integrates ``cosquad_lin`` over the angle itself, as for ``phong``, not over the half angle; it
-        prints n for pi in the denominators and n/2 for the exponent -n/2.
+        [C] integrates ``cosquad_lin`` over the angle itself, as for ``phong``, not over the half angle. Our
+        text of [C], read by a machine, has n for pi in the denominators and n/2 for the exponent -n/2.
 
         Parameters
         ----------

@@ -110,8 +110,8 @@ def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.
     ``L = -V`` has no H and no highlight, and only its N·L counts. A change of N·H by e changes ``(N·H)^n`` by
     up to ``n e``: with large exponents the default thresholds allow visible errors.
 
-    The listing of [T] appendix В has this test inverted: it returns Phong if the normals are close. It is
-    corrected here.
+    The listing of [T] appendix В, as docs/theory/errata.md describes it, has the test of the normals
+    inverted: it returns Phong if they are close. It is corrected here.
 
     Parameters
     ----------

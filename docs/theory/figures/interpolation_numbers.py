@@ -22,6 +22,7 @@ from blysk.golden.number.polynomials import half_angle_factor, largest_error, mi
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.reflection import COSQUAD
 
 _ANGLES = (5, 10, 20, 45, 90)
 
@@ -246,7 +247,11 @@ def _sentences() -> list[str]:
     assert shift < 1e-5
     bits = [math.log2(4095 * 2.0**18), math.log2(4095**2 / 2 * 2.0**18)]
     turn = max(curve_errors(d)[3] / math.degrees(math.radians(d) ** 3) for d in (20, 45, 60))
+    # Length of a flat face's normals by the plain cubic, and what the peak of `cosquad` loses by it.
+    short = 2 * float(minimax(_by_cosine, *_FACTOR, 3).sum())
+    lost = [255 * (1 - float(COSQUAD.reflect(short, n))) for n in (100, 1000)]
     return [
+        f"the peak by {lost[0]:.1f} LSB at n = 100, and by {lost[1]:.1f} LSB at n = 1000",
         f"at 45° this is {float(half_angle_factor(1 - math.cos(math.radians(45)))) - 0.5:.4f}",
         f"{(q + q * q) / (1 - math.cos(math.radians(45))) - 1:.1%} at most, for k = 0 at 90°",
         f"a threshold of 2^-10 asks for at most {depths[0]} levels, one of 2^-14 for {depths[1]}",

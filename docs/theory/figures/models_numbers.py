@@ -151,6 +151,19 @@ def _steepest(model: ReflectionModel, exponent: int = 1000) -> float:
     return float(np.abs(np.gradient(values, gamma)).max() / math.sqrt(exponent))
 
 
+def _reflected() -> list[float]:
+    """Energy that `cosquad_lin` reflects with its factor, by exponent from 1 to 1000."""
+    model = REFLECTION_MODELS["cosquad_lin"]
+    found = []
+    for n in range(1, 1001):
+        # With x = 1 - c, from 0 to where the base is 0: the integral of (1 - k x)^2 (1 - x), times 2 pi.
+        k = model.slope(n)
+        x = np.polynomial.Polynomial([0, 1])
+        whole = ((1 - k * x) ** 2 * (1 - x)).integ()
+        found.append(2 * math.pi * model.energy_factor(n) * float(whole(min(1 / k, 1.0))))
+    return found
+
+
 def _metrics() -> tuple[float, float, float, float]:
     """NMSE and MNSE as published of one LSB in the pixel nearest to the mean, and in the farthest."""
     reference = np.linspace(0, 255, 256) ** 2 / 255
@@ -175,6 +188,10 @@ def _sentences() -> list[str]:
     same, other, near, far = _metrics()
     steepest, slow = _steepest(COSQUAD), _steepest(REFLECTION_MODELS["exp"])
     assert math.isclose(same, other, rel_tol=1e-9)
+    reflected = _reflected()
+    over = sum(energy > 1 for energy in reflected[1:]) / 999
+    most = int(np.argmax(reflected))
+    slopes = (largest_error(REFLECTION_MODELS[name], 256) for name in ("lyon1_refitted", "cosquad_lin"))
     return [
         f"within {line:.2%} of this k for n from 2 to 1000 (`{0.44813} n + {0.10235}`: {refitted:.2%})",
         f"`k/n` tends to `(1 - 0.8) / -ln 0.64 = {limit:.4f}`",
@@ -187,6 +204,10 @@ def _sentences() -> list[str]:
         f"FLIP p99 <= {perception.FLIP_P99} and max <= {perception.FLIP_MAX:.2f}, and CIEDE2000 p99 <= "
         f"{perception.CIEDE2000_P99} and max <= {perception.CIEDE2000_MAX}",
         f"the largest error is at most {perception.LARGEST_LSB:.0f} LSB",
+        f"reflects {reflected[1]:.4f} at n = 2 and {reflected[most]:.4f} at most, at n = {most + 1}",
+        f"{over:.1%} of the exponents".replace("%", " %"),
+        f"outside the range of [C], it is {reflected[0]:.4f}",
+        "has {:.3f} in place of {:.3f} at n = 256".format(*slopes),
     ]
 
 

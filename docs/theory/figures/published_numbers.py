@@ -7,8 +7,10 @@ from markdown import table
 
 from blysk.bench.report import phong_blinn
 from blysk.bench.report.cosine_quadratic import PUBLISHED, coefficients, errors, slopes
-from blysk.bench.report.errata import ERRATA, evidence
+from blysk.bench.report.errata import ERRATA, KINDS, evidence, matters
+from blysk.bench.report.errata_evidence import factor_quadratics
 from blysk.bench.report.thesis import CLAIMS, software
+from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax
 from blysk.golden.reference.reflection import exponent_ratio
 
 
@@ -26,9 +28,18 @@ def _errata(document: str) -> Callable[[], str]:
             if erratum.place.startswith(f"[{document}]"):
                 place = erratum.place.removeprefix(f"[{document}]").lstrip(", ")
                 numbers = (_number(value) for value in found[name])
-                rows.append([place, erratum.published, erratum.right, erratum.quantity, *numbers])
-        head = ["place", "printed", "right", "computed quantity", "as printed", "as it should be"]
-        return table(head, rows, 4)
+                words = (erratum.kind, erratum.published, erratum.right, erratum.quantity)
+                rows.append([place, *words, *numbers])
+        head = [
+            "place",
+            "kind",
+            "printed",
+            "what comes out, or our form",
+            "quantity",
+            "as printed",
+            "as it comes out",
+        ]
+        return table(head, rows, 5)
 
     return made
 
@@ -92,7 +103,19 @@ def _phong_blinn() -> str:
 
 def _errata_sentences() -> list[str]:
     ratio = float(exponent_ratio(math.cos(math.radians(40))))
-    return [f"{len(ERRATA)} entries", f"{ratio:.2f} at 40°"]
+    quadratics = factor_quadratics()
+    plain = largest_error(half_angle_factor, minimax(half_angle_factor, 0, 1, 2), 0, 1)[1]
+    counted = matters()
+    kinds = [f"*{kind}*, {meaning} ({counted[kind]}" for kind, meaning in KINDS.items()]
+    return [
+        f"{sum(counted.values())} matters in {len(ERRATA)} entries",
+        *kinds,
+        f"{ratio:.2f} at 40°",
+        f"relative error of a quadratic is {quadratics['relative'][1]:.3%}; with".replace("%", " %"),
+        f"0.002 at most it is {quadratics['within'][1]:.3%}".replace("%", " %"),
+        f"nodes has {quadratics['nodes'][1]:.3%}, and {quadratics['nodes'][0]:.4f}".replace("%", " %"),
+        f"Our {plain:.3%} was".replace("%", " %"),
+    ]
 
 
 def _figure_sentences() -> list[str]:
