@@ -1,6 +1,6 @@
 """Frame constants: the registers behind the write port."""
 
-from amaranth.hdl import Module, Signal, Value, unsigned
+from amaranth.hdl import Const, Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -79,8 +79,9 @@ class FrameConstantsUnit(wiring.Component):
 
     A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
     the colours are in memories, one for each word, written for the material whose index was last written to
-    address 4 and read for ``material``: 1 cycle after ``material`` changes, and 3 after a write. Writes for
-    an index past the last material are lost. Memories are not cleared by reset.
+    address 4 and read for ``material``: 1 cycle after ``material`` changes, and 3 after a write. All 18 bits
+    of an index count: writes for an index past the last material are lost, and so is a bank past the last
+    one. A unit of one material has no index: address 4 changes nothing. Memories are not cleared by reset.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ class FrameConstantsUnit(wiring.Component):
         if not 1 <= materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {materials}")
         self.lights = lights
-        self.materials = materials
+        self.materials, self.banks = materials, banks
         self.tables = {}
         if threshold is not None:
             self.tables[THRESHOLD_ADDRESS] = "threshold"
@@ -154,9 +155,14 @@ class FrameConstantsUnit(wiring.Component):
         word_data = Signal.like(self.write.payload.data)
         m.d.sync += word_data.eq(self.write.payload.data)
         if self.materials > 1:
-            index = Signal(range(self.materials))
+            index, there_is = Signal(range(self.materials)), Signal(name="there_is_the_material", init=1)
             with m.If(accepted & (self.write.payload.address == MATERIAL_ADDRESS)):
                 m.d.sync += index.eq(self.write.payload.data)
+                m.d.sync += there_is.eq(self.write.payload.data < self.materials)
+        there_is_the_bank = Const(1)
+        if self.banks > 1:
+            there_is_the_bank = Signal(name="there_is_the_bank")
+            m.d.sync += there_is_the_bank.eq(self.write.payload.data < self.banks)
         # The upper address selects a light or the frame, the lower one a word of it.
         address, decoded = self.write.payload.address, {}
         for kind, digits, part in (
@@ -170,6 +176,8 @@ class FrameConstantsUnit(wiring.Component):
             code = Value.cast(word)
             light, field = divmod(address, LIGHT_STRIDE)
             written = decoded["light", light] & decoded["field", field]
+            if address == BANK_ADDRESS:
+                written &= there_is_the_bank
             if self.materials > 1 and address in of_material:
                 memory = Memory(shape=len(code), depth=self.materials, init=[])
                 m.submodules[f"word_{address}"] = memory
@@ -177,7 +185,7 @@ class FrameConstantsUnit(wiring.Component):
                 m.d.comb += [
                     write.addr.eq(index),
                     write.data.eq(word_data[: len(code)]),
-                    write.en.eq(written),
+                    write.en.eq(written & there_is),
                     read.addr.eq(self.material),
                     code.eq(read.data),
                 ]

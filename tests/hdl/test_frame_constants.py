@@ -9,6 +9,7 @@ from amaranth.hdl import ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
 from blysk.golden.frame_constants import (
+    BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
@@ -17,6 +18,7 @@ from blysk.golden.frame_constants import (
     FrameConstants,
     writes_of,
 )
+from blysk.golden.number.fixed import UQ
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.presets import preset
 from blysk.hdl.frame_constants import FrameConstantsUnit
@@ -89,13 +91,15 @@ def test_every_address_writes_its_constant_and_no_other(lights):
 
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_every_address_writes_its_materials_constant_and_no_other(lights):
-    """All 512 addresses, and now and then another material, in random order.
+    """All 512 addresses, and now and then another material, or one that there is not, in random order.
 
     A write is seen 3 cycles later where the word is of the material, and 2 where it is not; another
     material's constants are seen 1 cycle after its index is given.
     """
     rng = np.random.default_rng(10 + lights)
     materials = 3
+    # Their low bits are those of a material in every case; writes for the last six are lost.
+    indices = [0, 1, 2] * 4 + [3, 4, 5, 6, 2**9 + 1, 2**17 + 2]
     unit = FrameConstantsUnit(lights, materials)
     words = words_by_address(unit.constants, lights)
     of_frame = [(light + 1) * LIGHT_STRIDE + k for light in range(lights) for k in range(6)]
@@ -105,11 +109,11 @@ def test_every_address_writes_its_materials_constant_and_no_other(lights):
         index, material = 0, 0
         for address in np.r_[rng.permutation(512), rng.choice(list(words), 200)].tolist():
             if rng.random() < 0.3:
-                index = int(rng.integers(materials))
+                index = int(rng.choice(indices))
                 await write(ctx, unit, MATERIAL_ADDRESS, index)
             data = int(rng.integers(0, 2**18))
             if address == MATERIAL_ADDRESS:
-                data = index = int(rng.integers(materials))
+                data = index = int(rng.choice(indices))
             await write(ctx, unit, address, data)
             assert {a: ctx.get(word) for a, word in words.items()} == expected[material]
             await ctx.tick()
@@ -132,6 +136,20 @@ def test_every_address_writes_its_materials_constant_and_no_other(lights):
                 ctx.set(unit.material, material)
                 await ctx.tick()
                 assert {a: ctx.get(word) for a, word in words.items()} == expected[material]
+
+    run_bench(unit, bench)
+
+
+def test_a_bank_past_the_last_is_lost():
+    """Of three banks; nor does it take the place of the material's threshold."""
+    unit = FrameConstantsUnit(1, 2, UQ(3, 15), banks=3)
+
+    async def bench(ctx):
+        for given, bank in ((1, 1), (3, 1), (2, 2), (4, 2), (2**17, 2), (2**16 + 1, 2), (0, 0)):
+            await write(ctx, unit, BANK_ADDRESS, given)
+            await ctx.tick().repeat(2)
+            assert ctx.get(unit.constants.bank) == bank
+            assert ctx.get(unit.constants.threshold) == 0
 
     run_bench(unit, bench)
 
@@ -391,12 +409,15 @@ def test_cost_of_a_material_change():
 
 @pytest.mark.long
 def test_indices_of_no_material_change_nothing():
-    """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits."""
+    """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits.
+
+    Of the indices 3, 4 and 5 the low bits of two are those of materials.
+    """
     rng = np.random.default_rng(35)
     design = preset(model="cosquad", method="linear", materials=3)
     unit = ShadingPipelineUnit(design)
     spans = any_spans(rng, design, rng.integers(1, 9, 12))
     spans = replace(spans, material=np.arange(12) // 4)
-    constants = any_constants(rng, replace(design, materials=4), spans)
+    constants = any_constants(rng, replace(design, materials=6), spans)
     for engine in ("auto", "pysim"):
         shade(unit, spans, constants, engine)
