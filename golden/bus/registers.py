@@ -55,7 +55,7 @@ FRAME, COUNTERS, CONSTANTS = 0x040, 0x080, 0x800
 """First address of the registers of the picture, of the counters, and of the frame constants."""
 
 ERRORS = {
-    "unmapped": "no register at the address, or it is no multiple of 4",
+    "unmapped": "no register at the address, or a write of a word at no multiple of 4",
     "read_only": "a write to a register that is read-only",
     "write_only": "a read of a register that is write-only",
     "value": "a value that its register does not hold",
@@ -77,7 +77,7 @@ class Register:
         Address of its first byte, a multiple of 4.
     access : str
         ``"read-only"``, ``"read-write"`` (reset to 0), ``"write-only"``, or ``"clear"``: a 1 written clears
-        the bit.
+        its bit, and a 1 for a bit that there is not does nothing.
     width : int
         Bits of its value.
     signed : bool
@@ -88,6 +88,8 @@ class Register:
         Number format.
     bits : tuple of (str, int, int, str)
         Parts of the value: name, first bit, number of bits, description.
+    range : (int, int), optional
+        Least and largest value, where not all codes are values.
     """
 
     name: str
@@ -98,10 +100,14 @@ class Register:
     text: str = ""
     format: str = ""
     bits: tuple[tuple[str, int, int, str], ...] = ()
+    range: tuple[int, int] | None = None
 
     def holds(self, data: int) -> bool:
         """Whether a written word of 32 bits is a value that the register can hold."""
-        return data == self.extended(data)
+        if data != self.extended(data) or self.range is None:
+            return data == self.extended(data)
+        low, high = self.range
+        return low <= data - (self.signed and data >> (WORD_BITS - 1)) * (1 << WORD_BITS) <= high
 
     def extended(self, code: int) -> int:
         """The word of 32 bits that holds a code."""
@@ -125,15 +131,17 @@ def frame_registers(picture: bool = False) -> list[Register]:
         "bottom": "the row after the last",
     }
     kinds = ", ".join(f"{k}: {name}" for k, name in enumerate(BACK_FACES))
-    rows = [(name, X_BITS, True, f"{text}; pixels, -2048 to 2048") for name, text in borders.items()]
+    most = 1 << X_BITS - 2
+    rows = [(name, X_BITS, True, f"{text}; pixels, -{most} to {most}") for name, text in borders.items()]
     rows += [
         ("back_faces", 2, False, f"back faces, {kinds}"),
         ("limit", LIMIT_BITS, False, "largest chord between the unit normals of a span's ends, in 1/1024"),
     ]
     if picture:
         rows.append(("picture", 1, False, "changes with each picture: the coarse depth test begins anew"))
+    ranges = dict.fromkeys(borders, (-most, most)) | {"back_faces": (0, len(BACK_FACES) - 1)}
     return [
-        Register(name, FRAME + 4 * k, "read-write", width, signed, text)
+        Register(name, FRAME + 4 * k, "read-write", width, signed, text, range=ranges.get(name))
         for k, (name, width, signed, text) in enumerate(rows)
     ]
 
@@ -187,8 +195,18 @@ def constant_registers(design: Design) -> list[Register]:
         rows.append(("bank", BANK_ADDRESS, width, False, "", "bank of a material's table"))
     for light in range(design.lights):
         add(f"light{light}_", (light + 1) * LIGHT_STRIDE, FIELDS_OF_A_LIGHT, _OF_A_LIGHT)
+    ranges = {"material": (0, design.materials - 1), "bank": (0, design.banks - 1)}
     return [
-        Register(name, CONSTANTS + 4 * address, "write-only", width, signed, text, form)
+        Register(
+            name,
+            CONSTANTS + 4 * address,
+            "write-only",
+            width,
+            signed,
+            text,
+            form,
+            range=ranges.get(name),
+        )
         for name, address, width, signed, form, text in sorted(rows, key=lambda row: row[1])
     ]
 
@@ -230,7 +248,7 @@ class RegisterMap:
                 0x00C,
                 "clear",
                 len(ERRORS),
-                text="why accesses were refused; a 1 clears",
+                text="why accesses were refused; a 1 clears its bit",
                 bits=causes,
             ),
             Register("refused", 0x010, "read-only", ADDRESS_BITS, text="address of the access refused last"),
@@ -279,16 +297,17 @@ class RegisterFile:
         Parameters
         ----------
         address : int
-            Byte address, 12 bits.
+            Byte address, 12 bits; a read takes the word in which it is, and so does a write of some bytes.
         data : int, optional
             The word to write; ``None``: a read.
         strobe : int
-            One bit for each byte: whether it is written.
+            One bit for each byte: whether it is written. A write of no byte changes nothing.
         busy : bool
             Whether the core is working on a frame.
         """
-        register = self.map.by_address.get(address)
-        cause = self._refusal(register, data, strobe, busy)
+        register = self.map.by_address.get(address & ~3)
+        whole = data is not None and strobe == 15
+        cause = self._refusal(None if whole and address % 4 else register, data, strobe, busy)
         if cause:
             self.values["errors"] = self.values.get("errors", 0) | 1 << list(ERRORS).index(cause)
             self.values["refused"] = address
@@ -297,22 +316,27 @@ class RegisterFile:
             fixed = {"identity": IDENTITY, "version": VERSION, "state": int(busy)}
             return register.extended(fixed.get(register.name, self.values.get(register.name, 0))), ""
         if register.access == "clear":
-            self.values[register.name] = self.values.get(register.name, 0) & ~data
-        else:
+            written = sum(0xFF << 8 * byte for byte in range(4) if strobe >> byte & 1)
+            self.values[register.name] = self.values.get(register.name, 0) & ~(data & written)
+        elif strobe:
             self.values[register.name] = data & (1 << register.width) - 1
         return 0, ""
 
     @staticmethod
     def _refusal(register: Register | None, data: int | None, strobe: int, busy: bool) -> str:
-        """The first cause, in the order of `ERRORS`, for which the access is refused."""
+        """The first cause for which the access is refused."""
         if register is None:
             return "unmapped"
         if data is None:
             return "write_only" if register.access == "write-only" else ""
+        if not strobe:
+            return ""
         if register.access == "read-only":
             return "read_only"
-        if not register.holds(data):
-            return "value"
+        if register.access == "clear":
+            return ""
         if strobe != 15:
             return "strobe"
-        return "busy" if busy and register.access != "clear" else ""
+        if not register.holds(data):
+            return "value"
+        return "busy" if busy else ""

@@ -36,7 +36,8 @@ class RegistersUnit(wiring.Component):
 
     An access is answered 2 cycles after it was accepted, and the next is accepted when the answer has been
     taken. A refused access changes nothing but the registers ``errors`` and ``refused``. Registers of the
-    picture and frame constants are written while ``busy`` is low.
+    picture and frame constants are written while ``busy`` is low, as whole words. Bits of ``errors`` are
+    cleared at any time, by the bytes that are written, all ones included. A read of a byte gets its word.
 
     Parameters
     ----------
@@ -94,16 +95,16 @@ class RegistersUnit(wiring.Component):
             m.d.sync += [full.eq(0), answered.eq(1), answer.error.eq(cause.any()), answer.data.eq(word)]
             with m.If(cause.any()):
                 m.d.sync += [refused.eq(access.address), errors.eq(errors | cause)]
-        accepted = full & access.write & ~cause.any()
-        with m.If(accepted & (access.address == self.parameters["errors"].address)):
+        accepted, whole = full & access.write & ~cause.any(), access.strobe.all()
+        with m.If(accepted & access.strobe[0] & _is_at(access, self.parameters["errors"])):
             m.d.sync += errors.eq(errors & ~access.data[: len(ERRORS)])
         for register in self.parameters.picture:
             value = Signal(_shape(register), name=f"picture_{register.name}")
             m.d.comb += self.picture[register.name].eq(value)
-            with m.If(accepted & (access.address == register.address)):
+            with m.If(accepted & whole & _is_at(access, register)):
                 m.d.sync += value.eq(access.data)
         m.d.comb += [
-            self.load.valid.eq(accepted & (access.address >= CONSTANTS)),
+            self.load.valid.eq(accepted & whole & (access.address >= CONSTANTS)),
             self.load.address.eq((access.address - CONSTANTS) >> 2),
             self.load.data.eq(access.data),
         ]
@@ -113,32 +114,33 @@ class RegistersUnit(wiring.Component):
         """Why the access in the register is refused, a bit for each cause; and the word that it reads."""
         cause, word = Signal(len(ERRORS), name="cause"), Signal(WORD_BITS, name="word")
         found, fits = Signal(name="found"), Signal(name="fits")
-        readable, writable, locked = (Signal(name=name) for name in ("readable", "writable", "locked"))
+        readable, writable, clears = (Signal(name=name) for name in ("readable", "writable", "clears"))
         said = {"identity": IDENTITY, "version": VERSION, "state": self.constants.busy} | held
         said |= {name: self.constants[name] for name, *_ in self.parameters.counters}
-        with m.Switch(access.address):
+        with m.Switch(access.address[2:]):
             for register in self.parameters.registers:
-                with m.Case(register.address):
+                with m.Case(register.address >> 2):
                     reads, writes = register.access != "write-only", register.access != "read-only"
                     m.d.comb += [found.eq(1), readable.eq(reads), writable.eq(writes)]
                     if writes:
                         m.d.comb += [
                             fits.eq(_fits(register, access.data)),
-                            locked.eq(register.access != "clear"),
+                            clears.eq(register.access == "clear"),
                         ]
                     if reads:
                         value = said[register.name] if register.name in said else self.picture[register.name]
                         read = Value.cast(value) if isinstance(value, Value) else Const(value, register.width)
                         with m.If(~access.write):
                             m.d.comb += word.eq(read.as_signed() if register.signed else read)
-        names = ("unmapped", "read_only", "write_only", "value", "strobe", "busy")
+        some, whole = access.write & access.strobe.any(), access.write & access.strobe.all()
+        names = ("unmapped", "read_only", "write_only", "strobe", "value", "busy")
         wrong = (
-            ~found,
-            access.write & ~writable,
+            ~found | (whole & access.address[:2].any()),
+            some & ~writable,
             ~access.write & ~readable,
-            access.write & ~fits,
-            access.write & ~access.strobe.all(),
-            access.write & locked & self.constants.busy,
+            some & ~clears & ~whole,
+            some & ~clears & ~fits,
+            some & ~clears & self.constants.busy,
         )
         before = Const(0)
         for name, one in zip(names, wrong, strict=True):
@@ -152,8 +154,17 @@ def _shape(register: Register):
 
 
 def _fits(register: Register, word: Value) -> Value:
-    """Whether a word of 32 bits is the extension of the register's value."""
-    above = word[register.width :]
-    if not len(above):
-        return Const(1)
-    return above == (word[register.width - 1].replicate(len(above)) if register.signed else 0)
+    """Whether a word of 32 bits is the extension of a value in the register's range."""
+    above, fits = word[register.width :], Const(1)
+    if len(above):
+        fits = above == (word[register.width - 1].replicate(len(above)) if register.signed else 0)
+    if register.range is not None:
+        code, (low, high) = Value.cast(word[: register.width]), register.range
+        code = code.as_signed() if register.signed else code
+        fits &= (code >= low) & (code <= high)
+    return fits
+
+
+def _is_at(access, register: Register) -> Value:
+    """Whether the address is in the register's word."""
+    return access.address[2:] == register.address >> 2

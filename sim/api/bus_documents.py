@@ -19,7 +19,7 @@ _IN_SVD = {
     "write-only": {"access": "write-only"},
     "clear": {"access": "read-write", "modifiedWriteValues": "oneToClear"},
 }
-_ACCESS = {"clear": "1 clears"}
+_ACCESS = {"clear": "a 1 clears its bit"}
 
 
 def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
@@ -58,7 +58,7 @@ def _markdown(unit: BusUnit, name: str) -> str:
         "",
         f"{unit.map.core.capitalize()}. Words of {WORD_BITS} bits, little endian, in {_SPACE} bytes. Signed "
         "values are extended by their sign. An access that is refused (SLVERR, ERR) changes nothing but "
-        "`errors` and `refused`.",
+        "`errors` and `refused`. `errors` takes any word or byte at any time: all ones clear it.",
         "",
         "| address | register | access | bits | what it is |",
         "| --- | --- | --- | ---: | --- |",

@@ -108,6 +108,9 @@ async def refusals(bus, case):
     assert await bus.read(errors) == (OKAY, 0b11111)
     assert await bus.write(errors, 0b10101) == OKAY
     assert await bus.read(errors) == (OKAY, 0b01010)
+    # As drivers do: all ones, of which most are for bits that there are not.
+    assert await bus.write(errors, 0xFFFFFFFF) == OKAY
+    assert await bus.read(errors) == (OKAY, 0)
 
 
 @cocotb.test()

@@ -45,6 +45,7 @@ def _accesses(unit, rng, count, busy=0):
     data ^= np.where(kind < 0.1, 1 << rng.integers(0, 32, count), 0)
     address = np.where((kind > 0.1) & (kind < 0.15), address ^ 1 << rng.integers(0, 12, count), address)
     strobe = np.where((kind > 0.15) & (kind < 0.2), rng.integers(0, 15, count), 15)
+    data = np.where((kind > 0.2) & (kind < 0.25), rng.choice([0, (1 << 32) - 1], count), data)
     named = [registers.index(unit.parameters[name]) for name in ("errors", "refused")]
     named += [registers.index(register) for register in unit.parameters.picture]
     # Every third access reads back what an earlier one may have changed.
@@ -71,9 +72,15 @@ def _borders(unit, rng, count):
     for register in unit.parameters.registers:
         half, whole = 1 << register.width - 1, 1 << register.width
         ends = {end + step for end in (0, half - 1, half, whole - 1) for step in (-1, 0, 1)}
+        ends |= {end + step for end in register.range or () for step in (-1, 0, 1)}
         words = {word & 0xFFFFFFFF for end in ends for word in (end, register.extended(end), end | 1 << 31)}
         for word in sorted(words):
             accesses += [(register.address, 1, word, 15), (register.address, 0, 0, 15)]
+        # Bytes and halves of it, by their own addresses and by that of the word, and no byte at all.
+        for strobe in range(16):
+            first = register.address + max((strobe & -strobe).bit_length() - 1, 0)
+            accesses += [(place, 1, 0xFFFFFFFF, strobe) for place in (register.address, first)]
+            accesses += [(register.address | strobe & 3, 0, 0, strobe)]
     names = "address", "write", "data", "strobe"
     beats = dict(zip(names, np.array(accesses).T, strict=True))
     counters = {name: (1 << width) - 1 for name, width, _ in _COUNTERS}
@@ -81,19 +88,19 @@ def _borders(unit, rng, count):
 
 
 def _decoding(unit, rng, count):
-    """Reads and writes at addresses a bit off those of registers."""
+    """Reads and writes, some of no byte, at addresses a bit off those of registers."""
     address = np.array([register.address for register in unit.parameters.registers])
     address = (address[:, np.newaxis] ^ 1 << np.arange(12)).ravel()
-    both = np.tile(address, 2)
-    beats = {"address": both, "write": np.arange(len(both)) // len(address), "data": np.zeros_like(both)}
+    thrice = np.tile(address, 3)
+    kind = np.arange(len(thrice)) // len(address)
+    beats = {"address": thrice, "write": (kind > 0).astype(int), "data": np.zeros_like(thrice)}
     counters = {name: (1 << width) - 1 for name, width, _ in _COUNTERS}
-    return Case(beats | {"strobe": np.full(len(both), 15)}, {"busy": 0} | counters)
+    return Case(beats | {"strobe": np.where(kind == 2, 0, 15)}, {"busy": 0} | counters)
 
 
-def _map(lights):
-    return RegisterMap(
-        "core", _COUNTERS, frame_registers(), constant_registers(preset(model="cosquad", lights=lights))
-    )
+def _map(lights, materials=1):
+    design = preset(model="cosquad", lights=lights, materials=materials)
+    return RegisterMap("core", _COUNTERS, frame_registers(), constant_registers(design))
 
 
 RECORD = Record(
@@ -102,7 +109,7 @@ RECORD = Record(
     source="docs/theory/bus.md#registers",
     variants={
         "": Variant(partial(RegistersUnit, _map(1))),
-        "4 lights": Variant(partial(RegistersUnit, _map(4))),
+        "4 lights, 3 materials": Variant(partial(RegistersUnit, _map(4, 3))),
     },
     expect=_expect,
     stimuli={
