@@ -86,7 +86,8 @@ def command(
     lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or if the
     frames are too heavy for 60 Hz.
 
-    On a 25F the default model is cosquad: with blinn no placement of its design has been routed so far.
+    What is known of the board's bitstream is printed first: on a 25F the last try gave none. There the
+    default model is cosquad: with blinn no placement of its design has been routed so far.
 
     The buttons of the board stop the motion, turn it round, and change the material and the light.
 
@@ -117,6 +118,8 @@ def command(
         raise InputError(f"--clock {clock:g}", str(error), "give another rate") from error
     _check_load(gpu, plan)
     click.echo("\n".join(_design_lines(board, mesh, gpu, plan)))
+    if not simulate:
+        click.echo(f"{'known':<12}of a bitstream: {board.known}")
     entry = f"{board.name}, {mesh}, {gpu.drawing.mesh.triangles:,} triangles"
     figures = recorded.setdefault(entry, {})
     if simulate:

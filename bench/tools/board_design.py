@@ -38,10 +38,19 @@ COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 
 _LEFT_OUT = ("size", "projection", "viewer", "target", "method", "operand", "gate", "setup_interval", "style")
 
-OPTIONS = {name: option for name, option in {**SCENE, **DESIGN}.items() if name not in _LEFT_OUT}
-"""Options of the command; the size is that of the display, and the camera a perspective one."""
-
 _DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
+
+_TOLD = _DEFAULTS | {"model": "blinn, on a 25F cosquad"}
+
+OPTIONS = {
+    name: option._replace(default=_TOLD.get(name, option.default))
+    for name, option in {**SCENE, **DESIGN}.items()
+    if name not in _LEFT_OUT
+}
+"""Options of the command, with the defaults that its help tells.
+
+The size is that of the display, and the camera a perspective one.
+"""
 
 _COMPACT = {"setup_interval": 9, "model": "cosquad"}
 """Defaults on a small device: setup interval, and a model whose design has been routed."""

@@ -1,4 +1,4 @@
-"""Fill in the tables of ``board.md`` from ``board.json``, which ``blysk board --record`` writes.
+"""Fill in the tables of ``board.md`` from ``board.json``, of ``blysk board --record``, and from `BOARDS`.
 
 python docs/guide/board_tables.py            # write the tables
 python docs/guide/board_tables.py --check    # change nothing; fail where the page is not what comes out
@@ -10,6 +10,8 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+from blysk.bench.tools.board_build import BOARDS
 
 GUIDE = Path(__file__).parent
 PAGE, FIGURES = GUIDE / "board.md", GUIDE / "board.json"
@@ -36,7 +38,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--check", action="store_true")
     check = parser.parse_args(arguments).check
     entries = json.loads(FIGURES.read_text(encoding="utf-8"))
-    tables = {"board-parts": _parts, "board-frames": _frames, "board-others": _others}
+    tables = {"board-known": _known, "board-parts": _parts, "board-frames": _frames, "board-others": _others}
     text = PAGE.read_text(encoding="utf-8")
     made = _TABLE.sub(lambda m: "".join((m[1], "\n".join(tables[m[2]](entries)), "\n", m[3])), text)
     if check:
@@ -56,6 +58,11 @@ def _named(entry: str) -> tuple[str, str]:
     """Board and triangles of an entry's name."""
     board, _, triangles = entry.split(", ")
     return board, triangles.removesuffix(" triangles")
+
+
+def _known(entries: dict) -> Iterator[str]:
+    """What the records of the boards say of their bitstreams."""
+    return _rows(["board", "bitstream"], [[name, board.known] for name, board in BOARDS.items()], left=2)
 
 
 def _parts(entries: dict) -> Iterator[str]:

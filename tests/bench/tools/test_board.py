@@ -1,6 +1,7 @@
 # amaranth: UnusedElaboratable=no
 """``blysk board``: bad input in one line, the pins of each board, what is said of clocks, a bitstream."""
 
+import re
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -165,6 +166,22 @@ def test_a_router_that_will_not_end_is_given_up(twice, says):
     # What the placer says of its own rounds, and a line that has just begun.
     assert _stuck(f"Info: iter=595 steplen=1.296256 a=299.9\n{said}Info:     iter=") == says
     assert _stuck("") == ""
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_what_is_known_is_printed_before_the_build(name, capsys, monkeypatch, tmp_path):
+    """Before an hour is spent; a bitstream that was made is told of with its commit."""
+    told = []
+
+    def give_up(*arguments):
+        told.append(capsys.readouterr().out)
+        raise ToolError("given up")
+
+    monkeypatch.setattr("blysk.bench.tools.board.build", give_up)
+    monkeypatch.setattr("blysk.bench.tools.board.packages_missing", lambda: None)
+    assert main(["board", name, "--triangles", "100", "-o", str(tmp_path / "x.bit")]) == 1
+    assert f"known       of a bitstream: {BOARDS[name].known}\n" in told[0]
+    assert re.search(r"commit [0-9a-f]{7}", BOARDS[name].known)
 
 
 def test_figures_are_no_json(capsys, tmp_path):
