@@ -146,7 +146,7 @@ def test_exponents_whose_energy_factor_fits(energy, largest):
 
 
 def test_models_without_an_energy_factor_are_refused():
-    with pytest.raises(ValueError, match=r"^model must be one of phong, blinn, cosquad_lin, not exp$"):
+    with pytest.raises(ValueError, match=r"^model must be one of .*blinn.*, not exp$"):
         FrameConstants.of(scene([Light((0, 0, 1))]), energy=REFLECTION_MODELS["exp"])
 
 

@@ -16,8 +16,8 @@ def test_every_name_has_a_line():
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        ({"method": "slurp"}, "^method must be one of linear, .*, recurrence-direct, not 'slurp'$"),
-        ({"model": "shiny"}, "^model must be one of cosquad, .*, ggx, not 'shiny'$"),
+        ({"method": "slurp"}, "^method must be one of .*linear.*, not 'slurp'$"),
+        ({"model": "shiny"}, "^model must be one of .*ggx.*, not 'shiny'$"),
     ],
 )
 def test_unknown_names(names, message):

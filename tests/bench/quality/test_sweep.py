@@ -199,5 +199,6 @@ def test_chord_method_is_within_an_lsb(mesh, capsys):
     """Part of what the command sweeps by itself: every model, and an exponent in thirteen."""
     exponents = map(str, sorted({*FEW_EXPONENTS[::3], *range(1, 1001, 13)}))
     assert main([mesh, "--models", "cosquad", "--exponents", *exponents]) == 0
-    assert main([mesh, "--models", *list(MODELS)[1:], "--exponents", "1", "3", "10", "100", "1000"]) == 0
+    others = [name for name in MODELS if name != "cosquad"]
+    assert main([mesh, "--models", *others, "--exponents", "1", "3", "10", "100", "1000"]) == 0
     capsys.readouterr()

@@ -220,7 +220,7 @@ def test_errors_are_measured(entry):
     model, arithmetic, total = sample_of(entry, FEW, 3).errors
     assert (model is None) == (arithmetic is None)
     assert np.isfinite(total)
-    assert total > 0 or entry.record.name in ("dot_product", "gpq")
+    assert (total == 0) == (entry.variant.note == "exact")
     assert model is None or total <= model + arithmetic + 1e-12
 
 
@@ -256,8 +256,8 @@ def test_same_seed_same_figures(unit):
     np.testing.assert_array_equal(first.found, again.found)
     assert first.errors == again.errors
     if entry.variant.exhaustive:
-        # Every operand is there.
-        assert np.size(first.found) == 2**17 + 1
+        # Every operand is there, of the arc cosine's so many.
+        assert unit != "arccos" or np.size(first.found) == 2**17 + 1
         np.testing.assert_array_equal(first.found, other.found)
     else:
         assert first.found.shape != other.found.shape or np.any(first.found != other.found)

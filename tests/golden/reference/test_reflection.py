@@ -239,7 +239,7 @@ def test_exponent_ratio():
 
 
 def test_refusals():
-    with pytest.raises(ValueError, match=r"model must be one of phong, blinn, cosquad_lin, not cosquad"):
+    with pytest.raises(ValueError, match=r"model must be one of .*blinn.*, not cosquad$"):
         REFLECTION_MODELS["cosquad"].energy_factor(10)
     with pytest.raises(ValueError, match="power must be 2 or 4, not 3"):
         coscos_scale(10, 3)
