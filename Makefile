@@ -10,7 +10,7 @@ COMMA := ,
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-all test-long prove mutants soak coverage bench pages site lint clean
+.PHONY: demo test test-all test-long test-ci prove mutants soak coverage bench pages site lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -23,13 +23,16 @@ test-all:
 	$(MAKE) prove
 	$(MAKE) test-long
 
-# What `make test` leaves out but for proofs: other structures of the units, costs, sweeps, browsers. With MINUTES
-# those tests, or proofs, that start within them, others every day.
+# What `make test` leaves out but for proofs: other structures of the units, costs, sweeps, browsers.
 test-long: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m long $(MINUTES:%=--minutes %)
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m long
+
+# Of those the part that CI runs.
+test-ci: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m ci
 
 prove: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m prove tests/formal $(MINUTES:%=--minutes %)
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m prove tests/formal
 
 mutants: $(VENV)/.installed-test
 	$(BIN)/python -m blysk.bench.quality.mutants

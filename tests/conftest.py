@@ -1,21 +1,21 @@
-"""What all tests share: the order of their groups, a limit of time, interrupts, compiled models."""
+"""What all tests share: the order of their groups, interrupts, compiled models."""
 
 import importlib.util
-import os
 import re
 import signal
 import threading
-import time
 from collections import Counter
-from datetime import date
-from hashlib import sha256
 from pathlib import Path
 
+import hypothesis
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/tools/test_pages.py")
 """Files whose tests of a unit are a group."""
+
+LONGEST = ("tests/bench/tools/test_absorb_registers.py", "tests/sim/engines/test_cache.py")
+"""Files whose groups take the longest: workers begin with them."""
 
 
 def group_of(nodeid):
@@ -31,73 +31,21 @@ class Groups(LoadScopeScheduling):
         return group_of(nodeid)
 
 
-class Durations:
-    """Seconds that each test took when it ran last, kept in pytest's cache."""
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items):
+    """The groups in `LONGEST` first, then those of the most tests: at the end no worker waits for another."""
+    count = Counter(group_of(item.nodeid) for item in items)
 
-    KEY, UNKNOWN = "blysk/durations", 1.0
+    def place(item):
+        group = group_of(item.nodeid)
+        return not group.startswith(LONGEST), -count[group], group
 
-    def __init__(self, cache):
-        self.cache, self.last, self.found = cache, cache.get(self.KEY, {}), {}
-
-    @pytest.hookimpl(trylast=True)
-    def pytest_collection_modifyitems(self, items):
-        """The longest groups first: at the end no worker waits for another. Without figures, the largest."""
-        seconds = Counter()
-        for item in items:
-            seconds[group_of(item.nodeid)] += self.last.get(item.nodeid, self.UNKNOWN)
-        order = {group: place for place, (group, _) in enumerate(seconds.most_common())}
-        items.sort(key=lambda item: order[group_of(item.nodeid)])
-
-    def pytest_runtest_logreport(self, report):
-        self.found[report.nodeid] = round(self.found.get(report.nodeid, 0) + report.duration, 2)
-
-    def pytest_sessionfinish(self, session):
-        if not hasattr(session.config, "workerinput"):
-            self.cache.set(self.KEY, self.last | self.found)
+    items.sort(key=place)
 
 
-class Limit:
-    """Skips tests that would start late; the order of groups is another every day, so that all get a turn.
-
-    Those that hold the whole project, its wheel, types and examples, come first on every day.
-    """
-
-    DAY = "BLYSK_TEST_DAY"
-    EVERY_DAY = tuple(f"tests/test_{name}.py" for name in ("supply", "embedding", "examples", "citations"))
-
-    def __init__(self, minutes):
-        self.minutes, self.end = minutes, time.monotonic() + 60 * minutes
-        # Workers have that of the process that starts them.
-        self.day = os.environ.setdefault(self.DAY, date.today().isoformat())
-
-    @pytest.hookimpl(trylast=True)
-    def pytest_collection_modifyitems(self, items):
-        def place(item):
-            group = group_of(item.nodeid)
-            return group not in self.EVERY_DAY, sha256(f"{self.day} {group}".encode()).digest()
-
-        items.sort(key=place)
-
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_runtest_setup(self, item):
-        if time.monotonic() > self.end:
-            pytest.skip(f"not started within {self.minutes:g} minutes")
-
-
-def pytest_addoption(parser):
-    parser.addoption(
-        "--minutes",
-        type=float,
-        metavar="NUMBER",
-        help="start no test after so many minutes; those left out are skipped, and are others every day",
-    )
-
-
-def pytest_configure(config):
-    if config.option.minutes is not None:
-        config.pluginmanager.register(Limit(config.option.minutes))
-    elif hasattr(config, "cache"):
-        config.pluginmanager.register(Durations(config.cache))
+# Examples are drawn, and they are the same in every run.
+hypothesis.settings.register_profile("blysk", derandomize=True, database=None)
+hypothesis.settings.load_profile("blysk")
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -16,7 +16,7 @@ from blysk.sim.api.design import design
 from blysk.sim.api.scene import scene
 from blysk.sim.frames.display import OneClock, show
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.ci]
 
 BACKGROUND = (26, 28, 32)
 
