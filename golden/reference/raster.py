@@ -18,6 +18,8 @@ SUBPIXELS = 256
 # Pixels beyond which a triangle is cut, so that edge functions stay within int64: coordinates within
 # 2^28 steps give products within 2^59.
 _GUARD = float(2**20)
+# A height below this part of the largest coordinate is rounding only.
+_FLAT = 2.0**-47
 # Scanlines or fragments handled at once; bounds the memory, changes no result.
 _CHUNK = 1 << 20
 
@@ -61,9 +63,10 @@ class Raster:
         Number of triangles of the mesh. Each is either drawn (it has spans before the depth test) or counted
         once in one of the next four counters.
     degenerate : int
-        Triangles without area, in the world or after rounding to 1/256 pixel.
+        Triangles without area after rounding to 1/256 pixel. Without area in the world, but with some after
+        rounding, a triangle is drawn: it closes the seam between a side and its parts.
     culled : int
-        Triangles seen from behind and left out because the scene asks for that.
+        Triangles clockwise after rounding, and left out because the scene asks for that.
     outside : int
         Triangles wholly outside the picture or nearer than the near plane.
     uncovered : int
@@ -140,10 +143,16 @@ def face_normals(mesh: Mesh) -> np.ndarray:
     Returns
     -------
     float64 array, shape (F, 3)
-        0 where a triangle has no area.
+        Where a triangle has no area but by rounding: along the sum of its vertex normals, and 0 if that is 0.
     """
     first, second, third = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    return normalise(np.cross(second - first, third - first))
+    left, right = second - first, third - first
+    cross = np.cross(left, right)
+    around = sum_of_components(np.abs(left) + np.abs(right))
+    height = _FLAT * np.abs(mesh.vertices).max(initial=0)
+    flat = np.flatnonzero(sum_of_components(np.abs(cross)) <= height * around)
+    cross[flat] = mesh.normals[mesh.faces[flat]].sum(axis=1)
+    return normalise(cross)
 
 
 def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -176,8 +185,14 @@ def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tupl
     return np.concatenate(kept), np.concatenate(kept_source)
 
 
-def _assemble(scene: Scene, candidates: np.ndarray, corners: np.ndarray) -> tuple[_Pieces, np.ndarray]:
-    """Clip, divide and round triangles; also returns the mesh triangles with a part left after clipping."""
+def _assemble(
+    scene: Scene, candidates: np.ndarray, corners: np.ndarray
+) -> tuple[_Pieces, np.ndarray, np.ndarray]:
+    """Clip, divide and round triangles, and drop those without area, and back faces of a scene that culls.
+
+    Also returns the mesh triangles with a part left after clipping, and with an area left after rounding.
+    The rounded corners tell a back face: then a closed surface has a front wherever it has a back.
+    """
     near = scene.camera.near
     x, y, w, depth = np.moveaxis(corners, -1, 0)
     beyond = (np.maximum(np.abs(x), np.abs(y)) > _GUARD * w) | (depth < near)
@@ -208,15 +223,17 @@ def _assemble(scene: Scene, candidates: np.ndarray, corners: np.ndarray) -> tupl
     turn = np.where(clockwise[:, np.newaxis], [0, 2, 1], [0, 1, 2])
     rows = np.arange(len(area))[:, np.newaxis]
     solid = area != 0
+    # y grows downwards: an area over 0 is clockwise.
+    shown = solid & ~((area > 0) & scene.culls[triangle])
     pieces = _Pieces(
-        points=points[rows, turn][solid],
-        area=np.abs(area[solid]),
-        weight=weight[rows, turn][solid],
-        nearness=nearness[rows, turn][solid],
-        corner=corner[rows, turn][solid],
-        triangle=triangle[solid],
+        points=points[rows, turn][shown],
+        area=np.abs(area[shown]),
+        weight=weight[rows, turn][shown],
+        nearness=nearness[rows, turn][shown],
+        corner=corner[rows, turn][shown],
+        triangle=triangle[shown],
     )
-    return pieces, left_over
+    return pieces, left_over, triangle[solid]
 
 
 def _counting(counts: np.ndarray) -> np.ndarray:
@@ -283,29 +300,26 @@ def rasterise(scene: Scene) -> Raster:
     mesh, width, height = scene.mesh, scene.width, scene.height
     faces = mesh.faces
     plane = face_normals(mesh)
-    degenerate = ~any_component(plane)
     homogeneous = scene.camera.homogeneous(mesh.vertices, width, height)
     if scene.camera.projection == "perspective":
         towards = scene.camera.position - mesh.vertices[faces[:, 0]]
         back = sum_of_components(plane * towards) < 0
     else:
         back = plane @ scene.camera.viewer < 0
-    culled = back & ~degenerate & scene.culls
 
     x, y, w, depth = homogeneous.T
     outside = np.zeros(len(faces), dtype=bool)
     for beyond in (x < 0, x > width * w, y < 0, y > height * w, depth < scene.camera.near):
         outside |= beyond[faces[:, 0]] & beyond[faces[:, 1]] & beyond[faces[:, 2]]
-    candidates = np.flatnonzero(~(degenerate | culled | outside))
-    outside &= ~(degenerate | culled)
-    pieces, left_over = _assemble(scene, candidates, homogeneous[faces[candidates]])
-    present = np.zeros((3, len(faces)), dtype=bool)
-    present[0, left_over] = True
-    present[1, pieces.triangle] = True
+    candidates = np.flatnonzero(~outside)
+    pieces, left_over, solid = _assemble(scene, candidates, homogeneous[faces[candidates]])
+    present = np.zeros((4, len(faces)), dtype=bool)
+    for row, triangles in zip(present, (left_over, solid, pieces.triangle), strict=False):
+        row[triangles] = True
 
     (piece, left, line, length), owner = _drawn(pieces, width, height)
     count = len(piece)
-    present[2, pieces.triangle[piece]] = True
+    present[3, pieces.triangle[piece]] = True
     seen = np.zeros(count, dtype=bool)
     seen[owner[owner >= 0]] = True
     kept = np.flatnonzero(seen)
@@ -347,10 +361,10 @@ def rasterise(scene: Scene) -> Raster:
         pixel=pixel,
         visible=owner[pixel] == span,
         triangles=len(faces),
-        degenerate=int(degenerate.sum() + (present[0] & ~present[1]).sum()),
-        culled=int(culled.sum()),
+        degenerate=int((present[0] & ~present[1]).sum()),
+        culled=int((present[1] & ~present[2]).sum()),
         outside=int(outside.sum() + len(candidates) - present[0].sum()),
-        uncovered=int((present[1] & ~present[2]).sum()),
+        uncovered=int((present[2] & ~present[3]).sum()),
         hidden_spans=count - len(kept),
         repaired_normals=sum(int(end.lost.sum()) for end in ends),
     )

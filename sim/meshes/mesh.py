@@ -17,7 +17,7 @@ from blysk.sim.errors import InputError
 from blysk.sim.meshes.gltf import check_gltf, find_gltf_materials, gltf_document, plain_gltf
 from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found
-from blysk.sim.meshes.normals import crease_normals, face_cross, repaired_normals, transformed
+from blysk.sim.meshes.normals import crease_normals, face_directions, repaired_normals, transformed
 from blysk.sim.meshes.obj import find_obj_materials, split_obj, tidy_obj
 from blysk.sim.meshes.ply import read_ply
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused
@@ -37,9 +37,6 @@ DEFAULT_TRIANGLES = 10_000
 DEFAULT_CREASE = 40.0
 """Angle between faces, in degrees, over which an edge is sharp; for meshes without normals."""
 
-# A triangle whose height is below this part of the largest coordinate is rounding only: 32 units of 2**-53.
-_FLAT = 2.0**-48
-
 
 @dataclass(frozen=True)
 class LoadedMesh:
@@ -55,7 +52,8 @@ class LoadedMesh:
         Stored vertex normals that were zero, not finite, or more than 1/256 off unit length, or that the
         file refers to but does not hold.
     dropped_faces : int
-        Triangles without area, left out.
+        Triangles without area, left out: two corners are at one position, or no triangle shares a side.
+        Others without area stay: they close the seam between a side and its parts.
     materials : tuple of FileMaterial
         Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
         differ in more than the name.
@@ -90,7 +88,7 @@ def load_mesh(
     All meshes of a scene are put together in world coordinates: vertices by the node's matrix ``M``,
     normals by its inverse transpose, and a mirroring node (``det M < 0``) turns the triangles round.
     Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
-    cover them, concave ones by ear clipping. Quantised arrays of glTF are scaled, and all instances of a node
+    cover them and keep all their corners, concave ones by ear clipping. Quantised arrays of glTF are scaled, and all instances of a node
     drawn; morph weights and skins are not applied, and listed in ``ignored``.
 
     Materials of a GLB or glTF file: the base colour without its alpha, metallic and roughness factors of
@@ -358,7 +356,10 @@ def _finish(
     lost: int,
     crease_angle: float,
 ) -> LoadedMesh:
-    """Drop faces without area, mend stored normals, compute the others; materials keep the file's numbers."""
+    """Mend stored normals, compute the others; materials keep the file's numbers.
+
+    Faces without area stay where their sides join others, and are dropped where they join none.
+    """
     used = np.unique(faces)
     broken = len(used) - np.isfinite(vertices[used]).all(axis=1).sum()
     if broken:
@@ -368,17 +369,18 @@ def _finish(
 
     # Tiny and huge models would under- and overflow in the products below.
     scaled = vertices / np.abs(vertices[used]).max()
-    cross, longest = face_cross(scaled, faces)
-    solid = cross > _FLAT * longest
-    dropped = int(len(faces) - solid.sum())
-    faces, material = faces[solid], material[solid]
-    if not len(faces):
+    directions, found, solid = face_directions(scaled, faces)
+    if not solid.any():
         raise Refused("none of its faces has an area")
+    dropped = int(len(faces) - found.sum())
+    faces, material, directions = faces[found], material[found], directions[found]
 
     kept = has_normals[faces[:, 0]]
-    corner, smooth_faces, smooth_normals = crease_normals(scaled, faces[~kept], crease_angle)
+    corner, smooth_faces, smooth_normals = crease_normals(
+        scaled, faces[~kept], directions[~kept], crease_angle
+    )
     own = np.unique(faces[kept])
-    own_normals, repaired = repaired_normals(scaled, faces[kept], normals, own)
+    own_normals, repaired = repaired_normals(scaled, faces[kept], directions[kept], normals, own)
     renumbered = np.searchsorted(own, faces[kept])
     mesh = Mesh(
         vertices=np.concatenate([vertices[own], vertices[corner]]),

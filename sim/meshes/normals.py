@@ -4,27 +4,85 @@ import numpy as np
 
 from blysk.golden.reference.geometry import normalise
 
-__all__ = ["crease_normals", "face_cross", "repaired_normals", "transformed", "weighted_normals"]
+__all__ = ["crease_normals", "face_directions", "repaired_normals", "transformed", "weighted_normals"]
 
 # The largest error of a stored normal's length that counts as rounding, itself stored in float32.
 _LENGTH_TOLERANCE = 1 / 256 + 1e-6
+# A triangle whose height is below this part of the largest coordinate is rounding only: 32 units of 2**-53.
+_FLAT = 2.0**-48
 # Slack of the crease test in the cosine: the rounding of vertices stored as float32.
 _COSINE_SLACK = 1e-6
 
 
-def face_cross(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Twice the area, and the longest side, of each face."""
+def face_directions(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit face normals, and which faces have one: a face without area takes that of a neighbour.
+
+    The neighbour across its longest side goes first: a face over corners on a straight side then belongs to
+    the polygon of that side. A face with two corners at one position, or without a neighbour, has none.
+
+    Parameters
+    ----------
+    vertices : float64 array, shape (V, 3)
+        Positions, the largest coordinate about 1.
+    faces : int array, shape (F, 3)
+        Their corners.
+
+    Returns
+    -------
+    directions : float64 array, shape (F, 3)
+        0 for a face that has none.
+    found : bool array, shape (F,)
+        Whether it has one.
+    solid : bool array, shape (F,)
+        Whether it has an area.
+    """
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    sides = np.stack([b - a, c - b, a - c])
-    return np.linalg.norm(np.cross(sides[0], sides[1]), axis=-1), np.linalg.norm(sides, axis=-1).max(axis=0)
+    sides = np.stack([b - a, c - b, a - c], axis=1)
+    lengths = np.linalg.norm(sides, axis=-1)
+    cross = np.cross(sides[:, 0], sides[:, 1])
+    solid = np.linalg.norm(cross, axis=-1) > _FLAT * lengths.max(axis=1)
+    directions = np.where(solid[:, np.newaxis], normalise(cross), 0)
+    found = solid.copy()
+    flat = ~solid & (lengths > 0).all(axis=1)
+    if not flat.any():
+        return directions, found, solid
+    first, second = _shared_sides(_places(vertices, faces))
+    first, second = np.concatenate([first, second]), np.concatenate([second, first])
+    known = flat[first // 3] & (found | flat)[second // 3]
+    first, second = first[known], second[known]
+    longest = lengths.ravel()[first] == lengths.max(axis=1)[first // 3]
+    for chosen in (longest, np.ones_like(longest)):
+        taker, giver = first[chosen] // 3, second[chosen] // 3
+        while True:
+            ready = ~found[taker] & found[giver]
+            if not ready.any():
+                break
+            directions[taker[ready]] = directions[giver[ready]]
+            found[taker[ready]] = True
+    return directions, found, solid
+
+
+def _places(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Corners of faces by position: the same number for equal positions."""
+    _, welded = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    return welded.ravel()[faces]
+
+
+def _shared_sides(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of sides between the same two places; side 3 f + k goes from corner k of face f to the next."""
+    start, end = places.ravel(), np.roll(places, -1, axis=1).ravel()
+    edge = np.minimum(start, end) * (places.max() + 1) + np.maximum(start, end)
+    order = np.argsort(edge, kind="stable")
+    first, second = order[:-1], order[1:]
+    shared = edge[first] == edge[second]
+    return first[shared], second[shared]
 
 
 def weighted_normals(
-    vertices: np.ndarray, faces: np.ndarray, owner: np.ndarray, owners: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Unit face normals, and their angle-weighted unit sums over the corners of each ``owner`` (F, 3)."""
+    vertices: np.ndarray, faces: np.ndarray, face_normals: np.ndarray, owner: np.ndarray, owners: int
+) -> np.ndarray:
+    """Angle-weighted unit sums of the unit face normals over the corners of each ``owner`` (F, 3)."""
     corners = vertices[faces]
-    face_normals = normalise(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     sides = np.roll(corners, -1, axis=1) - corners
     back = -np.roll(sides, 1, axis=1)
     angles = np.arctan2(np.linalg.norm(np.cross(sides, back), axis=-1), np.einsum("fki,fki->fk", sides, back))
@@ -37,13 +95,13 @@ def weighted_normals(
         one = np.zeros(owners, dtype=np.int64)
         one[flat] = np.repeat(np.arange(len(faces)), 3)
         total[cancelled] = face_normals[one[cancelled]]
-    return face_normals, normalise(total)
+    return normalise(total)
 
 
 def repaired_normals(
-    vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray, own: np.ndarray
+    vertices: np.ndarray, faces: np.ndarray, directions: np.ndarray, normals: np.ndarray, own: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Unit stored normals of the vertices ``own``, and how many had to be mended."""
+    """Unit stored normals of the vertices ``own``, and how many were mended; directions are of faces."""
     stored = normals[own]
     usable = np.isfinite(stored).all(axis=1) & stored.any(axis=1)
     # The largest component bounds the length without overflow.
@@ -54,36 +112,30 @@ def repaired_normals(
     result = normalise(np.where(usable[:, np.newaxis], stored, 0))
     if not usable.all():
         owner = np.searchsorted(own, faces)
-        _, computed = weighted_normals(vertices, faces, owner, len(own))
+        computed = weighted_normals(vertices, faces, directions, owner, len(own))
         result[~usable] = computed[~usable]
     return result, int(bad.sum())
 
 
 def crease_normals(
-    vertices: np.ndarray, faces: np.ndarray, crease_angle: float
+    vertices: np.ndarray, faces: np.ndarray, directions: np.ndarray, crease_angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cut a mesh at its creases: the old vertex of each new one, the new faces, and the new normals.
 
+    ``directions`` are the unit normals of the faces.
     Two corners at one position share a new vertex if a chain of faces around the position leads from one to
     the other over edges that are no creases.
     """
     if not len(faces):
         return np.zeros(0, dtype=np.int64), faces, np.zeros((0, 3))
-    _, welded = np.unique(vertices + 0.0, axis=0, return_inverse=True)
-    places = welded.ravel()[faces]
-    face_normals, _ = weighted_normals(vertices, faces, np.zeros_like(faces), 1)
-
+    places = _places(vertices, faces)
     corner = np.arange(faces.size).reshape(faces.shape)
     start, end = places.ravel(), np.roll(places, -1, axis=1).ravel()
     start_corner, end_corner = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     low_corner = np.where(start < end, start_corner, end_corner)
     high_corner = np.where(start < end, end_corner, start_corner)
-    edge = np.minimum(start, end) * (places.max() + 1) + np.maximum(start, end)
-    order = np.argsort(edge, kind="stable")
-    first, second = order[:-1], order[1:]
-    shared = edge[first] == edge[second]
-    first, second = first[shared], second[shared]
-    cosine = np.einsum("ei,ei->e", face_normals[first // 3], face_normals[second // 3])
+    first, second = _shared_sides(places)
+    cosine = np.einsum("ei,ei->e", directions[first // 3], directions[second // 3])
     smooth = cosine >= np.cos(np.radians(crease_angle)) - _COSINE_SLACK
     first, second = first[smooth], second[smooth]
 
@@ -98,8 +150,7 @@ def crease_normals(
     new_faces = group.reshape(faces.shape).astype(np.int64)
     old_vertex = np.zeros(count, dtype=np.int64)
     old_vertex[group] = faces.ravel()
-    _, normals = weighted_normals(vertices, faces, new_faces, count)
-    return old_vertex, new_faces, normals
+    return old_vertex, new_faces, weighted_normals(vertices, faces, directions, new_faces, count)
 
 
 def transformed(normals: np.ndarray, cofactors: np.ndarray) -> np.ndarray:

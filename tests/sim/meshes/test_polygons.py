@@ -44,7 +44,7 @@ def check_cover(outline, corners):
     areas = np.array([shoelace(np.asarray(outline)[triangle]) for triangle in corners])
     assert (areas * np.sign(shoelace(outline)) >= -1e-12).all()
     assert areas.sum() == pytest.approx(shoelace(outline), rel=1e-12)
-    assert len(corners) <= len(outline) - 2
+    assert len(corners) == len(outline) - 2
 
 
 CASES = {**OUTLINES, **{f"spiral{k}": spiral(5 + k, k) for k in range(20)}}
