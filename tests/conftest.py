@@ -3,6 +3,7 @@
 import importlib.util
 import re
 import signal
+import subprocess
 import threading
 from collections import Counter
 from pathlib import Path
@@ -10,6 +11,11 @@ from pathlib import Path
 import hypothesis
 import pytest
 from xdist.scheduler import LoadScopeScheduling
+
+from blysk.hdl.emit.processes import Process
+
+# A test that is killed leaves no program behind, nor does a run of tests with its workers.
+subprocess.Popen = Process
 
 BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/tools/test_pages.py")
 """Files whose tests of a unit are a group."""

@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import re
 import sys
 import tomllib
 from pathlib import Path
@@ -99,6 +100,33 @@ def test_no_import_goes_in_a_circle():
         for name, path in FILES.items()
     }
     list(graphlib.TopologicalSorter(graph).static_order())
+
+
+STARTERS = {
+    "blysk.hdl.emit.processes": "programs",
+    "blysk.sim.frames.workers": "workers, which watch their parent",
+}
+"""Files that may start processes, and which."""
+
+
+def starts(source: str, package: str) -> set[str]:
+    """Calls and imports by which a source starts a process; its exceptions and constants start none."""
+    calls = re.findall(
+        r"\bsubprocess\.(?:run|Popen|call|check_call|check_output|getoutput)\b"
+        r"|\bos\.(?:system|popen|fork|forkpty|posix_spawn\w*|spawn\w+)\(",
+        source,
+    )
+    if not re.search("subprocess|multiprocessing|ProcessPool", source):
+        return set(calls)
+    modules = imports(source, package)
+    wrong = {"multiprocessing", "concurrent.futures.ProcessPoolExecutor"} & modules
+    return {*calls, *wrong, *(module for module in modules if module.startswith("subprocess."))}
+
+
+def test_processes_end_with_their_parent():
+    """All are started by the files that see to it."""
+    found = {name: starts(path.read_text(encoding="utf-8"), name) for name, path in FILES.items()}
+    assert {name for name, calls in found.items() if calls} == set(STARTERS)
 
 
 def test_the_wheel_has_every_package():

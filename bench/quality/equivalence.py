@@ -13,6 +13,7 @@ from pathlib import Path
 
 from blysk.bench.tools.place_and_route import YOSYS
 from blysk.bench.tools.tool_runner import ToolError
+from blysk.hdl.emit.processes import run_program
 
 __all__ = ["Miter", "yosys"]
 
@@ -36,7 +37,7 @@ def yosys(script: str, folder: Path) -> None:
     command = [sys.executable, "-c", YOSYS]
     streams = {"capture_output": True, "encoding": "utf-8"}
     try:
-        done = subprocess.run(command, input=script, cwd=folder, timeout=YOSYS_SECONDS, **streams)
+        done = run_program(command, input=script, cwd=folder, timeout=YOSYS_SECONDS, **streams)
     except subprocess.TimeoutExpired:
         raise ToolError(f"Yosys has not ended after {YOSYS_SECONDS} s") from None
     if done.returncode:
@@ -171,7 +172,7 @@ class Miter:
         script = f"read_aiger mutant.aig; strash; scleanup; scorr; pdr -a -v -T {math.ceil(seconds)}"
         abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
         try:
-            done = subprocess.run(
+            done = run_program(
                 [abc, "-c", script],
                 capture_output=True,
                 encoding="utf-8",

@@ -15,7 +15,6 @@ over the cycles, from packed beats to packed beats.
 import hashlib
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -35,6 +34,7 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import preset
+from blysk.hdl.emit.processes import run_program
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import Run, simulate
@@ -262,7 +262,7 @@ def picture_seconds(triangles: int = 50_000, size: str = "640x480", repeats: int
         command += ["--triangles", str(triangles), "--size", size, "--method", "chord"]
         command += ["--json", str(figures), "-o", str(Path(folder) / "picture.png")]
         for _ in range(1 + repeats):
-            done = subprocess.run(command, check=True, capture_output=True, text=True)
+            done = run_program(command, check=True, capture_output=True, text=True)
             processor.append(float(done.stdout.splitlines()[-1]))
             wall.append(json.loads(figures.read_text())["seconds"]["total"])
     return min(wall[1:]), min(processor[1:])

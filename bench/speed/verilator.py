@@ -7,7 +7,6 @@ as Verilator needs it: with the clock low, after which the outputs are read, and
 
 import ctypes
 import os
-import subprocess
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,6 +16,7 @@ from amaranth.hdl import Shape
 from amaranth.lib import data
 from amaranth.lib.wiring import Component
 
+from blysk.hdl.emit.processes import run_program
 from blysk.hdl.emit.verilog import emit
 from blysk.sim.engines.beats import pack, word_count
 from blysk.sim.engines.compilers import find_compilers
@@ -146,7 +146,7 @@ def _driver(ports: Ports) -> str:
 
 
 def _run(command: list, folder: Path, **options) -> None:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", **options)
+    done = run_program(command, cwd=folder, capture_output=True, text=True, errors="replace", **options)
     if done.returncode:
         lines = (done.stderr or done.stdout).strip().splitlines()
         line = next((line for line in lines if "rror" in line), (lines or ["no message"])[0])

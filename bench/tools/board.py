@@ -9,7 +9,6 @@ and the frames compared with those of the bit-accurate model.
 
 import json
 import shutil
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from fractions import Fraction
@@ -29,6 +28,7 @@ from blysk.golden.gpu import Gpu
 from blysk.golden.reference.scene import Scene
 from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
 from blysk.golden.video.draw_unit import turned
+from blysk.hdl.emit.processes import run_program
 from blysk.hdl.gpu import GpuUnit
 from blysk.sim.cli.options import given_options, lights_of, options_of
 from blysk.sim.engines.engine import SimulationError
@@ -360,9 +360,7 @@ def _loader() -> str:
 
 def _load(loader: str, board: Board, path: str) -> None:
     """Load a bitstream into the FPGA's memory."""
-    done = subprocess.run(
-        [loader, "-b", board.loader, path], capture_output=True, text=True, errors="replace"
-    )
+    done = run_program([loader, "-b", board.loader, path], capture_output=True, text=True, errors="replace")
     if done.returncode:
         lines = (done.stderr or done.stdout).strip().splitlines() or ["no message"]
         raise ToolError(f"openFPGALoader ends with status {done.returncode}: {lines[-1]}")

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from blysk.hdl.emit.processes import Process
 from blysk.sim.engines.engine import SimulationError
 
 __all__ = ["MOUNT", "GivenUp", "TooLarge", "ToolError", "ToolRunner"]
@@ -36,7 +37,7 @@ class ToolRunner:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._running: set[subprocess.Popen] = set()
+        self._running: set[Process] = set()
         self._stopped = False
 
     def run(
@@ -61,7 +62,7 @@ class ToolRunner:
             with self._lock:
                 if self._stopped:
                     raise ToolError(f"{name} was stopped")
-                process = subprocess.Popen(
+                process = Process(
                     command,
                     cwd=folder,
                     env={**os.environ, "YOWASP_MOUNT": f"{MOUNT}=."},

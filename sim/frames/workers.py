@@ -4,9 +4,11 @@ import contextlib
 import importlib.util
 import logging
 import multiprocessing
+import multiprocessing.connection
 import os
 import re
 import signal
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -87,7 +89,14 @@ class _Pool(ProcessPoolExecutor):
             return super().submit(*arguments, **named)
 
 
+def _end_with_parent() -> None:
+    """Wait until the process that started this one is gone, and end: SIGKILL left it no time to tell."""
+    multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
+    os._exit(1)
+
+
 def _begin(cache: str, begin: Callable[..., object] | None, arguments: tuple[Any, ...]) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     # The parent stops its workers; where it could not block the signal for them, they ignore it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["BLYSK_CACHE"] = cache

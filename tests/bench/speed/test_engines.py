@@ -117,14 +117,14 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
 def test_picture_seconds(monkeypatch):
     """The command is run as a user would, and the first picture, which builds the model, does not count."""
     calls = []
-    run = blysk.bench.speed.engines.subprocess.run
+    run = blysk.bench.speed.engines.run_program
 
     def counted(command, **options):
         # Without a cache each would build; the interpreted engine builds nothing.
         calls.append([*command, "--engine", "pysim"])
         return run(calls[-1], **options)
 
-    monkeypatch.setattr(blysk.bench.speed.engines.subprocess, "run", counted)
+    monkeypatch.setattr(blysk.bench.speed.engines, "run_program", counted)
     wall, processor = picture_seconds(100, "16x12", repeats=1)
     assert len(calls) == 2
     assert processor > 0.01

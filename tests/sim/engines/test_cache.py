@@ -38,7 +38,7 @@ def test_cached_model_needs_neither_yosys_nor_pysim(filled, monkeypatch):
     def never(*arguments):
         raise AssertionError("the model is in the cache")
 
-    monkeypatch.setattr(cxxrtl._Yosys, "run", never)
+    monkeypatch.setattr(cxxrtl.AmaranthYosys, "run", never)
     monkeypatch.setattr(cxxrtl, "Interpreted", never)
     assert scaled() == (3 * BEATS).tolist()
     with pytest.raises(AssertionError, match="the model is in the cache"):

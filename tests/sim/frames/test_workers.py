@@ -2,6 +2,10 @@
 
 import multiprocessing
 import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -33,6 +37,34 @@ def test_processes_are_told_once_and_share_the_cache():
     assert {answer[1] for answer in answers} == {str(cache_folder())}
     assert os.getpid() not in {answer[2] for answer in answers}
     assert set(multiprocessing.active_children()) == children
+
+
+KILLED = """
+import os, signal, sys
+from blysk.hdl.emit.processes import run_program
+from blysk.sim.frames.workers import local_executor
+
+if __name__ == "__main__":
+    with local_executor(1) as executor:
+        print(executor.submit(os.getpid).result(), flush=True)
+        executor.submit(run_program, ["sh", "-c", "echo $$ & sleep 300 & echo $!; wait"])
+        sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_workers_and_their_programs_end_with_a_killed_parent(tmp_path):
+    script = tmp_path / "killed.py"
+    script.write_text(KILLED)
+    command = [sys.executable, str(script)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
+        started = [int(parent.stdout.readline()) for _ in range(3)]
+        os.kill(parent.pid, signal.SIGKILL)
+        # No more comes once nobody holds the pipe: neither the worker nor one of its programs.
+        assert parent.stdout.read() == b""
+    for number in started:
+        status = Path(f"/proc/{number}/stat")
+        assert not status.exists() or status.read_text().rpartition(")")[2].split()[0] == "Z"
 
 
 def test_an_error_of_the_work_is_passed_on():
