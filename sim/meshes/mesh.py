@@ -88,8 +88,8 @@ def load_mesh(
     All meshes of a scene are put together in world coordinates: vertices by the node's matrix ``M``,
     normals by its inverse transpose, and a mirroring node (``det M < 0``) turns the triangles round.
     Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
-    cover them and keep all their corners, concave ones by ear clipping. Quantised arrays of glTF are scaled, and all instances of a node
-    drawn; morph weights and skins are not applied, and listed in ``ignored``.
+    cover them and keep all their corners, concave ones by ear clipping. Quantised arrays of glTF are scaled,
+    and all instances of a node drawn; morph weights and skins are not applied, and listed in ``ignored``.
 
     Materials of a GLB or glTF file: the base colour without its alpha, metallic and roughness factors of
     ``pbrMetallicRoughness``, each 1 if missing (see `Material.of_metallic_roughness`), and ``doubleSided``.
