@@ -1,24 +1,21 @@
 """Cutting of spans that are too wide for an interpolation method."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frames.highlight_limits import HighlightLimits
-from blysk.golden.frames.local import CHUNK, SurfacePoints, chunks, lines_along, weights_along
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.frames.local import chunks, lines_along, weights_along
+from blysk.golden.frames.pieces import Pieces
 from blysk.golden.methods.interpolator import Interpolator
-from blysk.golden.number.spans import pixels_of, runs_of
-from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["cut_by_angle", "cut_by_error", "cut_spans", "missed_spans"]
+__all__ = ["cut_by_angle", "cut_by_error", "cut_by_length", "cut_spans"]
 
 
 def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
@@ -45,6 +42,8 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
         How many of the given spans were cut.
     """
     interpolator, limits = design.interpolator, HighlightLimits.of(scene.materials, design)
+    if isinstance(interpolator, RenormaliseInterpolator):
+        return cut_by_length(raster, interpolator.LARGEST_RATIO)
     if interpolator.CUT_BY_ERROR:
         return cut_by_error(scene, raster, interpolator, limits)
     return cut_by_angle(raster, min(map(interpolator.widest_span, limits.exponents)))
@@ -70,6 +69,40 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
     def is_wide(origin, first, last):
         left, right = (_normals(raster, origin, place) for place in (first, last))
         return (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
+
+    return _halve(raster, is_wide)
+
+
+def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
+    """Halve spans until no pixel's normal, not of unit length, is too short beside the longer end's.
+
+    Such normals come of W that differ much along a span, and of ends that are nearly opposite.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans.
+    largest_ratio : float
+        Largest length of an end over that of the normal of a pixel.
+
+    Returns
+    -------
+    raster, cut
+        As of `cut_spans`.
+    """
+
+    def is_wide(origin, first, last):
+        steps = np.maximum(raster.length[origin] - 1, 1)
+        left, right = (lines_along(raster, origin, place / steps) for place in (first, last))
+        change = right - left
+        square = np.einsum("sk,sk->s", change, change)
+        t = -np.einsum("sk,sk->s", left, change) / np.where(square, square, 1.0)
+        nearest = first + np.clip(t, 0, 1) * (last - first)
+        # The pixels before and behind the line's place nearest to 0.
+        places = np.floor(nearest), np.ceil(nearest)
+        least = [np.linalg.norm(lines_along(raster, origin, place / steps), axis=1) for place in places]
+        longest = np.maximum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))
+        return (np.minimum(*least) * largest_ratio < longest) & (last > first)
 
     return _halve(raster, is_wide)
 
@@ -180,292 +213,8 @@ def cut_by_error(
         left, right = (_normals(raster, origin, place) for place in (first, last))
         wide = (np.einsum("ij,ij->i", left, right) < cosines[material]) & (last > first)
         rest = np.flatnonzero(~wide & (last - first > 1))
-        pieces = _Pieces.of(scene, raster, origin[rest], first[rest], last[rest])
+        pieces = Pieces.of(scene, raster, origin[rest], first[rest], last[rest])
         wide[rest] = pieces.miss(interpolator, limits, material[rest])
         return wide
 
     return _halve(raster, is_wide)
-
-
-def missed_spans(
-    scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
-) -> int:
-    """Number of spans of a raster in which the method's curve is off by more than the tolerances.
-
-    Parameters
-    ----------
-    scene, raster, interpolator, limits
-        As for `cut_by_error`.
-    """
-    limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
-    spans = np.flatnonzero(raster.length > 2)
-    missed = 0
-    for part in chunks(len(spans)):
-        origin = spans[part]
-        pieces = _Pieces.of(scene, raster, origin, np.zeros_like(origin), raster.length[origin] - 1)
-        material = scene.mesh.material[raster.triangle[origin]]
-        missed += int(np.count_nonzero(pieces.miss(interpolator, limits, material)))
-    return missed
-
-
-@dataclass(frozen=True)
-class _Pieces:
-    """Pixels ``first`` to ``last``, three or more, of spans ``origin``, with points of the surface."""
-
-    scene: Scene
-    raster: Raster
-    origin: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
-    places: tuple[SurfacePoints, ...]
-    """Points of each piece at t = 0, 1/4, 1/2, 3/4 and 1."""
-
-    @classmethod
-    def of(cls, scene, raster, origin, first, last) -> "_Pieces":
-        """Pieces with their points of the surface."""
-        steps = raster.length[origin] - 1
-        at = [(first + (last - first) * k / 4) / steps for k in range(5)]
-        places = tuple(SurfacePoints.at(scene, raster, origin, t) for t in at)
-        return cls(scene, raster, origin, first, last, places)
-
-    def miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
-        """Whether the curve of a method is too far from the exact one; bool, shape (pieces,)."""
-        if isinstance(interpolator, ChordInterpolator) and interpolator.scale:
-            scaled = tuple(place.scaled(interpolator.scale) for place in self.places)
-            return replace(self, places=scaled)._miss(interpolator, limits, material)
-        return self._miss(interpolator, limits, material)
-
-    def _miss(self, interpolator, limits, material) -> np.ndarray:
-        """Result of `miss`; u of the places has the scale of the method's words."""
-        pixels = (self.last - self.first + 1)[:, np.newaxis]
-        chord = isinstance(interpolator, ChordInterpolator)
-        # From so many pixels on there are pixels between the three, or two, values of the curve.
-        between = pixels > (3 if chord else 2)
-        fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
-        names = ("diffuse", "highlight", "factor") if fading.any() else ("diffuse", "highlight")
-        curves = {name: _Quadratic.of(self.places, name) for name in names}
-        diffuse, highlight = curves["diffuse"], curves["highlight"]
-        if chord:
-            wrong = self._flagged(interpolator, limits, material, curves)
-            misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
-        else:
-            wrong = np.zeros(len(self.origin), dtype=bool)
-            misses = self._misses_of_normals(interpolator)
-        wrong |= between[:, 0] & self.places[0].turned(self.places[-1], ChordInterpolator())
-        margin = self._margin()[:, np.newaxis]
-        errors = {name: margin * miss for name, miss in misses.items()}
-        if chord:
-            setup = interpolator.setup
-            errors["diffuse"] += setup.diffuse_error(*diffuse.sizes)
-            errors["highlight"] += setup.highlight_error(*highlight.sizes)
-        in_front = diffuse.largest + errors["diffuse"] >= 0
-        least = np.maximum(highlight.least - margin / ChordInterpolator.MARGIN * misses["highlight"], 0)
-        too_far = errors["diffuse"] > ChordInterpolator().diffuse_tolerance
-        tolerance, lit = limits.tolerance(material, least), limits.is_lit(material, least)
-        # For a light that fades every pixel is checked, below.
-        too_far |= (errors["highlight"] > tolerance) & ~fading
-        wrong |= (too_far & in_front & between).any(axis=1)
-        if fading.any():
-            chosen = np.flatnonzero(between[:, 0] & ~wrong)
-            shares = errors["highlight"][chosen] / tolerance[chosen], lit[chosen]
-            wrong[chosen] = (self._fades_wrong(chosen, curves, *shares) & fading).any(axis=1)
-        turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & lit
-        chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
-        if chord:
-            kept = diffuse.left, diffuse.slope, diffuse.curvature
-            wrong[chosen] = _mistakes_sign(
-                self.scene,
-                self.raster,
-                *(field[chosen] for field in (self.origin, self.first, self.last, turns_dark, *kept)),
-            )
-        return wrong
-
-    def _fades_wrong(self, chosen, curves, highlight_share, lit) -> np.ndarray:
-        """Whether the factor of a light, or its product with N·L, is too far off at any pixel of a piece.
-
-        Parameters
-        ----------
-        chosen : int array
-            Pieces.
-        curves : dict of _Quadratic
-            Curves ``diffuse`` and ``factor`` of all pieces.
-        highlight_share : float64 array, shape (chosen, lights)
-            Error of u as a share of its tolerance.
-        lit : bool array, shape (chosen, lights)
-            Whether a light may have a highlight.
-
-        Returns
-        -------
-        bool array, shape (chosen, lights)
-        """
-        method = ChordInterpolator()
-        names = ("diffuse", "factor")
-        curves = {name: curves[name].part(chosen) for name in names}
-        ends = (field[chosen] for field in (self.origin, self.first, self.last))
-        misses, largest = _misses_of_pixels(self.scene, self.raster, *ends, curves)
-        words = {name: method.setup.diffuse_error(*curve.sizes) for name, curve in curves.items()}
-        # A light that fades may be brighter than white where it is near.
-        bright = np.array([max(1.0, *light.color) for light in self.scene.lights])
-        factor = np.where(lit, 255 * bright * (misses["factor"] + words["factor"]), 0)
-        total = factor + method.HIGHLIGHT_BUDGET * highlight_share * largest * bright
-        wrong = bright * (misses["diffuse"] + words["diffuse"]) > method.diffuse_tolerance
-        return wrong | ((factor > method.FACTOR_BUDGET) | (total > method.HIGHLIGHT_BUDGET)) & (largest > 0)
-
-    def _margin(self) -> np.ndarray:
-        """Bound of the largest error on each piece, as a multiple of the error at its quarters.
-
-        The largest of `ChordInterpolator.MARGIN`, the ratio of the interpolated normals' lengths at the two
-        ends, and the ratio of the weights there: a large ratio moves all change near to one end.
-        """
-        ends = []
-        for place in (self.first, self.last):
-            at = self.raster, self.origin, place / (self.raster.length[self.origin] - 1)
-            ends.append([np.linalg.norm(lines_along(*at), axis=1), weights_along(*at).sum(axis=1)])
-        smaller, larger = np.sort(ends, axis=0)
-        ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
-        return np.maximum(ratio, ChordInterpolator.MARGIN)
-
-    def _flagged(
-        self, interpolator: ChordInterpolator, limits: HighlightLimits, material, curves
-    ) -> np.ndarray:
-        """Whether the chord method may flag a piece; if ``False``, it does not."""
-        setup, limit, one = interpolator.setup, SpanLimit(), float(ONE_SQUARED.values)
-        formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
-        formats["factor"] = setup.DIFFUSE_SLOPE_FORMAT
-        flagged = np.zeros(len(self.origin), dtype=bool)
-        for name, curve in curves.items():
-            slope, curvature = (one * size for size in curve.sizes)
-            # One rounding step less than the words hold.
-            flagged |= (curvature > 2.0 ** (setup.CURVATURE_FORMAT.integer_bits - 1) - 2.0**-19).any(axis=1)
-            flagged |= (slope > 2.0 ** (formats[name].integer_bits - 1) - 2.0**-17).any(axis=1)
-        if interpolator.TAKES_VALUES:
-            return flagged
-        cosine = np.einsum("ij,ij->i", self.places[0].normal, self.places[-1].normal)
-        angle = np.degrees(np.arccos(np.minimum(cosine, 1)))
-        angles = np.array([limit.angle(word) for word in limits.words])[material]
-        lit = limits.least_dark[material]
-        diffuse, highlight = (
-            np.stack([getattr(self.places[k], name) for k in (0, 2, 4)], axis=-1)
-            for name in ("diffuse", "highlight")
-        )
-        # Values are off by the rounding of N, L and H.
-        near = limit.least(highlight) / 2 < lit[:, np.newaxis] + 1e-4 * 2**interpolator.scale
-        near &= diffuse.max(axis=2) > float(limit.BEHIND.values) - 1e-4
-        wide = (angle > limit.WIDEST) | ((angle > angles) & near.any(axis=1))
-        return flagged | (wide & (self.last - self.first + 1 >= limit.SHORTEST))
-
-    def _misses_of_normals(self, interpolator: Interpolator) -> dict[str, np.ndarray]:
-        """Largest errors of N·L and u of a method's normals, at the places `Interpolator.CHECKED_AT`."""
-        left, right = self.places[0].normal, self.places[-1].normal
-        misses = {"diffuse": 0.0, "highlight": 0.0}
-        known = {k / 4: place for k, place in enumerate(self.places)}
-        steps = self.raster.length[self.origin] - 1
-        for t in interpolator.CHECKED_AT:
-            exact = known.get(t)
-            if exact is None:
-                at = (self.first + (self.last - self.first) * t) / steps
-                exact = SurfacePoints.at(self.scene, self.raster, self.origin, at)
-            normal = interpolator.exact_normals(left, right, np.full(len(left), t))
-            own = exact.with_normal(normal, interpolator.uses_chord)
-            for name in misses:
-                misses[name] = np.maximum(misses[name], np.abs(getattr(own, name) - getattr(exact, name)))
-        return misses
-
-
-@dataclass(frozen=True)
-class _Quadratic:
-    """Quadratics ``left + t slope + t^2 curvature``, shape (pieces, lights), through three exact values."""
-
-    left: np.ndarray
-    slope: np.ndarray
-    curvature: np.ndarray
-    least: np.ndarray
-    largest: np.ndarray
-
-    @classmethod
-    def of(cls, places: Sequence[SurfacePoints], name: str) -> "_Quadratic":
-        """Through the values at t = 0, 1/2 and 1."""
-        left, middle, right = (getattr(places[k], name) for k in (0, 2, 4))
-        curvature = 2 * (left + right - 2 * middle)
-        slope = right - left - curvature
-        # The quadratic at its vertex, if that is on the span.
-        t = np.clip(-slope / np.where(curvature, 2 * curvature, 1.0), 0, 1)
-        vertex = left + t * (slope + t * curvature)
-        three = left, right, vertex
-        return cls(left, slope, curvature, np.minimum.reduce(three), np.maximum.reduce(three))
-
-    def part(self, chosen: np.ndarray) -> "_Quadratic":
-        """The quadratics of some pieces."""
-        kept = self.left, self.slope, self.curvature, self.least, self.largest
-        return _Quadratic(*(field[chosen] for field in kept))
-
-    def at(self, piece: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Values at t of pieces, shape (count, lights)."""
-        t = t[:, np.newaxis]
-        return self.left[piece] + t * (self.slope[piece] + t * self.curvature[piece])
-
-    @property
-    def sizes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Absolute values of the slope and curvature terms P and G."""
-        return np.abs(self.slope), np.abs(self.curvature)
-
-    def miss(self, places: Sequence[SurfacePoints], name: str) -> np.ndarray:
-        """Largest distance from the exact values at t = 1/4 and 3/4."""
-        return np.maximum.reduce(
-            [
-                np.abs(self.left + t * (self.slope + t * self.curvature) - getattr(places[k], name))
-                for k, t in ((1, 0.25), (3, 0.75))
-            ]
-        )
-
-
-def _pixels_of(scene, raster, origin, first, last) -> Iterator[tuple[np.ndarray, SurfacePoints, np.ndarray]]:
-    """Index of the piece, exact values and t for every pixel of pieces, in chunks."""
-    for run in runs_of(last - first + 1, CHUNK):
-        span, step = pixels_of((last - first + 1)[run])
-        of_pixel = run.start + span
-        place = (first[of_pixel] + step) / (raster.length[origin[of_pixel]] - 1)
-        exact = SurfacePoints.at(scene, raster, origin[of_pixel], place)
-        yield of_pixel, exact, step / (last - first)[of_pixel]
-
-
-def _misses_of_pixels(scene, raster, origin, first, last, curves) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Largest distance of curves from the exact values at the pixels of pieces.
-
-    Returns
-    -------
-    misses : dict of float64 array, shape (pieces, lights)
-        Errors of ``diffuse``, where values under 0 count as 0, and of ``factor`` at pixels where the light is
-        not behind the surface.
-    largest : float64 array, shape (pieces, lights)
-        Largest factor at such pixels; 0 without any.
-    """
-    shape = len(origin), len(scene.lights)
-    misses, largest = {name: np.zeros(shape) for name in curves}, np.zeros(shape)
-    for of_pixel, exact, t in _pixels_of(scene, raster, origin, first, last):
-        starts = np.flatnonzero(np.r_[True, of_pixel[1:] != of_pixel[:-1]])
-        pieces = of_pixel[starts]
-        fit = {name: curve.at(of_pixel, t) for name, curve in curves.items()}
-        reached = exact.diffuse > -ChordSetup.DIFFUSE_FORMAT.step
-        for values, of_all in (
-            (np.abs(np.maximum(fit["diffuse"], 0) - np.maximum(exact.diffuse, 0)), misses["diffuse"]),
-            (np.where(reached, np.abs(fit["factor"] - exact.factor), 0), misses["factor"]),
-            (np.where(reached, exact.factor, 0), largest),
-        ):
-            of_all[pieces] = np.maximum.reduceat(values, starts)
-    return misses, largest
-
-
-def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, curvature) -> np.ndarray:
-    """Whether N·L of a pixel of a span might have the wrong sign, for the lights in ``lights``."""
-    result = np.zeros(len(origin), dtype=bool)
-    bound = ChordSetup().diffuse_error(np.abs(slope), np.abs(curvature))
-    for of_pixel, exact, t in _pixels_of(scene, raster, origin, first, last):
-        t = t[:, np.newaxis]
-        fit = left[of_pixel] + t * (slope[of_pixel] + t * curvature[of_pixel])
-        wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
-        # Nearer to 0 no word tells the sign; the little light of one that fades may be shown or not.
-        wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
-        wrong &= (exact.factor > ChordInterpolator.FACTOR_BUDGET / 255) & lights[of_pixel]
-        result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0
-    return result

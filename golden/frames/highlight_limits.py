@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,6 +41,14 @@ class _Curve:
         slope = np.maximum(self._from(self._points[1], u), 2.0**-self.scale)
         return ChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
 
+    @cached_property
+    def turn(self) -> float:
+        """As of `HighlightLimits`, for one material."""
+        u, _, slope = curve_lines(self.model, self.parameter)
+        # Each slope counts up to the next argument.
+        steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slope)).max()
+        return ChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
+
     def is_lit(self, u: np.ndarray) -> np.ndarray:
         """As of `HighlightLimits`."""
         return (self._from(self._points[2], u) > 1 / 1020) & (u < 1)
@@ -67,6 +76,8 @@ class HighlightLimits:
     exponents: np.ndarray
     curves: Sequence[_Curve | None]
     least_dark: np.ndarray
+
+    STEEPEST: ClassVar[float] = 0.77
 
     @classmethod
     def of(cls, materials: Sequence[Material], design: Design | None = None) -> "HighlightLimits":
@@ -107,6 +118,23 @@ class HighlightLimits:
             Least value of u, at least 0.
         """
         return self._of("tolerance", ChordInterpolator().highlight_tolerance, material, u)
+
+    def turn(self, material: np.ndarray) -> np.ndarray:
+        """Angle in radians by which a normal may turn for `ChordInterpolator.HIGHLIGHT_BUDGET`, whatever u.
+
+        It is the budget over the steepest slope of S over gamma: of a polynomial or a power at most
+        `STEEPEST` times ``sqrt n``, of a lobe the largest ``sqrt(2u) |dS/du|`` of its curve.
+
+        Parameters
+        ----------
+        material : int array, shape (pieces,)
+            Material of each piece of a span.
+        """
+        of_material = ChordInterpolator.HIGHLIGHT_BUDGET / (255 * self.STEEPEST * np.sqrt(self.exponents))
+        for index, curve in enumerate(self.curves):
+            if curve is not None:
+                of_material[index] = curve.turn
+        return of_material[material]
 
     def is_lit(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.

@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cut_spans, missed_spans
+from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands, middle_normals
+from blysk.golden.frames.missed import missed_spans
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise, quantise_direction
 from blysk.golden.pipeline import Design, Spans
+from blysk.golden.reference.geometry import any_component
 from blysk.golden.reference.lighting import Material, halfway_vector
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
@@ -95,7 +97,11 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
         values, factors = local_operands(scene, cut, design.lights, design.factors, scale)
         spans = replace(spans, values=values, factors=factors)
     elif design.interpolator.takes_line:
-        left, right = quantise_line(*line_ends(cut))
+        left, right = line_ends(cut)
+        # A pixel between opposite normals has no line.
+        none = ~(any_component(left) | any_component(right))
+        left[none] = right[none] = cut.normal_left[none]
+        left, right = quantise_line(left, right)
         spans = replace(spans, normal_left=left, normal_right=right)
     elif design.interpolator.TAKES_MIDDLE:
         spans = replace(spans, normal_middle=quantise(middle_normals(cut)))

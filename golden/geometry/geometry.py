@@ -12,7 +12,7 @@ from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.plane_assembler import PlaneAssembler, Planes
 from blysk.golden.geometry.plane_setup import PlaneSetup
 from blysk.golden.geometry.span_adapter import LineAdapter, LineSpans
-from blysk.golden.geometry.span_attributes import SpanAttributes
+from blysk.golden.geometry.span_attributes import Pieces, SpanAttributes
 from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
 from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triangles
 from blysk.golden.geometry.vertex_sort import SortedTriangles, VertexSort
@@ -62,6 +62,19 @@ class Geometry:
         )
         return planes, int(scales.sliver.sum())
 
+    def pieces(self, triangles: Triangles, frame: Frame) -> tuple[SortedTriangles, Pieces, dict[str, int]]:
+        """Sorted triangles, the pieces of their spans with N/W at both ends, and the counts so far."""
+        drawn, rows, _, counts = self.rows(triangles, frame)
+        planes, sliver = self.planes(drawn, frame)
+        pieces, more = SpanAttributes().compute(rows, planes)
+        counts = {
+            **counts,
+            "empty": counts["empty"] + more["empty"],
+            "sliver": sliver,
+            "cut": more["cut"],
+        }
+        return drawn, pieces, counts
+
     def compute(self, triangles: Triangles, frame: Frame) -> tuple[TrueSpans | LineSpans, dict[str, int]]:
         """Bit-accurate spans, and the counters.
 
@@ -85,15 +98,7 @@ class Geometry:
         ValueError
             If a coordinate is out of the grid's range.
         """
-        drawn, rows, _, counts = self.rows(triangles, frame)
-        planes, sliver = self.planes(drawn, frame)
-        pieces, more = SpanAttributes().compute(rows, planes)
+        drawn, pieces, counts = self.pieces(triangles, frame)
         spans, repaired = (LineAdapter().compute(pieces), 0) if self.lines else EdgeNormals().compute(pieces)
-        counts = {
-            **counts,
-            "empty": counts["empty"] + more["empty"],
-            "sliver": sliver,
-            "cut": more["cut"],
-            "repaired": repaired,
-        }
+        counts = {**counts, "repaired": repaired}
         return replace(spans, triangle=drawn.source[spans.triangle]), counts

@@ -15,7 +15,7 @@ __all__ = ["Renormaliser"]
 
 @dataclass(frozen=True)
 class Renormaliser:
-    """Unit vector ``N = v / |v|``, for lengths of v from 2^-8 to 1: the exact normal in any span.
+    """Unit vector ``N = v / |v|``, for lengths of v from 2^-8 to 1: the exact normal at every pixel.
 
     v is shifted left until its largest component is 1/2 or more, and rounded to ``w``. With ``s = w . w``,
     1/4 to 3, the result is ``N = r w`` with ``r = (ONE/2^17) / sqrt(s)``, where ``ONE/2^17`` is the length 1

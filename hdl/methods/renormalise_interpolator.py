@@ -1,4 +1,4 @@
-"""Renormalisation at every pixel: exact perspective-correct normals of any span."""
+"""Renormalisation at every pixel: perspective-correct normals of wide spans."""
 
 from amaranth.hdl import Signal
 from amaranth.lib import data, stream

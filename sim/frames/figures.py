@@ -106,6 +106,8 @@ def triangle_figures(
             "cut_spans": counts["cut"],
             "hidden_pixels": counts["hidden"],
             "dropped_pixels": counts["dropped"],
+            "missed_pieces": counts["missed_pieces"],
+            "short_normals": counts["short_normals"],
             "wide_spans": counts["wide_spans"],
             "out_of_range_spans": counts["out_of_range_spans"],
         },

@@ -21,13 +21,26 @@ _COUNTS = {
     "hidden_pixels": "pixels shaded behind what was drawn before",
     "dropped_pixels": "pixels of hidden spans dropped before shading",
     "cut_spans": "spans cut to the range of the method",
-    "missed_spans": "spans that this method misses by over 0.25 LSB (chord and renormalise do not)",
+    "missed_spans": "spans that this method misses by over 0.25 LSB",
+    "missed_pieces": "spans that this method misses by over 0.25 LSB, as lengths of their normals differ",
+    "short_normals": "spans with normals too short for the words, as W differs much, perhaps 0.25 LSB off",
     "wide_spans": "spans wider than the error bound of the exponent allows",
     "out_of_range_spans": "spans out of range in the pipeline",
 }
 
+_REMEDIES = {
+    "missed_spans": "use chord or renormalise",
+    "missed_pieces": "use geometry software, or smaller triangles",
+    "short_normals": "use geometry software, or divide the triangles",
+    "wide_spans": "use smaller triangles",
+    "out_of_range_spans": "pixels of theirs are wrong: use another method, or divide the triangles",
+}
+"""What helps against a count; after a semicolon."""
 
-_WARNINGS = ("repaired_normals", "dropped_faces", "missed_spans", "wide_spans", "out_of_range_spans")
+_WARNINGS = (
+    *("repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals", "wide_spans"),
+    "out_of_range_spans",
+)
 """Counts that may come from a fault of the mesh or the design."""
 
 
@@ -91,9 +104,14 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         yield _line("error", f"{exact}, {method:.2f} from exact normals with this model")
     else:
         yield _line("error", "none, no pixel shows the surface")
-    counted = [text for key, text in _COUNTS.items() if figures["counts"].get(key) and key in _WARNINGS]
+    counts = figures["counts"]
+    counted = [
+        f"{text}: {counts[key]:,}{_remedy(key)}"
+        for key, text in _COUNTS.items()
+        if counts.get(key) and key in _WARNINGS
+    ]
     if counted:
-        yield _line("noticed", f"{counted[0]}{f' and {len(counted) - 1} more' * (len(counted) > 1)}; see -v")
+        yield _line("noticed", f"{counted[0]}{f', and {len(counted) - 1} more' * (len(counted) > 1)}; see -v")
     yield _line("seconds", f"{figures['seconds'].get('total', sum(figures['seconds'].values())):.1f}")
 
 
@@ -161,7 +179,11 @@ def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 def _count_lines(counts: Mapping[str, int]) -> Iterator[str]:
     for key, text in _COUNTS.items():
         if counts.get(key):
-            yield _line("counted", f"{text}: {counts[key]:,}")
+            yield _line("counted", f"{text}: {counts[key]:,}{_remedy(key)}")
+
+
+def _remedy(key: str) -> str:
+    return f"; {_REMEDIES[key]}" if key in _REMEDIES else ""
 
 
 def _second_line(seconds: Mapping[str, float]) -> str:

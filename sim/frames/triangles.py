@@ -10,6 +10,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
 from blysk.golden.frame_constants import writes_of
+from blysk.golden.frames.missed import missed_pieces
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles
 from blysk.golden.geometry.scene_triangles import SceneTriangles
@@ -67,7 +68,7 @@ class SimulatedTriangleFrame:
     sent : SceneTriangles
         The triangles that were sent, with the frame's constants.
     counts : dict of str to int
-        `RenderUnit`'s counters.
+        `RenderUnit`'s counters, and `missed_pieces`.
     written : int
         Pixels written, with those that a nearer surface replaced later.
     visible : int
@@ -79,7 +80,7 @@ class SimulatedTriangleFrame:
     engine : {"cxxrtl", "pysim"}
         The simulator.
     seconds : dict
-        Seconds of ``triangles`` (to transform and clip them) and of ``simulate``.
+        Seconds of ``triangles`` (to transform, clip and check them) and of ``simulate``.
     setups : int
         Lanes of triangle setup.
     coarse : bool
@@ -213,12 +214,22 @@ class TriangleSimulator:
             raise ValueError(f"the scene is {scene.width}x{scene.height}, the memory {width}x{height}")
         start = perf_counter()
         sent = sent_triangles(scene, self.renderer, self.angle)
+        missed = missed_pieces(scene, self.renderer, sent)
         ready = perf_counter()
         if not len(sent.triangles):
             image = frame_of_pixels(scene, *np.zeros((2, 0), dtype=int), np.zeros((0, 3), dtype=np.uint8))
             seconds = {"triangles": ready - start, "simulate": 0.0}
             return SimulatedTriangleFrame(
-                image, sent, dict.fromkeys(STATUS, 0), 0, 0, 0, 0, self.engine, seconds, setups=self.setups
+                image,
+                sent,
+                dict.fromkeys(STATUS, 0) | missed,
+                0,
+                0,
+                0,
+                0,
+                self.engine,
+                seconds,
+                setups=self.setups,
             )
         run = simulate(
             self._unit,
@@ -240,7 +251,7 @@ class TriangleSimulator:
         return SimulatedTriangleFrame(
             image=frame_of_pixels(scene, beats["x"], beats["y"], color),
             sent=sent,
-            counts=counts,
+            counts=counts | missed,
             written=len(beats),
             visible=len(np.unique(beats["y"].astype(np.int64) * scene.width + beats["x"])),
             cycles=int(run.status["busy"]),

@@ -1,0 +1,152 @@
+"""Missed spans: how many spans of a frame a method's curve, or its words, miss."""
+
+import numpy as np
+
+from blysk.golden.frames.highlight_limits import HighlightLimits
+from blysk.golden.frames.local import chunks
+from blysk.golden.frames.pieces import Pieces
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.geometry.span_adapter import LineAdapter
+from blysk.golden.geometry.span_attributes import SPAN_NORMAL
+from blysk.golden.geometry.span_attributes import Pieces as HardwarePieces
+from blysk.golden.geometry.triangles import ATTRIBUTE
+from blysk.golden.geometry.vertex_sort import SortedTriangles
+from blysk.golden.methods.interpolator import Interpolator
+from blysk.golden.normals.line_setup import LineSetup
+from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
+
+__all__ = ["missed_pieces", "missed_spans"]
+
+
+def missed_spans(
+    scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
+) -> int:
+    """Number of spans of a raster in which the method's curve is off by more than the tolerances.
+
+    Parameters
+    ----------
+    scene, raster, interpolator, limits
+        As for `cut_by_error`.
+    """
+    turn = np.zeros(len(raster.length))
+    return int(np.count_nonzero(_missed(scene, raster, interpolator, limits, turn)[0]))
+
+
+def _missed(
+    scene: Scene,
+    raster: Raster,
+    interpolator: Interpolator,
+    limits: HighlightLimits | None,
+    turn: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Spans that are off by more than the tolerances, by the method's curve or by their words.
+
+    The errors of a normal that is turned by e are at most e for N·L and ``sqrt(2u) e + e^2/2`` for u, as
+    ``|N - H| = sqrt(2u)``. The signs of N·L are not looked at.
+
+    Parameters
+    ----------
+    scene, raster, interpolator, limits
+        As for `cut_by_error`.
+    turn : float array, shape (spans,)
+        Angle in radians by which the words of a span's normals may be off.
+
+    Returns
+    -------
+    by_curve, by_words : bool arrays, shape (spans,)
+        A span is ``by_curve`` only if it is not ``by_words``.
+    """
+    limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
+    by_curve, by_words = np.zeros((2, len(raster.length)), dtype=bool)
+    for origin in chunks(len(raster.length)):
+        span = np.arange(len(raster.length))[origin]
+        pieces = Pieces.of(scene, raster, span, np.zeros_like(span), raster.length[origin] - 1)
+        material = scene.mesh.material[raster.triangle[origin]]
+        by_curve[origin], by_words[origin] = pieces.off(interpolator, limits, material, turn[origin])
+    return by_curve & ~by_words, by_words
+
+
+def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dict[str, int]:
+    """Numbers of the pieces that are off by more than the tolerances of `ChordInterpolator`.
+
+    Geometry cuts a span by an angle. The angle bounds the error of a method's curve only where the lengths of
+    N/W at both ends of a piece are equal: for ends in the ratio g the chord method's error is about
+    ``12 n (g - 1) psi^2`` LSB more. So N·L and u of the curve are compared with those of the piece's own line
+    at its quarters, as `cut_by_error` does before it cuts. The quarters know the error in between up to a
+    factor that was found by search, see `ChordInterpolator`.
+
+    The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle, which turns
+    a normal of length m by that over m. Where this alone is over a tolerance, the normals are short.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is drawn; without point lights and with a far viewer.
+    renderer : Renderer
+        Geometry and shading.
+    sent : SceneTriangles
+        The scene's triangles.
+
+    Returns
+    -------
+    dict of str to int
+        ``missed_pieces``: off by the curve. ``short_normals``: off by the words alone.
+
+    Source: docs/theory/geometry.md#normals.
+    """
+    drawn, pieces, _ = renderer.geometry.pieces(sent.triangles, sent.frame)
+    limits = HighlightLimits.of(scene.materials, renderer.design)
+    turn = _turn(drawn, pieces, renderer)
+    raster = _raster(pieces, sent.source[drawn.source])
+    curve, words = _missed(scene, raster, renderer.design.interpolator, limits, turn)
+    return {"missed_pieces": int(curve.sum()), "short_normals": int(words.sum())}
+
+
+def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) -> np.ndarray:
+    """Angle in radians by which the words may turn a normal of each piece."""
+    steps = renderer.geometry.grid.steps
+    rows = np.ptp(drawn.triangles.y, axis=1) / steps
+    width = np.maximum(drawn.area / np.maximum(rows, 1 / steps) / steps**2, 1 / steps)
+    # The corners are rounded, and the pixel's value is cut.
+    error = GradientSetup.error(rows, width) + ATTRIBUTE.step / 2 + SPAN_NORMAL.step
+    left, right = pieces.left.values, pieces.right.values
+    longest = np.maximum(*(np.linalg.norm(end, axis=1) for end in (left, right)))
+    error = np.sqrt(3) * error[pieces.triangle]
+    if renderer.geometry.lines:
+        error += longest * (2 * np.sqrt(3) * LineAdapter.ERROR + LineSetup.ERROR)
+    return np.minimum(error / np.maximum(_nearest(left, right), SPAN_NORMAL.step), np.pi)
+
+
+def _nearest(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Least distance of straight lines between two points, each of shape (S, 3), from 0."""
+    step = right - left
+    square = np.einsum("sk,sk->s", step, step)
+    t = -np.einsum("sk,sk->s", left, step) / np.where(square, square, 1.0)
+    return np.linalg.norm(left + np.clip(t, 0, 1)[:, np.newaxis] * step, axis=1)
+
+
+def _raster(pieces: HardwarePieces, source: np.ndarray) -> Raster:
+    """Spans of the pieces, without fragments; ``source`` is the mesh's face of each triangle."""
+    ends = {}
+    sign = np.where(pieces.flip, -1.0, 1.0)[:, np.newaxis]
+    for side, end in (("left", pieces.left.values), ("right", pieces.right.values)):
+        magnitude = np.linalg.norm(end, axis=1)
+        ends[f"normal_{side}"] = sign * end / np.where(magnitude, magnitude, 1.0)[:, np.newaxis]
+        ends[f"magnitude_{side}"] = magnitude
+        # Without point lights nothing asks where a pixel is on the surface.
+        ends[f"weights_{side}"] = np.full((len(pieces), 3), 1 / 3)
+    none = np.zeros(0, dtype=np.int64)
+    counts = ("triangles", "degenerate", "culled", "outside", "uncovered", "hidden_spans", "repaired_normals")
+    return Raster(
+        x=pieces.x,
+        y=pieces.y,
+        length=pieces.length,
+        triangle=source[pieces.triangle],
+        **ends,
+        back=pieces.flip,
+        **dict.fromkeys(("span", "offset", "pixel", "visible"), none),
+        **dict.fromkeys(counts, 0),
+    )
