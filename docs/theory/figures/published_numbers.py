@@ -64,9 +64,6 @@ def _line_models() -> str:
     return table(["model", "largest absolute error", "largest relative error in the zone"], rows)
 
 
-_KINDS = ("multiplications", "additions", "divisions", "roots", "functions")
-
-
 def _operations() -> str:
     """Operations of a normal or of a pixel's N·L and N·H, counted while the ways of [T] run."""
     rows = []
