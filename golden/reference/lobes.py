@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
+from blysk.golden.text import plain_text
 
 __all__ = [
     "BECKMANN",
@@ -234,12 +235,12 @@ class TabulatedModel(ReflectionModel):
         """
         path = Path(path)
         try:
-            text = path.read_text(encoding="utf-8-sig")
+            text = plain_text(path.read_bytes())
         except UnicodeDecodeError:
             raise ValueError(f"{path.name} must be a text of numbers, not other bytes") from None
         lines = [
             (number, [field.strip() for field in line.split(",")])
-            for number, line in enumerate(text.splitlines(), 1)
+            for number, line in enumerate(text.split("\n"), 1)
             if line.strip() and not line.lstrip().startswith("#")
         ]
         if len(lines) > MAX_POINTS:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from blysk.golden.text import plain_text
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, Lights, PartError, shown_key
 from blysk.sim.errors import InputError
 from blysk.sim.value_types import Value, shown
@@ -142,14 +143,16 @@ def _parse(path: Path) -> dict:
         raise PartError(
             "", f"is over {MAX_BYTES:,} bytes", "keep the mesh in a file of its own, and name it by mesh.file"
         )
-    for line, text in enumerate(data.split(b"\n"), 1):
-        if text.count(b".") > _MAX_DOTS:
+    try:
+        whole = plain_text(data)
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise PartError("", f"is not UTF-8 (line {line})", "save it as UTF-8 text") from error
+    for line, text in enumerate(whole.split("\n"), 1):
+        if text.count(".") > _MAX_DOTS:
             raise PartError("", f"has over {_MAX_DOTS} dots in line {line}", "break the line")
     try:
-        return tomllib.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise PartError("", f"is not UTF-8 (line {line})", "save it as UTF-8 text") from error
+        return tomllib.loads(whole)
     except RecursionError as error:
         raise PartError("", "is nested too deeply", "see blysk render --help for the keys") from error
     # A syntax error, or a whole number of more than 4300 digits.

@@ -225,9 +225,22 @@ BAD = {
     "pipeline.operand = 'cross'": ("a.toml, pipeline.operand", "cosine, one_minus_cosine"),
     "pipeline.setup_interval = 0": ("a.toml, pipeline.setup_interval", "from 1 to 46"),
     b"a = '\xff'": ("a.toml", "is not UTF-8 (line 1)"),
-    b"\0": ("a.toml", "is no TOML"),
+    b"a\0b": ("a.toml", "is no TOML"),
     b"#" * (MAX_BYTES + 1): ("a.toml", "is over 100,000 bytes"),
 }
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\xef\xbb\xbf\r\n [mesh]\r\nfile = 'teapot'\r\n",
+        b"# C:\\scenes\\\r[mesh]\rfile = 'teapot'\r",
+        "[mesh]\nfile = 'teapot'\n".encode("utf-16"),
+    ],
+    ids=["mark and CR LF", "CR", "UTF-16"],
+)
+def test_text_however_it_was_saved(write, data):
+    assert read_scene_file(write(data)).values == {"mesh": "teapot"}
 
 
 @pytest.mark.parametrize("content", BAD, ids=lambda content: str(content[:40]))

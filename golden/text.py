@@ -1,0 +1,41 @@
+"""Text of files, however it was saved: byte order marks, encodings, ends of lines."""
+
+import codecs
+
+__all__ = ["is_wide", "plain_text"]
+
+# UTF-32 before UTF-16, whose mark of little-endian files is the first half of the other's.
+_MARKS = {
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF32_BE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+
+
+def is_wide(data: bytes) -> bool:
+    """Whether a byte order mark says that characters take two or four bytes."""
+    return data.startswith(tuple(_MARKS))
+
+
+def plain_text(data: bytes, errors: str = "strict") -> str:
+    r"""The text of a file's bytes: UTF-8, or in the encoding of its byte order mark.
+
+    Each line ends with ``\n``, also where the file has ``\r\n`` or a lone ``\r``. Marks are removed wherever
+    they stand, as joined files have them inside; so are the bytes 0 and 26 that old programs put at the end.
+
+    Parameters
+    ----------
+    data : bytes
+        Contents of the file.
+    errors : {"strict", "replace"}
+        What happens to bytes that are no text.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        If bytes are no text, and ``errors`` is ``"strict"``.
+    """
+    encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
+    text = data.decode(encoding, errors).replace("\ufeff", "").rstrip("\0\x1a")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
