@@ -75,8 +75,7 @@ class RenderedFrame:
     name : str
         Name of the mesh.
     details : dict
-        Further figures: ``counts`` of the mesh, ``seconds`` of loading and building, and perhaps
-        ``specialisation``.
+        ``ignored`` and ``counts`` of `LoadedMesh`, ``seconds`` of its parts, perhaps ``specialisation``.
     """
 
     scene: Scene
@@ -248,9 +247,9 @@ class Rendering:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Counts of repairs of the mesh: normals and dropped faces."""
-        mesh = self.loaded
-        return {"repaired_normals": mesh.repaired_normals, "dropped_faces": mesh.dropped_faces}
+        """Counts of the mesh, see `LoadedMesh`."""
+        names = ("repaired_normals", "dropped_faces", "opposed_faces")
+        return {name: getattr(self.loaded, name) for name in names}
 
     def render(self, progress: Progress | None = None, vcd: str | None = None) -> RenderedFrame:
         """Draw the first scene.
@@ -264,7 +263,8 @@ class Rendering:
         """
         assert self.simulator is not None
         frame = self.simulator.render(self.specialisation.scenes[0], progress=progress, vcd=vcd)
-        details: dict[str, Any] = {"counts": self.counts, "seconds": self.seconds}
+        details: dict[str, Any] = {"ignored": list(self.loaded.ignored)}
+        details |= {"counts": self.counts, "seconds": self.seconds}
         if self.is_specialised:
             details["specialisation"] = {**saving_figures(self.specialisation), "cycles": frame.cycles}
             if vcd is None:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import warnings
 from dataclasses import replace
 from typing import Unpack
 
@@ -69,10 +70,19 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     ------
     InputError
         If the mesh cannot be read, or a value is out of range.
+
+    Warns
+    -----
+    RuntimeWarning
+        If the mesh file has contents that change the picture and are not read; see `LoadedMesh`.
     """
     settings = read_settings(source, options, SCENE)
     with settings.located():
-        return scenes_of(load(settings), settings)[0]
+        loaded = load(settings)
+        if loaded.ignored:
+            text = f"{loaded.name} is drawn without: {'; '.join(loaded.ignored)}"
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
+        return scenes_of(loaded, settings)[0]
 
 
 def load(settings: Settings) -> LoadedMesh:

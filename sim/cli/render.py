@@ -178,8 +178,7 @@ def command(
         lines = short_lines(report)
         if "specialisation" in report:
             lines = [*lines, *specialisation_lines(report["specialisation"])]
-    ignored = () if frames else ready.loaded.ignored
-    for line in (*lines, *(f"{'ignored':<12}{text}" for text in ignored)):
+    for line in lines:
         print(line)
     for name, path in {**written, "figures": figures, "waves": vcd}.items():
         if path:
@@ -255,6 +254,7 @@ def _animation(
     return {
         **mesh,
         **figures,
+        "ignored": list(ready.loaded.ignored),
         "workers": name,
         "seconds": {**ready.seconds, "frames": perf_counter() - start},
     }

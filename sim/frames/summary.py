@@ -8,6 +8,7 @@ from blysk.sim.frames.figures import ERRORS
 __all__ = ["animation_lines", "frame_lines", "short_lines", "specialisation_lines"]
 
 _COUNTS = {
+    "opposed_faces": "triangles with normals against their winding",
     "repaired_normals": "stored normals repaired",
     "dropped_faces": "faces without area dropped",
     "degenerate_triangles": "triangles without area on the screen",
@@ -29,6 +30,7 @@ _COUNTS = {
 }
 
 _REMEDIES = {
+    "opposed_faces": "--back-faces show takes their normals as they are; if they stay dark, export them anew",
     "missed_spans": "use chord or renormalise",
     "missed_pieces": "use geometry software, or smaller triangles",
     "short_normals": "use geometry software, or divide the triangles",
@@ -38,8 +40,8 @@ _REMEDIES = {
 """What helps against a count; after a semicolon."""
 
 _WARNINGS = (
-    *("repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals", "wide_spans"),
-    "out_of_range_spans",
+    *("opposed_faces", "repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals"),
+    *("wide_spans", "out_of_range_spans"),
 )
 """Counts that may come from a fault of the mesh or the design."""
 
@@ -81,6 +83,7 @@ def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         share = f"defined for {figures['mnse_published_share']:.1%}"
         yield _line("NMSE", f"{figures['nmse']:.3g} ({published}, {share})")
     yield from _count_lines(figures["counts"])
+    yield from _ignored_lines(figures)
     yield _second_line(figures["seconds"])
 
 
@@ -112,6 +115,7 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     ]
     if counted:
         yield _line("noticed", f"{counted[0]}{f', and {len(counted) - 1} more' * (len(counted) > 1)}; see -v")
+    yield from _ignored_lines(figures)
     yield _line("seconds", f"{figures['seconds'].get('total', sum(figures['seconds'].values())):.1f}")
 
 
@@ -128,6 +132,7 @@ def animation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("errors", "the worst of every frame")
     yield from _error_lines(figures)
     yield from _count_lines(figures["counts"])
+    yield from _ignored_lines(figures)
     yield _second_line(figures["seconds"])
 
 
@@ -184,6 +189,12 @@ def _count_lines(counts: Mapping[str, int]) -> Iterator[str]:
 
 def _remedy(key: str) -> str:
     return f"; {_REMEDIES[key]}" if key in _REMEDIES else ""
+
+
+def _ignored_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    """What a mesh file has that changes the picture and was not read, in one line."""
+    if figures.get("ignored"):
+        yield _line("ignored", "; ".join(figures["ignored"]))
 
 
 def _second_line(seconds: Mapping[str, float]) -> str:

@@ -4,48 +4,91 @@ import importlib.util
 import json
 import re
 import struct
+from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
-from blysk.sim.meshes.gltf_arrays import check_arrays
+from blysk.golden.text import plain_text
+from blysk.sim.meshes.gltf_arrays import MESHOPT, check_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found, color_of
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused, shown
 
-__all__ = ["check_gltf", "find_gltf_materials", "gltf_document", "plain_gltf"]
+__all__ = [
+    "check_gltf",
+    "complete_scene",
+    "find_gltf_materials",
+    "gltf_document",
+    "plain_gltf",
+    "tell_contents",
+]
 
-_NEEDS_DECODER = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
-# Extensions whose geometry is read, and those that say nothing of geometry.
-_SUPPORTED = re.compile(
-    "KHR_draco_mesh_compression|KHR_mesh_quantization|EXT_mesh_gpu_instancing|"
-    "[A-Z0-9]+_(materials?|textures?|lights?|image|xmp|animation)(_.+)?"
-)
+# Extensions that are read, those that change nothing that is read, and those that a picture does without.
+_READ = {"KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
+_READ |= {"KHR_node_visibility"}
+_SILENT = {"KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif"}
+_SILENT |= {"MSFT_texture_dds", "KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer"}
+_SILENT |= {"KHR_materials_variants", "KHR_node_hoverability", "KHR_node_selectability", "EXT_mesh_manifold"}
+_TOLD = {"KHR_lights_punctual", "EXT_lights_image_based", "EXT_lights_ies"}
+_TOLD |= {
+    f"KHR_materials_{name}"
+    for name in (
+        *("anisotropy", "clearcoat", "diffuse_transmission", "dispersion", "emissive_strength", "ior"),
+        *("iridescence", "pbrSpecularGlossiness", "sheen", "specular", "transmission", "unlit", "volume"),
+        "volume_scatter",
+    )
+}
+# Keys that are read, those of what is counted, and those that say nothing of the look.
+_ANY = {"name", "extensions", "extras"}
+_KNOWN = {
+    "document": {"asset", "scene", "scenes", "nodes", "meshes", "materials", "accessors", "bufferViews"}
+    | {"buffers", "animations", "skins", "cameras", "images", "textures", "samplers"}
+    | {"extensionsUsed", "extensionsRequired"},
+    "nodes": {"children", "matrix", "translation", "rotation", "scale", "mesh", "skin", "weights", "camera"},
+    "meshes": {"primitives", "weights"},
+    "primitives": {"attributes", "indices", "material", "mode", "targets"},
+    "materials": {"pbrMetallicRoughness", "doubleSided", "alphaMode", "alphaCutoff", "emissiveFactor"}
+    | {"normalTexture", "occlusionTexture", "emissiveTexture"},
+    "pbrMetallicRoughness": {"baseColorFactor", "metallicFactor", "roughnessFactor", "baseColorTexture"}
+    | {"metallicRoughnessTexture"},
+}
+_ATTRIBUTES = re.compile("POSITION|NORMAL|TANGENT|(TEXCOORD|JOINTS|WEIGHTS|COLOR)_[0-9]+|_.*")
 
 
 def gltf_document(data: bytes, suffix: str) -> dict:
-    """The JSON part of a GLB or glTF file."""
+    """The JSON part of a GLB or glTF file, of version 2."""
     if suffix == ".glb":
         if len(data) < 20 or data[:4] != b"glTF":
             raise Refused("it is no GLB file")
-        length, json_length = struct.unpack_from("<II", data, 8)
+        version, length, json_length = struct.unpack_from("<3I", data, 4)
+        if version != 2:
+            raise _of_version(f"{version}.0")
         if len(data) < (said := max(length, 20 + json_length)):
             raise Refused(f"it is cut short: the header says {said} bytes, there are {len(data)}")
         data = data[20 : 20 + json_length]
     try:
-        document = json.loads(data.decode("utf-8-sig"))
+        document = json.loads(plain_text(data))
     except ValueError as error:
         raise Refused(f"its JSON is damaged ({error})") from error
     if not isinstance(document, dict):
         raise Refused("its JSON is no glTF document")
+    asset = document.get("asset")
+    asset = asset if isinstance(asset, dict) else {}
+    # The first version has its parts by name, and before it was finished, no asset.
+    old = any(isinstance(document.get(name), dict) for name in ("accessors", "meshes", "nodes", "buffers"))
+    version = asset.get("minVersion", asset.get("version", "1.0" if old else "2.0"))
+    if str(version).split(".")[0] != "2" or str(asset.get("minVersion", "2.0")) not in ("2", "2.0"):
+        raise _of_version(shown(str(version)))
     return document
+
+
+def _of_version(version: str) -> Refused:
+    return Refused(f"it is glTF of version {version}, and version 2.0 is read", "convert it to glTF 2.0")
 
 
 def check_gltf(document: dict) -> None:
     """Refuse geometry that trimesh would load as zeros, and counts that would exhaust the memory."""
-    for extension in sorted(_NEEDS_DECODER.intersection(document.get("extensionsUsed", []))):
-        raise Refused(
-            f"it is compressed with {extension}, for which there is no decoder", "export it uncompressed"
-        )
     for extension in sorted(map(str, document.get("extensionsRequired", []))):
-        if not _SUPPORTED.fullmatch(extension):
+        if extension not in _READ | _SILENT | _TOLD:
             raise Refused(
                 f"it needs the extension {shown(extension)}, which is not supported", "export it without"
             )
@@ -60,10 +103,8 @@ def check_gltf(document: dict) -> None:
             attributes = primitive["attributes"]
             used = [attributes[k] for k in ("POSITION", "NORMAL") if k in attributes]
             used += [primitive["indices"]] if "indices" in primitive else []
-            if any("sparse" in accessors[index] for index in used):
-                raise Refused("it has sparse accessors, which are not supported", "export it without them")
             draco = "KHR_draco_mesh_compression" in primitive.get("extensions", {})
-            if not all("bufferView" in accessors[index] for index in used):
+            if not all({"bufferView", "sparse"} & accessors[index].keys() for index in used):
                 if not draco:
                     raise Refused("a mesh has no data")
                 if importlib.util.find_spec("DracoPy") is None:
@@ -93,6 +134,28 @@ def _check_nodes(document: dict) -> None:
         raise Refused("one of its nodes is twice in a scene", "export it with the roots alone in the scene")
 
 
+def complete_scene(document: dict, found: Found) -> None:
+    """Put the root nodes of a document without scenes into one, and leave out nodes that are not visible."""
+    nodes = document.setdefault("nodes", [])
+    if not document.get("scenes"):
+        if not nodes:
+            nodes += [{"mesh": number} for number in range(len(document.get("meshes", [])))]
+        below = {child for node in nodes for child in node.get("children", [])}
+        document["scenes"] = [{"nodes": [k for k in range(len(nodes)) if k not in below]}]
+    elif "scene" not in document:
+        found.tell("scene after the first", "scenes after the first", len(document["scenes"]) - 1)
+    document.setdefault("scene", 0)
+    hidden = [node for node in nodes if _extension(node, "KHR_node_visibility").get("visible") is False]
+    for node in hidden:
+        node.pop("mesh", None)
+        hidden += [nodes[child] for child in node.get("children", [])]
+
+
+def _extension(part: dict, name: str) -> dict:
+    """An extension of a part of a document; empty if it has none."""
+    return part.get("extensions", {}).get(name, {})
+
+
 def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
     """Replace a document's materials by their numbers, and remove textures and vertex colours.
 
@@ -104,11 +167,7 @@ def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
     colored = False
     for mesh in document.get("meshes", []):
         for primitive in mesh["primitives"]:
-            attributes = primitive["attributes"]
-            for name in list(attributes):
-                if name.startswith(("COLOR_", "TEXCOORD_")):
-                    colored |= name.startswith("COLOR_")
-                    del attributes[name]
+            colored |= any(name.startswith("COLOR_") for name in primitive["attributes"])
             index = primitive.pop("material", None)
             if index is None or not materials:
                 continue
@@ -119,19 +178,19 @@ def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
                 )
             primitive["material"] = index
     if colored:
-        found.ignored.append("vertex colours")
+        found.tell("vertex colours")
     if materials and texts:
         if not isinstance(texts, list) or not all(isinstance(text, dict) for text in texts):
             raise Refused("its materials are no list of objects", ONE_MATERIAL)
         found.names += [str(text.get("name", "")) for text in texts]
         for number, (name, text) in enumerate(zip(found.names[-len(texts) :], texts, strict=True)):
             given = shown(name)
-            found.readers.append(partial(_gltf_material, text, given or f"number {number}", given))
+            found.readers.append(partial(_gltf_material, text, given or f"number {number}", given, found))
         document["materials"] = [{"name": str(number)} for number in range(1, len(texts) + 1)]
 
 
-def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial, int]:
-    """A material of a glTF document, and how many textures it has.
+def _gltf_material(text: dict, name: str, given_name: str, found: Found) -> FileMaterial:
+    """A material of a glTF document; what else changes its look is told.
 
     Missing factors are 1, as glTF defines. Metallic and roughness factors of a texture do not count, as
     textures are not read.
@@ -141,12 +200,49 @@ def _gltf_material(text: dict, name: str, given_name: str) -> tuple[FileMaterial
     numbers = factor if isinstance(factor, list) and len(factor) == 4 else []
     usable = all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers)
     color = color_of(numbers[:3] if usable else [], "baseColorFactor", name, str(factor))
-    textures = sum(key.endswith("Texture") for part in (look, text) for key in part)
+    _tell_look(text, look, numbers[3], found)
     two_sided = text.get("doubleSided") is True
     if "metallicRoughnessTexture" in look:
-        return FileMaterial(given_name, color, two_sided=two_sided), textures
+        return FileMaterial(given_name, color, two_sided=two_sided)
     factors = [_factor(look, key, name) for key in ("metallicFactor", "roughnessFactor")]
-    return FileMaterial.of_metallic_roughness(given_name, color, *factors, two_sided), textures
+    return FileMaterial.of_metallic_roughness(given_name, color, *factors, two_sided)
+
+
+def _tell_look(text: dict, look: dict, alpha: float, found: Found) -> None:
+    """Tell what changes the look of a material and is not read."""
+    extensions = list(_extension_names(text))
+    found.tell("texture", "textures", sum(key.endswith("Texture") for part in _parts(text) for key in part))
+    mode, cutoff = text.get("alphaMode", "OPAQUE"), text.get("alphaCutoff", 0.5)
+    least = 1.0 if mode == "BLEND" else cutoff
+    kind = "of materials"
+    if mode != "OPAQUE" and (
+        "baseColorTexture" in look or not isinstance(least, int | float) or alpha < least
+    ):
+        found.tell_names(kind, [f"alpha (alphaMode {mode})"])
+    if text.get("emissiveFactor", [0, 0, 0]) != [0, 0, 0]:
+        found.tell_names(kind, ["emission (emissiveFactor)"])
+    found.tell_names(kind, extensions, _SILENT)
+    found.tell_names(kind, text, _KNOWN["materials"] | _ANY)
+    found.tell_names(kind, look, _KNOWN["pbrMetallicRoughness"] | _ANY)
+
+
+def _parts(part: Any) -> Iterator[dict]:
+    """A part of a document and all parts in it, but for what an application adds for itself."""
+    if isinstance(part, dict):
+        yield part
+        part = [value for key, value in part.items() if key != "extras"]
+    if isinstance(part, list):
+        for value in part:
+            if isinstance(value, dict | list):
+                yield from _parts(value)
+
+
+def _extension_names(part: Any) -> Iterator[str]:
+    """Names of all extensions in a part of a document."""
+    for each in _parts(part):
+        extensions = each.get("extensions")
+        if isinstance(extensions, dict):
+            yield from extensions
 
 
 def _factor(look: dict, key: str, name: str) -> float:
@@ -159,25 +255,51 @@ def _factor(look: dict, key: str, name: str) -> float:
     return float(value)
 
 
-def plain_gltf(document: dict, found: Found) -> bytes:
-    """The text of a document without cameras; what the picture will not show goes into ``found.ignored``.
+def tell_contents(document: dict, found: Found) -> None:
+    """Tell contents of a document, but for its materials, that change the picture and are not read.
 
-    trimesh would lose the nodes below a camera. Skins, and morph targets with a weight other than 0, are
-    counted: the mesh is drawn without them.
+    Skins, and morph targets with a weight other than 0, are counted: the mesh is drawn without them.
     """
-    meshes = document.get("meshes", [])
+    meshes, nodes = document.get("meshes", []), document.get("nodes", [])
     morphed = {
         node["mesh"]
-        for node in document.get("nodes", [])
+        for node in nodes
         if "mesh" in node and any(node.get("weights", meshes[node["mesh"]].get("weights", [])))
     }
-    skins = {node["skin"] for node in document.get("nodes", []) if "skin" in node and "mesh" in node}
-    for count, what in ((len(morphed), "mesh with morph weights"), (len(skins), "skin")):
-        if count:
-            found.ignored.append(f"{count} {what if count == 1 else _PLURALS[what]}")
-    for node in document.get("nodes", []):
-        node.pop("camera", None)
-    return json.dumps(document).encode()
+    found.tell("mesh with morph weights", "meshes with morph weights", len(morphed))
+    skins = {node["skin"] for node in nodes if "skin" in node and "mesh" in node}
+    found.tell("skin", "skins", len(skins))
+    found.tell("animation", "animations", len(document.get("animations", [])))
+    found.tell("camera", "cameras", sum("camera" in node for node in nodes))
+    lights = sum("light" in _extension(node, "KHR_lights_punctual") for node in nodes)
+    found.tell("light (KHR_lights_punctual)", "lights (KHR_lights_punctual)", lights)
+    primitives = [primitive for mesh in meshes for primitive in mesh["primitives"]]
+    attributes = {name for primitive in primitives for name in primitive["attributes"]}
+    found.tell_names("attributes", sorted(a for a in attributes if not _ATTRIBUTES.fullmatch(a)))
+    known = _READ | _SILENT | {"KHR_lights_punctual", *MESHOPT}
+    found.tell_names("extensions", _extension_names(document), known)
+    parts = {"document": [document], "nodes": nodes, "meshes": meshes, "primitives": primitives}
+    for name, each in parts.items():
+        found.tell_names(f"of {name}", (key for part in each for key in part), _KNOWN[name] | _ANY)
 
 
-_PLURALS = {"mesh with morph weights": "meshes with morph weights", "skin": "skins"}
+def plain_gltf(document: dict) -> bytes:
+    """The text of a document of meshes and nodes alone.
+
+    trimesh would lose the nodes below a camera.
+    """
+    for node in document["nodes"]:
+        for name in ("camera", "skin", "weights", "extensions", "extras"):
+            node.pop(name, None)
+    names = (
+        "asset",
+        "scene",
+        "scenes",
+        "nodes",
+        "meshes",
+        "materials",
+        "accessors",
+        "bufferViews",
+        "buffers",
+    )
+    return json.dumps({name: document[name] for name in names if name in document}).encode()

@@ -2,7 +2,6 @@
 
 import base64
 import binascii
-import importlib.util
 import math
 import os
 import struct
@@ -12,9 +11,11 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.refusal import REEXPORT, Refused, inside, shown
+from blysk.sim.meshes.strips import strip_triangles
 
-__all__ = ["check_arrays", "gltf_buffers", "plain_arrays"]
+__all__ = ["MESHOPT", "check_arrays", "gltf_buffers", "plain_arrays"]
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _FLOAT, _INDEX = 5126, (5121, 5123, 5125)
@@ -24,7 +25,10 @@ _ROUNDED = math.sqrt(3) / 127
 _INSTANCING = "EXT_mesh_gpu_instancing"
 _MAX_INSTANCES = 100_000
 _DRACO = "KHR_draco_mesh_compression"
-_LINES, _FAN, _MODES = 3, 6, 7
+_LINES, _STRIP, _FAN, _MODES = 3, 5, 6, 7
+_READ = ("POSITION", "NORMAL")
+MESHOPT = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
+"""Extensions of compressed views, for which there is no decoder: read where the plain data is there, too."""
 
 
 def _listed(document: dict, name: str) -> list[dict]:
@@ -80,7 +84,13 @@ def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list
     buffers = []
     for number, buffer in enumerate(_listed(document, "buffers")):
         uri = buffer.get("uri")
-        if uri is None and number == 0 and suffix == ".glb":
+        length = _whole(buffer.get("byteLength", 0), "the byteLength")
+        if uri is None and any(
+            buffer.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT
+        ):
+            # It stands for what the decoder would make.
+            found, length = b"", 0
+        elif uri is None and number == 0 and suffix == ".glb":
             found = _glb_chunk(data)
         elif not isinstance(uri, str):
             raise Refused(f"its buffer {number} has no data")
@@ -91,7 +101,6 @@ def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list
                 raise Refused(f"the text of its buffer {number} is no base64") from None
         else:
             found = _beside(folder, uri)
-        length = _whole(buffer.get("byteLength", 0), "the byteLength")
         if len(found) < length:
             raise Refused(f"its buffer {number} is cut short: it says {length} bytes, there are {len(found)}")
         buffers.append(found)
@@ -118,87 +127,122 @@ def _glb_chunk(data: bytes) -> bytes:
 
 
 class _Arrays:
-    """The accessors of a document, and a buffer of arrays put to them."""
+    """The accessors of a document, and the arrays that are put in their place."""
 
     def __init__(self, document: dict, buffers: list[bytes]):
         self.document, self.buffers = document, buffers
-        self.more: list[np.ndarray] = []
-        self.places: dict[tuple[int, str], int] = {}
+        self.stored: list[np.ndarray] = []
 
     def read(self, index: int) -> np.ndarray:
         """Values of an accessor, float64 or whole; normalised ones between -1 and 1 as glTF defines them."""
         accessor = self.document["accessors"][index]
         kind, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
-        if "bufferView" not in accessor or "sparse" in accessor:
-            raise Refused("it has sparse accessors or such without data", "export it without them")
-        view, count = self.document["bufferViews"][accessor["bufferView"]], accessor["count"]
-        data = self.buffers[view["buffer"]][view.get("byteOffset", 0) :][: view["byteLength"]]
-        step = view.get("byteStride") or kind.itemsize * width
-        start = accessor.get("byteOffset", 0)
-        if count == 0:
-            return np.zeros((0, width))
-        if start + (count - 1) * step + kind.itemsize * width > len(data) or step < kind.itemsize * width:
-            raise Refused(f"an array of {count} elements does not fit into its view")
-        values = np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
+        count = accessor["count"]
+        values = np.zeros((count, width), kind)
+        if "bufferView" in accessor:
+            values = self._rows(accessor, count, kind, width)
+        if sparse := accessor.get("sparse"):
+            few = _whole(sparse["count"], "the count of a sparse array", count + 1)
+            where = sparse["indices"]
+            places = self._rows(where, few, np.dtype(_TYPES[where["componentType"]]), 1)[:, 0]
+            if few and not 0 <= places.min() <= places.max() < count:
+                raise Refused(f"a sparse array has an element over {count - 1}")
+            values = values.copy()
+            values[places.astype(np.int64)] = self._rows(sparse["values"], few, kind, width)
         if accessor.get("normalized") and kind.kind != "f":
             return np.maximum(values / np.iinfo(kind).max, -1.0)
         return values.astype(np.float64 if kind.kind == "f" else np.int64)
 
-    def check_draco(self, compressed: dict) -> None:
-        """Refuse compressed data that its decoder refuses: trimesh would leave the part out.
+    def _rows(self, part: dict, count: int, kind: np.dtype, width: int) -> np.ndarray:
+        """Rows of the view that a part of the document names."""
+        views = self.document.get("bufferViews", [])
+        view = views[_whole(part["bufferView"], "an array in the view", len(views))]
+        data = self._bytes(view)
+        step = view.get("byteStride") or kind.itemsize * width
+        start = _whole(part.get("byteOffset", 0), "the byteOffset")
+        if count == 0:
+            return np.zeros((0, width), kind)
+        if start + (count - 1) * step + kind.itemsize * width > len(data) or step < kind.itemsize * width:
+            raise Refused(f"an array of {count} elements does not fit into its view")
+        return np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
 
-        Without the decoder, only data that is also there uncompressed gets here, and is read in that form.
-        """
-        if importlib.util.find_spec("DracoPy") is None:
-            return
+    def _bytes(self, view: dict) -> bytes:
+        """Bytes of a view."""
+        data = self.buffers[view["buffer"]][view.get("byteOffset", 0) :][: view["byteLength"]]
+        compressed = sorted(MESHOPT.intersection(view.get("extensions", {})))
+        if len(data) < view["byteLength"] and compressed:
+            raise Refused(
+                f"it is compressed with {compressed[0]}, for which there is no decoder",
+                "export it uncompressed",
+            )
+        return data
+
+    def decoded(self, primitive: dict) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Attributes and corners of Draco-compressed data; `Refused` if its decoder refuses it."""
         import DracoPy
 
+        compressed = primitive["extensions"][_DRACO]
         views = self.document.get("bufferViews", [])
-        view = views[_whole(compressed.get("bufferView"), "Draco-compressed data", len(views))]
-        data = self.buffers[view["buffer"]][view.get("byteOffset", 0) :][: view["byteLength"]]
+        data = self._bytes(views[_whole(compressed.get("bufferView"), "Draco-compressed data", len(views))])
         try:
-            DracoPy.decode(data)
+            mesh = DracoPy.decode(data)
+            names = {number: name for name, number in compressed["attributes"].items()}
+            found = {names.get(each["unique_id"]): np.array(each["data"]) for each in mesh.attributes}
+            return found, np.array(mesh.faces).astype(np.int64).ravel()
         # The decoder raises whatever it trips over.
         except Exception as error:
             raise Refused("its Draco-compressed data is damaged", REEXPORT) from error
 
     def add(self, values: np.ndarray) -> int:
         """Add an array, float32 vectors or 32-bit indices; the number of its new accessor."""
-        kind, component = ("<f4", _FLOAT) if values.dtype.kind == "f" else ("<u4", 5125)
-        stored = np.ascontiguousarray(values, dtype=kind)
-        views, accessors = self.document["bufferViews"], self.document["accessors"]
-        offset = sum(array.nbytes for array in self.more)
-        self.more.append(stored)
-        views.append({"buffer": len(self.buffers), "byteOffset": offset, "byteLength": stored.nbytes})
-        shape = {"count": len(stored), "type": "VEC3" if stored.ndim == 2 else "SCALAR"}
-        accessors.append({"bufferView": len(views) - 1, "componentType": component, **shape})
-        return len(accessors) - 1
+        self.stored.append(np.ascontiguousarray(values, dtype="<f4" if values.dtype.kind == "f" else "<u4"))
+        return len(self.stored) - 1
 
-    def as_floats(self, index: int, name: str) -> int:
-        """Number of an accessor that has an attribute as floats; quantised normals get unit length."""
+    def corners(self, primitive: dict) -> np.ndarray:
+        """Vertices of a primitive in order."""
+        accessors = self.document["accessors"]
+        if "indices" not in primitive:
+            return np.arange(accessors[primitive["attributes"]["POSITION"]]["count"])
+        accessor = accessors[primitive["indices"]]
+        if accessor["componentType"] not in _INDEX or accessor["type"] != "SCALAR":
+            raise Refused("its indices are no unsigned whole numbers")
+        return self.read(primitive["indices"])[:, 0]
+
+    def vectors(self, index: int, name: str) -> np.ndarray:
+        """Values of an attribute as floats; quantised normals get unit length."""
         accessor = self.document["accessors"][index]
         if accessor["type"] != "VEC3":
             raise Refused(f"its {name} is of the type {shown(str(accessor['type']))}, not VEC3")
-        if accessor["componentType"] == _FLOAT:
-            return index
         if accessor["componentType"] == 5125 or accessor["componentType"] not in _TYPES:
             raise Refused(f"its {name} has the componentType {shown(str(accessor['componentType']))}")
-        if (index, name) not in self.places:
-            values = self.read(index).astype(np.float64)
-            if name == "NORMAL":
-                # Rounding is no fault of the file.
-                length = np.linalg.norm(values, axis=1, keepdims=True)
-                near = np.abs(length - 1) <= _ROUNDED
-                values = np.where(near, values / np.where(near, length, 1.0), values)
-            self.places[index, name] = self.add(values)
-        return self.places[index, name]
+        values = self.read(index).astype(np.float64)
+        if name == "NORMAL" and accessor["componentType"] != _FLOAT:
+            # Rounding is no fault of the file.
+            length = np.linalg.norm(values, axis=1, keepdims=True)
+            near = np.abs(length - 1) <= _ROUNDED
+            values = np.where(near, values / np.where(near, length, 1.0), values)
+        return values
+
+    def document_parts(self) -> tuple[dict, bytes]:
+        """Accessors, views and the buffer of the arrays that were added."""
+        views, accessors, offset = [], [], 0
+        for number, array in enumerate(self.stored):
+            views.append({"buffer": 0, "byteOffset": offset, "byteLength": array.nbytes})
+            offset += array.nbytes
+            shape = {"count": len(array), "type": "VEC3" if array.ndim == 2 else "SCALAR"}
+            kind = _FLOAT if array.dtype.kind == "f" else 5125
+            accessors.append({"bufferView": number, "componentType": kind, **shape})
+        buffers = [{"uri": "0", "byteLength": offset}]
+        return {"accessors": accessors, "bufferViews": views, "buffers": buffers}, b"".join(
+            array.tobytes() for array in self.stored
+        )
 
 
-def plain_arrays(document: dict, buffers: list[bytes]) -> list[bytes]:
-    """Put a document into a form that trimesh reads right; the buffers, perhaps with a new one.
+def plain_arrays(document: dict, buffers: list[bytes], found: Found) -> bytes:
+    """Put a document into a form that trimesh reads right, of triangles alone; its one buffer.
 
-    trimesh does not scale normalised whole numbers, leaves out triangle fans, and draws only one of a node's
-    instances.
+    trimesh does not scale normalised whole numbers, reads no sparse arrays, leaves out triangle fans, and
+    draws only one of a node's instances. Parts of points and lines are told.
 
     Parameters
     ----------
@@ -206,43 +250,54 @@ def plain_arrays(document: dict, buffers: list[bytes]) -> list[bytes]:
         After `check_arrays`; it is changed.
     buffers : list of bytes
         Of `gltf_buffers`.
+    found : Found
+        Told what is left out.
     """
     arrays = _Arrays(document, buffers)
     for mesh in document.get("meshes", []):
-        for primitive in mesh["primitives"]:
-            if primitive.get("mode", 4) > _LINES:
-                if compressed := primitive.get("extensions", {}).get(_DRACO):
-                    arrays.check_draco(compressed)
-                _plain_primitive(primitive, arrays)
+        solid = [p for p in mesh["primitives"] if p.get("mode", 4) > _LINES]
+        found.tell(
+            "part of points or lines", "parts of points or lines", len(mesh["primitives"]) - len(solid)
+        )
+        drawn = [primitive for primitive in solid if "POSITION" in primitive["attributes"]]
+        found.tell("part without positions", "parts without positions", len(solid) - len(drawn))
+        mesh["primitives"] = [_plain_primitive(primitive, arrays, found) for primitive in drawn]
     _plain_instances(document, arrays)
-    if arrays.more:
-        buffers = [*buffers, b"".join(array.tobytes() for array in arrays.more)]
-    document["buffers"] = [{"uri": str(number), "byteLength": len(b)} for number, b in enumerate(buffers)]
-    return buffers
+    for node in document["nodes"]:
+        # trimesh would lose the nodes below.
+        if "mesh" in node and not document["meshes"][node["mesh"]]["primitives"]:
+            del node["mesh"]
+    parts, buffer = arrays.document_parts()
+    document |= parts
+    return buffer
 
 
-def _plain_primitive(primitive: dict, arrays: _Arrays) -> None:
-    attributes, accessors = primitive["attributes"], arrays.document["accessors"]
-    for name in {"POSITION", "NORMAL"}.intersection(attributes):
-        accessor = accessors[attributes[name]]
-        if "bufferView" in accessor:
-            attributes[name] = arrays.as_floats(attributes[name], name)
-        elif accessor["componentType"] != _FLOAT:
-            raise Refused(f"its {name} is compressed and quantised, too", "export it with one of both")
-    if "indices" in primitive:
-        accessor = accessors[primitive["indices"]]
-        if accessor["componentType"] not in _INDEX or accessor["type"] != "SCALAR":
-            raise Refused("its indices are no unsigned whole numbers")
-    if primitive.get("mode", 4) == _FAN:
-        if "indices" in primitive:
-            corners = arrays.read(primitive["indices"])[:, 0]
-        else:
-            corners = np.arange(accessors[attributes["POSITION"]]["count"])
-        if len(corners) < 3:
-            raise Refused("a triangle fan has fewer than 3 corners")
-        first = np.full(len(corners) - 2, corners[0])
-        fan = np.stack([corners[1:-1], corners[2:], first], axis=1)
-        primitive |= {"mode": 4, "indices": arrays.add(fan.ravel())}
+def _plain_primitive(primitive: dict, arrays: _Arrays, found: Found) -> dict:
+    """A primitive of triangles with floats for positions and normals."""
+    accessors = arrays.document["accessors"]
+    given = {name: primitive["attributes"][name] for name in _READ if name in primitive["attributes"]}
+    used = [*given.values(), *([primitive["indices"]] if "indices" in primitive else [])]
+    if all({"bufferView", "sparse"} & accessors[index].keys() for index in used):
+        vectors = {name: arrays.vectors(index, name) for name, index in given.items()}
+        corners = arrays.corners(primitive)
+    else:
+        if any(accessors[index]["componentType"] != _FLOAT for index in given.values()):
+            raise Refused("its POSITION is compressed and quantised, too", "export it with one of both")
+        decoded, corners = arrays.decoded(primitive)
+        vectors = {name: decoded[name].astype(np.float64) for name in given}
+    if len({len(values) for values in vectors.values()}) > 1:
+        found.tell("normals of another number than positions")
+        del vectors["NORMAL"]
+    mode = primitive.get("mode", 4)
+    if mode != 4 and len(corners) < 3:
+        raise Refused("a triangle strip or fan has fewer than 3 corners")
+    if mode == _FAN:
+        corners = np.stack([corners[1:-1], corners[2:], np.full(len(corners) - 2, corners[0])], axis=1)
+    elif mode == _STRIP:
+        corners = strip_triangles(corners)
+    plain = {"attributes": {name: arrays.add(values) for name, values in vectors.items()}}
+    plain["indices"] = arrays.add(corners.ravel())
+    return plain | ({"material": primitive["material"]} if "material" in primitive else {})
 
 
 def _plain_instances(document: dict, arrays: _Arrays) -> None:

@@ -1,6 +1,6 @@
 """Materials of mesh files: values that a file gives, and the reflection coefficients made of them."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from blysk.golden.reference.lighting import Material, Triple
@@ -10,7 +10,8 @@ __all__ = ["FileMaterial", "Found", "color_of", "surfaces"]
 
 # k_a of a material whose k_d is the file's: most MTL files have a Ka of 1, which would wash the picture out.
 _AMBIENT_SHARE = 0.1
-
+# Names of a kind in the list of what is not read; the others are counted.
+_MOST_NAMES = 12
 
 _SAID = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
 # What a file says of the second does not count where the first is given.
@@ -58,27 +59,51 @@ class FileMaterial:
 
 @dataclass
 class Found:
-    """A file's materials, number 0 for faces without one, and a list of the contents that are not read.
+    """A file's materials, number 0 for faces without one, and its contents that are not read.
 
     Parameters
     ----------
     names : list of str
         Names of the materials.
     readers : list of callable or None
-        A function for each material, called if a face uses it, that returns the material and its number of
-        textures; ``None`` if the file does not define it.
-    ignored : list of str
-        Contents that are not read, in words.
+        A function for each material that returns it, called if a face uses it; ``None`` if the file does not
+        define it.
     """
 
     names: list[str] = field(default_factory=lambda: [""])
-    readers: list[Callable[[], tuple[FileMaterial, int]] | None] = field(default_factory=lambda: [None])
-    ignored: list[str] = field(default_factory=list)
+    readers: list[Callable[[], FileMaterial] | None] = field(default_factory=lambda: [None])
+    _counts: dict[tuple[str, str], int] = field(default_factory=dict)
+    _listed: dict[str, dict[str, None]] = field(default_factory=dict)
 
-    def read(self, number: int) -> tuple[FileMaterial, int]:
-        """One material and how many textures it has."""
+    def read(self, number: int) -> FileMaterial:
+        """One material."""
         reader = self.readers[number]
-        return (FileMaterial(shown(self.names[number])), 0) if reader is None else reader()
+        return FileMaterial(shown(self.names[number])) if reader is None else reader()
+
+    def tell(self, what: str, many: str = "", count: int = 1) -> None:
+        """Tell contents that are not read: in words, or as a number of them if there is a plural."""
+        if count:
+            self._counts[what, many] = self._counts.get((what, many), 0) + count
+
+    def tell_names(self, kind: str, names: Iterable[str], known: Container[str] = ()) -> None:
+        """Tell those names of a kind that a reader does not know: every reader lists what it knows."""
+        for name in names:
+            if name not in known:
+                self._listed.setdefault(kind, {})[shown(name)] = None
+
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """The contents that are not read, in words: counts, then the names of each kind."""
+        counts = [
+            f"{count:,} {many if count > 1 else one}" if many else one
+            for (one, many), count in self._counts.items()
+        ]
+        for kind, names in self._listed.items():
+            shown_names = list(names)[:_MOST_NAMES]
+            if len(names) > _MOST_NAMES:
+                shown_names.append(f"{len(names) - _MOST_NAMES} more")
+            counts.append(f"{kind}: {', '.join(shown_names)}")
+        return tuple(counts)
 
 
 def color_of(channels: list[float], what: str, name: str, text: str) -> Triple:

@@ -14,14 +14,21 @@ import numpy as np
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.geometry import Mesh
 from blysk.sim.errors import InputError
-from blysk.sim.meshes.gltf import check_gltf, find_gltf_materials, gltf_document, plain_gltf
+from blysk.sim.meshes.gltf import (
+    check_gltf,
+    complete_scene,
+    find_gltf_materials,
+    gltf_document,
+    plain_gltf,
+    tell_contents,
+)
 from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.normals import crease_normals, face_directions, repaired_normals, transformed
 from blysk.sim.meshes.obj import find_obj_materials, split_obj, tidy_obj
 from blysk.sim.meshes.ply import read_ply
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused
-from blysk.sim.meshes.stl import tidy_stl
+from blysk.sim.meshes.stl import read_stl
 from blysk.sim.meshes.teapot import teapot
 
 if TYPE_CHECKING:
@@ -54,18 +61,21 @@ class LoadedMesh:
     dropped_faces : int
         Triangles without area, left out: two corners are at one position, or no triangle shares a side.
         Others without area stay: they close the seam between a side and its parts.
+    opposed_faces : int
+        Triangles whose stored normals all point against their winding: their light falls on the other side.
     materials : tuple of FileMaterial
         Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
         differ in more than the name.
     ignored : tuple of str
-        Contents or references of the file that mesh and materials do not show: textures, vertex colours, a
-        material file that is not there.
+        Contents or references of the file that change a picture and are not read: textures, vertex colours,
+        alpha, a material file that is not there, and by their names what a reader does not know.
     """
 
     mesh: Mesh
     name: str
     repaired_normals: int
     dropped_faces: int
+    opposed_faces: int = 0
     materials: tuple[FileMaterial, ...] = (FileMaterial(),)
     ignored: tuple[str, ...] = ()
 
@@ -88,17 +98,22 @@ def load_mesh(
     All meshes of a scene are put together in world coordinates: vertices by the node's matrix ``M``,
     normals by its inverse transpose, and a mirroring node (``det M < 0``) turns the triangles round.
     Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
-    cover them and keep all their corners, concave ones by ear clipping. Quantised arrays of glTF are scaled,
-    and all instances of a node drawn; morph weights and skins are not applied, and listed in ``ignored``.
+    cover them and keep all their corners, concave ones by ear clipping; strips of PLY and glTF are drawn.
+    Quantised and sparse arrays of glTF are read, and all instances of a node drawn; morph weights and skins
+    are not applied. A glTF file without scenes shows its root nodes. Nodes that are not visible
+    (KHR_node_visibility) are left out. Texts may begin with a byte order mark, and have any ends of lines.
 
     Materials of a GLB or glTF file: the base colour without its alpha, metallic and roughness factors of
     ``pbrMetallicRoughness``, each 1 if missing (see `Material.of_metallic_roughness`), and ``doubleSided``.
     Materials of an OBJ file, from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded, at
     least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of glTF are linear, as k_d
     is, and the picture is written without a transfer curve: they are used without conversion, as is Kd.
-    Transparency, emission and ``illum`` are not read. If a material file does not exist, or lacks a name, the
-    colours are ``None``, and ``ignored`` lists it, as it lists textures and vertex colours, which are never
-    read. Materials of no face are left out, and equal ones merged. PLY and STL files have one material.
+    If a material file does not exist, or lacks a name, the colours are ``None``. Materials of no face are
+    left out, and equal ones merged. PLY and STL files have one material.
+
+    What changes a picture and is not read is in ``ignored``: textures, vertex colours, alpha, emission,
+    ``illum``, smoothing groups, lights, cameras, animations. Each reader has a list of the statements,
+    keywords, properties, keys and extensions that it knows; others are in ``ignored`` by their names.
 
     Parameters
     ----------
@@ -121,7 +136,7 @@ def load_mesh(
     ------
     InputError
         If a number is out of range; if the file is missing, empty, of unknown type or damaged, refers to
-        files outside its folder, needs a decoder that is not installed or a glTF extension that is not
+        buffers outside its folder, needs a decoder that is not installed or a glTF extension that is not
         supported, or has numbers in another form than the format's; if it holds no triangle, a vertex that
         is not finite, an index out of range, nodes that form no trees, or more than 20 million triangles; if
         a material in use has a colour that is not three numbers from 0 to 1 or an exponent over 1000; or if
@@ -223,15 +238,16 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
         mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
         return trimesh.Scene(mesh), found
     elif suffix == ".stl":
-        data = tidy_stl(data)
+        return trimesh.Scene(trimesh.Trimesh(*read_stl(data, found), process=False)), found
     else:
         document = gltf_document(data, suffix)
         check_gltf(document)
         buffers = gltf_buffers(document, data, suffix, path.parent)
+        complete_scene(document, found)
         find_gltf_materials(document, materials, found)
-        buffers = plain_arrays(document, buffers)
-        references = {str(number): buffer for number, buffer in enumerate(buffers)}
-        data = plain_gltf(document, found)
+        tell_contents(document, found)
+        references = {"0": plain_arrays(document, buffers, found)}
+        data = plain_gltf(document)
         options["skip_materials"], suffix = False, ".gltf"
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type=suffix[1:], resolver=references, process=False, **options
@@ -250,7 +266,8 @@ def _assemble(
     nodes = [(matrix, scene.geometry[name], numbers[name]) for matrix, name in nodes]
     nodes = [node for node in nodes if isinstance(node[1], trimesh.Trimesh) and len(node[1].faces)]
     if not nodes:
-        raise Refused("it has no faces", "use a mesh of triangles; points and lines are not shaded")
+        ignored = f" (not read: {'; '.join(found.ignored)})" if found.ignored else ""
+        raise Refused(f"it has no faces{ignored}", "use a mesh of triangles; points and lines are not shaded")
     if (total := sum(len(geometry.faces) for _, geometry, _ in nodes)) > MAX_FACES:
         raise Refused(f"it has {total} triangles; the limit is {MAX_FACES}", "simplify it")
 
@@ -324,10 +341,9 @@ def _number(name: str, geometry: object, path: Path) -> int:
 def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
     """The mesh with the materials that its faces use, numbered from 0, equal ones merged."""
     used, of_face = np.unique(loaded.mesh.material, return_inverse=True)
-    places, materials, of_used, textures = {}, [], [], 0
+    places, materials, of_used = {}, [], []
     for number in used.tolist():
-        material, its_textures = found.read(number)
-        textures += its_textures
+        material = found.read(number)
         place = places.setdefault(replace(material, name=""), len(materials))
         if place == len(materials):
             materials.append(material)
@@ -336,13 +352,11 @@ def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
         of_used.append(place)
     if len(materials) > MAX_MATERIALS:
         raise Refused(f"it has {len(materials)} materials; the limit is {MAX_MATERIALS}", ONE_MATERIAL)
-    if textures:
-        found.ignored.append(f"{textures} texture{'s' * (textures > 1)}")
     return replace(
         loaded,
         mesh=replace(loaded.mesh, material=np.array(of_used)[of_face.ravel()]),
         materials=tuple(materials),
-        ignored=tuple(found.ignored),
+        ignored=found.ignored,
     )
 
 
@@ -388,4 +402,5 @@ def _finish(
         normals=np.concatenate([own_normals, smooth_normals]),
         material=np.concatenate([material[kept], material[~kept]]).astype(np.int64),
     )
-    return LoadedMesh(mesh, name, repaired + lost, dropped)
+    opposed = (np.einsum("fki,fi->fk", own_normals[renumbered], directions[kept]) < 0).all(axis=1).sum()
+    return LoadedMesh(mesh, name, repaired + lost, dropped, int(opposed))

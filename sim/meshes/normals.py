@@ -4,7 +4,13 @@ import numpy as np
 
 from blysk.golden.reference.geometry import normalise
 
-__all__ = ["crease_normals", "face_directions", "repaired_normals", "transformed", "weighted_normals"]
+__all__ = [
+    "crease_normals",
+    "face_directions",
+    "repaired_normals",
+    "transformed",
+    "weighted_normals",
+]
 
 # The largest error of a stored normal's length that counts as rounding, itself stored in float32.
 _LENGTH_TOLERANCE = 1 / 256 + 1e-6

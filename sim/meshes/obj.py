@@ -3,18 +3,38 @@
 import math
 import os
 import re
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.text import plain_text
 from blysk.sim.meshes.materials import FileMaterial, Found, color_of
 from blysk.sim.meshes.polygons import check_corners, triangulated
-from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, shown, utf8
+from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, shown
 
 __all__ = ["find_obj_materials", "split_obj", "tidy_obj"]
 
+# Statements that are read, and those that only name parts; texture coordinates are told with the textures.
+_STATEMENTS = {"usemtl", "mtllib", "o", "g", "s", "vt"}
+# Keywords of materials that are read, and those that count only together with others that are told.
+_KNOWN = {"Kd", "Ks", "Ns", "Pr", "Pm", "Ni", "sharpness", "Pcr", "anisor", "map_aat"}
+# Others, each with its meaning, and with the number that changes nothing.
+_UNREAD = {
+    "d": ("alpha", 1),
+    "Tr": ("alpha", 0),
+    "Tf": ("transmission", 1),
+    "Ke": ("emission", 0),
+    "Ka": ("ambient colour", math.nan),
+    "Ps": ("sheen", 0),
+    "Pc": ("clearcoat", 0),
+    "aniso": ("anisotropy", 0),
+    "illum": ("", 2),
+}
+# Why a material file is not read.
+_REASONS = ("which does not exist", "outside its folder")
 # Bytes of a material file; 100,000 materials take less.
 _MAX_LIBRARY = 16_000_000
 
@@ -22,69 +42,104 @@ _MAX_LIBRARY = 16_000_000
 def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
     """An OBJ file with an object for each material, named by its number, and the names of its material files.
 
-    The text after ``#`` is part of a material's name, as in ``usemtl Material #25``, and no comment.
+    What is left are statements of positions, normals, faces and those objects, a line for each. Statements of
+    other kinds are told. A backslash at the end of a line continues it, but not in a comment. The text after
+    ``#`` is part of a material's name, as in ``usemtl Material #25``, and no comment.
     """
     numbers = {"": 0}
     libraries = []
+    smooth = False
 
     def replaced(line):
-        keyword, rest = line[1], line[2].decode("utf-8").strip()
-        if keyword == b"mtllib":
+        nonlocal smooth
+        keyword, rest = line[1].decode("utf-8"), line[2].decode("utf-8").strip()
+        smooth |= keyword == "s"
+        if keyword == "mtllib":
             libraries.append(rest)
-        if keyword != b"usemtl":
+        found.tell_names("statements", [keyword], _STATEMENTS)
+        if keyword != "usemtl":
             return b""
         if rest not in numbers:
             numbers[rest] = len(numbers)
             found.names.append(rest)
             found.readers.append(None)
-        return b"o %d" % numbers[rest]
+        return b"o %d\n" % numbers[rest]
 
-    data = re.sub(rb"\\\r?\n", b"", utf8(data))
-    data = re.sub(rb"^[ \t]*(o|usemtl|mtllib)(?![^\s])([^\n]*)", replaced, data, flags=re.MULTILINE)
+    data = plain_text(data, "replace").encode()
+    data = re.sub(rb"^([ \t]*(?:usemtl|mtllib)(?!\S)[^\n]*)|#[^\n]*", _without_comment, data, flags=re.M)
+    data = re.sub(rb"\\[ \t]*\n", b" ", data)
+    data = re.sub(rb"^[^\S\n]*+(?!(?:vn?|f)(?!\S))(\S++)([^\n]*)\n?", replaced, data, flags=re.MULTILINE)
+    # Texture coordinates have gone.
+    data = re.sub(rb"(?<!\S)(-?[0-9]++)/-?[0-9]*+/(-?[0-9]++)(?!\S)", rb"\1//\2", data)
+    data = re.sub(rb"(?<!\S)(-?[0-9]++)/-?[0-9]*+/?+(?!\S)", rb"\1", data)
+    if smooth and re.search(rb"^[ \t]*f[ \t]+[^\s/]+(?!\S)", data, re.MULTILINE):
+        found.tell("smoothing groups (--crease says which edges are sharp)")
     return data, libraries
+
+
+def _without_comment(line: re.Match) -> bytes:
+    name = line[1] or b""
+    return name.rstrip(b"\\") if b"#" in name else name
 
 
 def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None:
     """Find the materials' definitions in the material files; a definition is read if a face uses it."""
     texts = {}
-    for name in dict.fromkeys(libraries):
-        # A name with spaces, or several names.
-        for part in [name] if os.path.isfile(inside(folder, name)) else name.split():
-            target = inside(folder, part)
-            if not os.path.isfile(target):
-                found.ignored.append(f"the material file {shown(part)!r}, which does not exist")
-                continue
-            if target.stat().st_size > _MAX_LIBRARY:
-                raise Refused(
-                    f"its material file {shown(part)!r} is over {_MAX_LIBRARY:,} bytes", "shorten it"
-                )
-            blocks = re.split(
-                r"^[ \t]*newmtl(?!\S)", target.read_text("utf-8-sig", "replace"), flags=re.MULTILINE
+    for target in dict.fromkeys(file for name in libraries for file in _library_files(name, folder, found)):
+        if target.stat().st_size > _MAX_LIBRARY:
+            raise Refused(
+                f"its material file {shown(target.name)!r} is over {_MAX_LIBRARY:,} bytes", "shorten it"
             )
-            for block in blocks[1:]:
-                first, _, text = block.partition("\n")
-                texts.setdefault(first.strip(), text)
+        library = plain_text(target.read_bytes(), "replace")
+        for block in re.split(r"^[ \t]*newmtl(?!\S)", library, flags=re.MULTILINE)[1:]:
+            first, _, text = block.partition("\n")
+            texts.setdefault(first.strip(), text)
     for number, name in enumerate(found.names[1:], 1):
         bare = name.partition(" #")[0].strip()
         text = texts.get(name, texts.get(bare))
-        found.readers[number] = None if text is None else partial(_mtl_material, text, shown(name))
-    if missing := found.readers[1:].count(None):
-        found.ignored.append(f"{missing} material name{'s' * (missing > 1)} without a definition")
+        found.readers[number] = None if text is None else partial(_mtl_material, text, shown(name), found)
+    missing = found.readers[1:].count(None)
+    found.tell("material name without a definition", "material names without a definition", missing)
 
 
-def _mtl_material(text: str, name: str) -> tuple[FileMaterial, int]:
-    """A material of a material file, and how many textures it has.
+def _library_files(name: str, folder: Path, found: Found) -> list[Path]:
+    """Files that a statement names, as a name with spaces, or as several names; others are told."""
+    bare = name.partition(" #")[0].strip()
+    files, told = [], {}
+    for part in dict.fromkeys([name, bare, *bare.split()]):
+        try:
+            target = inside(folder, part)
+        except Refused:
+            told[part] = _REASONS[1]
+            continue
+        if not os.path.isfile(target):
+            told[part] = _REASONS[0]
+        elif part in (name, bare):
+            return [target]
+        else:
+            files.append(target)
+    if name and not files:
+        told = {bare: max(told.values(), key=_REASONS.index)}
+    for part in bare.split() if files else [bare]:
+        if part in told:
+            found.tell(f"the material file {shown(part)!r}, {told[part]}")
+    return files
+
+
+def _mtl_material(text: str, name: str, found: Found) -> FileMaterial:
+    """A material of a material file.
 
     If it has a roughness Pr or a metallic factor Pm, these replace Ks and Ns; a missing Pr is then 1, a
-    missing Pm 0, and a missing Kd white.
+    missing Pm 0, and a missing Kd white. What else changes its look is told.
     """
-    values, textures = {}, 0
-    for line in text.splitlines():
+    values = {}
+    for line in text.split("\n"):
         keyword, *words = line.partition("#")[0].split() or [""]
-        if re.match("map_|norm$|bump$|disp$|decal$|refl$", keyword.lower()):
-            textures += 1
-        elif keyword in ("Kd", "Ks", "Ns", "Pr", "Pm"):
+        if re.match("map_|norm$|bump$|disp$|decal$|refl$", keyword.lower()) and keyword != "map_aat":
+            found.tell("texture", "textures")
+        elif keyword:
             values[keyword] = words
+    found.tell_names("of materials", _unread(values))
     colors = {}
     for keyword in ("Kd", "Ks"):
         if keyword in values:
@@ -101,7 +156,7 @@ def _mtl_material(text: str, name: str) -> tuple[FileMaterial, int]:
         factors[keyword] = number
     if factors.keys() & values.keys():
         base = colors.get("Kd", (1.0, 1.0, 1.0))
-        return FileMaterial.of_metallic_roughness(name, base, *factors.values()), textures
+        return FileMaterial.of_metallic_roughness(name, base, *factors.values())
     exponent = None
     if "Ns" in values:
         number = _float(" ".join(values["Ns"]))
@@ -112,7 +167,25 @@ def _mtl_material(text: str, name: str) -> tuple[FileMaterial, int]:
                 ONE_MATERIAL,
             )
         exponent = max(1, math.floor(number + 0.5))
-    return FileMaterial(name, colors.get("Kd"), colors.get("Ks"), exponent), textures
+    return FileMaterial(name, colors.get("Kd"), colors.get("Ks"), exponent)
+
+
+def _unread(values: dict[str, list[str]]) -> Iterator[str]:
+    """Keywords of a material that change its look and are not read, with what they mean."""
+    for keyword, words in values.items():
+        numbers = [_float(word) for word in words]
+        meaning, neutral = _UNREAD.get(keyword, ("", math.nan))
+        if keyword in _KNOWN or (numbers and all(number == neutral for number in numbers)):
+            continue
+        if keyword == "Tr" and "d" in values:
+            continue
+        if keyword == "illum":
+            # 1 is without a highlight.
+            if numbers == [1] and not any(map(_float, values.get("Ks", ["1"]))):
+                continue
+            yield " ".join([keyword, *words])
+        else:
+            yield f"{meaning} ({keyword})" if meaning else keyword
 
 
 def _float(word: str) -> float:
@@ -136,9 +209,8 @@ def tidy_obj(data: bytes, found: Found) -> bytes:
     Lines that trimesh would read wrongly are refused: numbers in another form than C's, positions with a
     weight other than 1, indices that are 0.
     """
-    data = re.sub(rb"#.*", b"", data)
-    if re.search(rb"^(?:[ \t]++(?:vn?|vt|f)[ \t]|(?:vn?|vt|f)(?:\t| [ \t]))", data, re.MULTILINE):
-        data = re.sub(rb"^[ \t]*(v|vn|vt|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
+    if re.search(rb"^(?:[ \t]++(?:vn?|f)[ \t]|(?:vn?|f)(?:\t| [ \t]))", data, re.MULTILINE):
+        data = re.sub(rb"^[ \t]*(v|vn|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
     if re.search(rb"^vn? (?!%b%b)" % (_THREE, _END), data, re.MULTILINE):
         data = _positions(data, found)
     if re.search(rb"^f(?: +[^\s]+){0,2}[ \t]*\r?$", data, re.MULTILINE):
@@ -155,7 +227,7 @@ def tidy_obj(data: bytes, found: Found) -> bytes:
 
 def _absolute(data: bytes) -> bytes:
     """The text with absolute indices: trimesh counts relative ones from the end of the file."""
-    counts = {b"v": 0, b"vt": 0, b"vn": 0}
+    counts = {b"v": 0, b"": 0, b"vn": 0}
 
     def absolute(corner):
         kinds = zip(counts, corner[0].split(b"/"), strict=False)
@@ -176,7 +248,7 @@ def _absolute(data: bytes) -> bytes:
         counts[line[1]] += 1
         return line[0]
 
-    return re.sub(rb"^(vn|vt|v|f) ([^\n]*)", replaced, data, flags=re.MULTILINE)
+    return re.sub(rb"^(vn|v|f) ([^\n]*)", replaced, data, flags=re.MULTILINE)
 
 
 def _positions(data: bytes, found: Found) -> bytes:
@@ -190,7 +262,7 @@ def _positions(data: bytes, found: Found) -> bytes:
     if re.search(rb"^v %b(?:[ \t]++%b){2}+%b" % (_THREE, _NUMBER, _END), data, re.MULTILINE):
         raise Refused("a position has 5 numbers", "give x y z, and red green blue after them")
     if re.search(rb"^v %b(?:[ \t]++%b){3}" % (_THREE, _NUMBER), data, re.MULTILINE):
-        found.ignored.append("vertex colours")
+        found.tell("vertex colours")
     return re.sub(rb"^(v %b)[^\n]*" % _THREE, rb"\1", data, flags=re.MULTILINE)
 
 

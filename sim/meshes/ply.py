@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from blysk.golden.text import is_wide, plain_text
 from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.polygons import check_corners, triangulated
 from blysk.sim.meshes.refusal import Refused, shown
+from blysk.sim.meshes.strips import strip_triangles
 
 __all__ = ["read_ply"]
 
@@ -18,6 +20,16 @@ _TYPES = {
     **{f"{'u' * (kind[0] == 'u')}int{8 * int(kind[1])}": kind for kind in _KINDS.values()},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
+# Properties that are read, and those that say nothing of the look, or only where textures do.
+_KNOWN = {
+    "vertex": {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "texture_v"}
+    | {"texture_s", "texture_t", "confidence", "intensity", "quality", "value", "flags", "radius"},
+    "face": {"vertex_indices", "vertex_index", "texcoord", "texnumber", "quality", "flags"}
+    | {"nx", "ny", "nz"},
+    "tristrips": {"vertex_indices", "vertex_index"},
+}
+_COLORS = {"red", "green", "blue", "diffuse_red", "diffuse_green", "diffuse_blue", "r", "g", "b"}
+_ALPHA = {"alpha", "diffuse_alpha", "a"}
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -70,6 +82,8 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
         else:
             columns[element.name] = _text(element, rows[start : start + element.rows])
             start += element.rows
+        if element.rows:
+            _tell(element, columns[element.name], found)
     vertex = columns.get("vertex", {})
     if not all(isinstance(vertex.get(name), np.ndarray) for name in "xyz"):
         raise Refused("its vertices have no x, y and z")
@@ -77,18 +91,54 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
     normals = None
     if all(isinstance(vertex.get(name), np.ndarray) for name in ("nx", "ny", "nz")):
         normals = np.column_stack([vertex[name] for name in ("nx", "ny", "nz")]).astype(np.float64)
-    return vertices, normals, _triangles(vertices, columns.get("face", {}))
+    faces = _triangles(vertices, columns.get("face", {}))
+    if "tristrips" in columns:
+        strips = _indices(columns["tristrips"])
+        corners = np.zeros(0, np.int64) if strips is None else _separated(strips)
+        check_corners(corners[corners != -1], len(vertices))
+        faces = np.concatenate([faces, strip_triangles(corners)])
+    return vertices, normals, faces
 
 
-def _triangles(vertices: np.ndarray, face: _Columns) -> np.ndarray:
-    lists = {name: column for name, column in face.items() if isinstance(column, _List)}
+def _tell(element: _Element, columns: _Columns, found: Found) -> None:
+    """Tell an element, or those of its properties, that change the look and are not read."""
+    if element.name not in _KNOWN:
+        found.tell_names("elements", [element.name])
+        return
+    names = {each.name for each in element.properties}
+    if names & _COLORS:
+        found.tell(f"{element.name} colours")
+    for name in names & _ALPHA:
+        values, whole = columns[name], {"u1": 255, "u2": 65535}
+        kind = next(each.kind for each in element.properties if each.name == name)
+        if isinstance(values, _List) or (values != whole.get(kind, 1)).any():
+            found.tell(f"{element.name} alpha")
+    others = sorted(names - _COLORS - _ALPHA)
+    found.tell_names(f"{element.name} properties", others, _KNOWN[element.name])
+
+
+def _indices(columns: _Columns) -> _List | None:
+    """The list of vertices of an element: of the usual name, or the only list."""
+    lists = {name: column for name, column in columns.items() if isinstance(column, _List)}
     name = next((name for name in ("vertex_indices", "vertex_index") if name in lists), None)
     if name is None and len(lists) != 1:
-        return np.zeros((0, 3), dtype=np.int64)
+        return None
     indices = lists[name] if name else next(iter(lists.values()))
     if (indices.values != np.floor(indices.values)).any():
         raise Refused("a face has an index that is no whole number")
-    values = indices.values.astype(np.int64)
+    return _List(indices.values.astype(np.int64), indices.counts)
+
+
+def _separated(strips: _List) -> np.ndarray:
+    """Strips in one array, each with -1 behind it."""
+    return np.insert(strips.values, np.cumsum(strips.counts), -1)
+
+
+def _triangles(vertices: np.ndarray, face: _Columns) -> np.ndarray:
+    indices = _indices(face)
+    if indices is None:
+        return np.zeros((0, 3), dtype=np.int64)
+    values = indices.values
     check_corners(values, len(vertices))
     if (indices.counts < 3).any():
         raise Refused("a face has fewer than 3 corners")
@@ -107,18 +157,22 @@ def _triangles(vertices: np.ndarray, face: _Columns) -> np.ndarray:
 
 def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
     """Byte order (empty for text), the elements, and the rest after the header."""
-    head, mark, body = data.partition(b"end_header")
-    if not mark:
+    if is_wide(data):
+        data = plain_text(data, "replace").encode()
+    # The word stands at the head of a line, and not in a comment.
+    end = re.search(rb"[\r\n][ \t]*+end_header[ \t]*+(?=[\r\n]|\Z)", data)
+    if end is None:
         raise Refused("the PLY header has no end")
     order, elements, textures = None, [], 0
-    lines = head.decode("utf-8", "replace").splitlines()
-    if lines[0].strip() != "ply":
+    head, body = data[: end.start()], data[end.end() :]
+    lines = [line.strip() for line in plain_text(head, "replace").split("\n") if line.strip()] or [""]
+    if lines[0].lower() != "ply":
         raise Refused("it is no PLY file")
     for line in lines[1:]:
         words = line.split()
         # A comment of several lines: some programs forget the word before the second.
         if not words or words[0] not in ("format", "element", "property"):
-            textures += words[:2] == ["comment", "TextureFile"]
+            textures += [word.lower() for word in words[:2]] == ["comment", "texturefile"]
         elif words[0] == "format" and len(words) == 3 and words[1] in _ORDERS and order is None:
             order = _ORDERS[words[1]]
         elif words[0] == "element" and len(words) == 3 and re.fullmatch("[0-9]{1,18}", words[2]):
@@ -133,15 +187,11 @@ def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
         names = [each.name for each in element.properties]
         if len(set(names)) < len(names) or [e.name for e in elements].count(element.name) > 1:
             raise Refused("its header has a name twice")
-        if element.name == "vertex" and {"red", "diffuse_red"}.intersection(names):
-            found.ignored.append("vertex colours")
-    if textures:
-        found.ignored.append("1 texture")
-    for end in (b"\r\n", b"\n", b"\r") if head.startswith(b"ply\r\n") else (b"\n", b"\r"):
-        if (body.lstrip(b" \t") if order == "" else body).startswith(end):
-            return order, elements, body.partition(end)[2]
-    if body.strip():
-        raise Refused("the PLY header has no end")
+    found.tell("texture", "textures", textures)
+    # A file of lone carriage returns may have a line feed as the first byte of its data.
+    for mark in (b"\r\n", b"\n", b"\r") if b"\n" in head else (b"\r", b"\n"):
+        if body.startswith(mark):
+            return order, elements, body.removeprefix(mark)
     return order, elements, b""
 
 

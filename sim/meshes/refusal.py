@@ -1,13 +1,12 @@
 """Shared parts of the readers of mesh files: refusals, names in messages, and files that a file refers to."""
 
-import codecs
 import os
 import re
 from pathlib import Path
 
 from blysk.sim.errors import one_line
 
-__all__ = ["MAX_FACES", "ONE_MATERIAL", "REEXPORT", "Refused", "inside", "shown", "utf8"]
+__all__ = ["MAX_FACES", "ONE_MATERIAL", "REEXPORT", "Refused", "inside", "shown"]
 
 MAX_FACES = 20_000_000
 """Largest number of triangles of a mesh."""
@@ -28,13 +27,6 @@ class Refused(Exception):
 def shown(text: str) -> str:
     """Text of a file for a message: in one line, and at most 60 characters."""
     return one_line(text, 60)
-
-
-def utf8(text: bytes) -> bytes:
-    """A text as valid UTF-8: UTF-16 with a byte order mark is converted, invalid bytes are replaced."""
-    if text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return text.decode("utf-16", "replace").encode()
-    return text.decode("utf-8", "replace").encode()
 
 
 def inside(folder: Path, reference: str, name: str | None = None) -> Path:

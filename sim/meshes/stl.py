@@ -1,24 +1,79 @@
-"""STL files that are cut short, which trimesh would load in part."""
+"""STL files: text and binary."""
 
+import re
 import struct
 
-from blysk.sim.meshes.refusal import Refused, utf8
+import numpy as np
 
-__all__ = ["tidy_stl"]
+from blysk.golden.text import is_wide, plain_text
+from blysk.sim.meshes.materials import Found
+from blysk.sim.meshes.refusal import Refused, shown
+
+__all__ = ["read_stl"]
+
+# First words of lines of a text.
+_KNOWN = {"solid", "endsolid", "facet", "endfacet", "normal", "outer", "loop", "endloop", "vertex", "end"}
 
 
-def tidy_stl(data: bytes) -> bytes:
-    """The bytes of an STL file; `Refused` if it is cut short, where trimesh says at most that it is empty."""
-    if data[:5].lower() == b"solid" and b"\0" not in data:
-        if b"endsolid" not in data.lower():
-            raise Refused("it is cut short: the end of the solid is missing")
-        return utf8(data)
+def read_stl(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices, three a triangle, and triangles of an STL file; facet normals follow from the vertices.
+
+    Raises
+    ------
+    Refused
+        If it is cut short, or a facet of a text has not three vertices of three numbers.
+    """
+    # The count of a binary file holds a byte of 0, unless it is of 17 million triangles.
+    text = is_wide(data) or b"\0" not in data.rstrip(b"\0")
+    if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
+        text = False
+    vertices = _text(data, found) if text else _binary(data, found)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
+
+
+def _text(data: bytes, found: Found) -> np.ndarray:
+    text = plain_text(data, "replace").lower().encode()
+    solids = len(re.findall(rb"^[ \t]*+solid\b", text, re.MULTILINE))
+    if not solids and b"facet" not in text:
+        raise Refused("it is no STL file: a text without solid and facet")
+    if len(re.findall(rb"\bend[ \t]*+solid\b", text)) < max(solids, 1):
+        raise Refused("it is cut short: the end of the solid is missing")
+    # A solid's name may hold any word.
+    text = re.sub(rb"^[ \t]*+(?:end[ \t]*+)?solid\b(?:(?!\bfacet\s)[^\n])*+", b"", text, flags=re.MULTILINE)
+    first_words = re.findall(rb"^[ \t]*+([a-z_]++)", text, re.MULTILINE)
+    found.tell_names("keywords", dict.fromkeys(word.decode() for word in first_words), _KNOWN)
+    words = np.array(re.findall(rb"\b(?:facet|vertex)\b", text), dtype="S6")
+    if len(words) % 4 or not (words.reshape(-1, 4) == [b"facet", b"vertex", b"vertex", b"vertex"]).all():
+        raise Refused("a facet has another number of vertices than 3")
+    numbers = re.findall(rb"\bvertex\s++(\S++)\s++(\S++)\s++(\S++)", text)
+    if re.search(rb"\bvertex\s[^\n]*_", text):
+        raise Refused("a vertex has a number with the character _")
+    try:
+        vertices = np.array(numbers, dtype="S").astype(np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise Refused(f"a vertex holds no number ({shown(str(error))})") from None
+    if 4 * len(vertices) != 3 * len(words):
+        raise Refused("a vertex has fewer than 3 numbers")
+    return vertices
+
+
+def _binary(data: bytes, found: Found) -> np.ndarray:
     if len(data) < 84:
         raise Refused(f"it is cut short: a binary STL has at least 84 bytes, there are {len(data)}")
-    count = struct.unpack_from("<I", data, 80)[0]
-    if len(data) != 84 + 50 * count:
+    (count,) = struct.unpack_from("<I", data, 80)
+    size = 84 + 50 * count
+    if len(data) < size:
         raise Refused(
-            f"its size is wrong: the header says {count} triangles, which take {84 + 50 * count} bytes, "
+            f"its size is wrong: the header says {count} triangles, which take {size} bytes, "
             f"there are {len(data)}"
         )
-    return data
+    found.tell("byte after the last triangle", "bytes after the last triangle", len(data) - size)
+    rows = np.frombuffer(
+        data, [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")], count, 84
+    )
+    found.tell(
+        "attribute that may be a colour", "attributes that may be colours", int((rows["attribute"] > 0).sum())
+    )
+    if re.search(rb"COLOR=|MATERIAL=", data[:80]):
+        found.tell("the colour of its header")
+    return rows["corners"].reshape(-1, 3).astype(np.float64)

@@ -17,6 +17,14 @@ from blysk.sim.meshes.mesh import load_mesh
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+)
+STL = (
+    "solid a vertex 9 9 9\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+    "endloop\nendfacet\nendsolid a vertex\n"
+)
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 

@@ -224,6 +224,7 @@ def test_one_shape_in_two_formats_is_one_picture(first, second, tolerance):
     assert np.abs(frames[0].image - frames[1].image)[both].mean() < tolerance
 
 
+@pytest.mark.filterwarnings("ignore:.* is drawn without:RuntimeWarning")
 @pytest.mark.parametrize("name", FILES)
 def test_picture(name):
     """The golden renderer draws each; it fills a good part of the picture, and stays within its box."""
