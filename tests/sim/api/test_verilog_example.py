@@ -8,6 +8,9 @@ import blysk
 from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.presets import preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.api.design import _descriptions as descriptions_of
+from blysk.sim.api.design import header_of
 from blysk.sim.api.verilog_example import EXPONENT, example_of
 
 
@@ -32,6 +35,20 @@ def test_values_follow_from_the_text(materials):
 
 def test_no_example_of_a_table_that_is_fixed_for_another_exponent():
     assert example_of(preset("chord", "blinn", exponent=20)) == []
+
+
+@pytest.mark.parametrize("method", ["chord", "linear", "renormalise"])
+def test_normals_are_described_as_they_are(method):
+    """The ends of a true line are no unit vectors, and no port of theirs is said to have one."""
+    unit = ShadingPipelineUnit(preset(method, "cosquad"))
+    (line,) = (line for line in header_of(unit) if line.startswith("i_normal_*"))
+    texts = [text for port, text in descriptions_of(unit, 1).items() if port.startswith("i_normal")]
+    assert len(texts) == (3 if method == "chord" else 2)
+    if method == "renormalise":
+        assert "N/W" in line
+        assert not any("unit" in text or "2^17" in text for text in (line, *texts))
+    else:
+        assert "unit vectors" in line
 
 
 @pytest.mark.long
