@@ -197,4 +197,4 @@ def test_wheel_renders_with_the_oldest_versions(wheel, tmp_path):
     done = subprocess.run([python.with_name("blysk"), "fpga"], capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("blysk: fpga: ")
-    assert done.stderr.endswith("pip install 'blysk[fpga]'\n")
+    assert done.stderr.endswith(f" -m pip install 'blysk[fpga] @ {Path(wheel).as_uri()}'\n")

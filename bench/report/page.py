@@ -11,6 +11,7 @@ from typing import Any
 
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
 
 __all__ = [
     "AXES",
@@ -125,7 +126,7 @@ def without_pictures(value: Any) -> Any:
 
 
 def _missing(name: str) -> InputError:
-    return InputError("bench", f"{name} is not installed", "pip install 'blysk[report]'")
+    return InputError("bench", f"{name} is not installed", install_extra("report"))
 
 
 @functools.cache

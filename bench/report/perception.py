@@ -6,6 +6,7 @@ from types import ModuleType
 import numpy as np
 
 from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
 
 __all__ = [
     "CIEDE2000_MAX",
@@ -50,7 +51,7 @@ def _flip() -> ModuleType:
     try:
         import flip_evaluator
     except ImportError:
-        raise InputError("FLIP", "flip-evaluator is not installed", "pip install 'blysk[report]'") from None
+        raise InputError("FLIP", "flip-evaluator is not installed", install_extra("report")) from None
     return flip_evaluator
 
 
@@ -58,9 +59,7 @@ def _color() -> ModuleType:
     try:
         from skimage import color
     except ImportError:
-        raise InputError(
-            "CIEDE2000", "scikit-image is not installed", "pip install 'blysk[report]'"
-        ) from None
+        raise InputError("CIEDE2000", "scikit-image is not installed", install_extra("report")) from None
     return color
 
 

@@ -12,6 +12,7 @@ from blysk.bench.tools.place_and_route import SEEDS, lay_out, tool_versions
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.installation import install_extra
 
 __all__ = ["measure", "section", "task", "tasks"]
 
@@ -50,7 +51,7 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
     """
     design = ShadingPipelineUnit(preset(method, model))
     if None in tools.values():
-        return {"reason": "place and route is not installed: pip install 'blysk[fpga]'"}
+        return {"reason": f"place and route is not installed: {install_extra('fpga')}"}
     try:
         return lay_out(method, design, seeds, family=FAMILIES[family]).as_dict()
     except TooLarge as error:
@@ -162,7 +163,7 @@ def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[
     missing = [package for package, version in versions.items() if version is None]
     if missing:
         return (
-            f"{device}: not measured, {' and '.join(missing)} not installed. `pip install 'blysk[fpga]'` "
+            f"{device}: not measured, {' and '.join(missing)} not installed. `{install_extra('fpga')}` "
             "brings what is needed; the next report then has the table."
         ), None
     rows: list[tuple[Cell, ...]] = [

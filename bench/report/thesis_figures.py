@@ -21,6 +21,7 @@ from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.installation import install_extra
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = [
@@ -170,7 +171,7 @@ def clock_rate(name: str, seeds: int, tools: dict[str, str | None]) -> dict[str,
         ``fmax``: median clock rate in MHz, or ``None`` with the ``reason``.
     """
     if None in tools.values():
-        return {"fmax": None, "reason": "place and route is not installed: pip install 'blysk[fpga]'"}
+        return {"fmax": None, "reason": f"place and route is not installed: {install_extra('fpga')}"}
     try:
         layout = lay_out(name, _entry(name).variant.unit(), seeds)
     except TooLarge as error:

@@ -23,6 +23,7 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import Frame, render
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.workers import local_executor
+from blysk.sim.installation import install_extra
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["LARGEST_MEMORY", "LONGEST_SECONDS", "Timing", "main", "scene_for", "timed", "vtk_image"]
@@ -251,7 +252,7 @@ def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeat
     try:
         draw, name = vtk_image(scene)
     except ModuleNotFoundError as error:
-        print(f"{error.name} is not installed; install blysk[bench] to compare with VTK")
+        print(f"{error.name} is not installed; {install_extra('bench')} to compare with VTK")
         return 1
     peer, drawn = timed(draw, repeats)
     print(f"VTK ({name}): {peer.wall:.3f} s, {peer.cpu:.3f} s of processor time, mesh already loaded")

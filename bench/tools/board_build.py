@@ -19,6 +19,7 @@ from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS
 from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner
 from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
 
 __all__ = [
     "BOARDS",
@@ -31,7 +32,7 @@ __all__ = [
     "refuse_too_large",
 ]
 
-_REMEDY = "pip install 'blysk[board]'"
+_REMEDY = install_extra("board")
 
 PERIODS = 1
 """Periods of the reader's clock that a path between two clocks may take; crossing words stay longer."""

@@ -24,6 +24,7 @@ from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell,
 from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner
 from blysk.sim.engines.cache import cache_folder, version_of
 from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
 from blysk.sim.output import write_json
 
 __all__ = [
@@ -46,7 +47,7 @@ __all__ = [
 
 SEEDS = 5
 
-_REMEDY = "pip install 'blysk[fpga]'"
+_REMEDY = install_extra("fpga")
 
 # Names of registers stay: cells are named by them. Amaranth's other names are aliases, of which abc9 makes
 # two cells of one name.

@@ -46,6 +46,7 @@ from blysk.golden.presets import LOBES, MODELS
 from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
+from blysk.sim.installation import install_extra
 from blysk.sim.output import atomic_writer, files_within, write_json, write_text
 from blysk.sim.value_types import Whole
 
@@ -75,7 +76,7 @@ def _missing() -> None:
     """Refuse to begin without the packages of the extra ``web``."""
     for name in _EXTRAS:
         if importlib.util.find_spec(name) is None:
-            raise InputError("web", f"{name} is not installed", "pip install 'blysk[web]'")
+            raise InputError("web", f"{name} is not installed", install_extra("web"))
 
 
 def _read(name: str) -> str:

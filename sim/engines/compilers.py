@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 from blysk.hdl.emit.processes import run_program
 from blysk.sim.engines.engine import CompilerMissing
+from blysk.sim.installation import install_extra
 
 __all__ = ["Compiler", "compiler_missing", "find_compilers"]
 
 # A model is one long function over thousands of members. GCC's search for redundant loads and dead stores
 # among them takes half of the compile time, and finds so few that the model runs as fast without it.
 _GCC_FLAGS = ("-fno-gcse", "-fno-tree-dse", "--param", "sccvn-max-alias-queries-per-access=50")
-_REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
+_REMEDY = f"install one, or {install_extra('native')}, or use the engine pysim"
 
 
 @dataclass(frozen=True)

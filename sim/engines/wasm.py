@@ -22,6 +22,7 @@ from blysk.hdl.emit.processes import run_program
 from blysk.sim.engines.beats import word_count
 from blysk.sim.engines.cxxrtl import runtime_folder, sources_of
 from blysk.sim.engines.engine import CompilerMissing, Ports, SimulationError
+from blysk.sim.installation import install_extra
 
 __all__ = ["build", "fields_of", "format_of", "ports_of"]
 
@@ -53,7 +54,7 @@ def build(component: Component) -> bytes:
     if ports.constants is not None or ports.status is None or ports.write is None:
         raise ValueError("a module has the streams i, o and write, a status, and no constants")
     if importlib.util.find_spec("ziglang") is None:
-        raise CompilerMissing("ziglang is not installed: pip install 'blysk[web]'")
+        raise CompilerMissing(f"ziglang is not installed: {install_extra('web')}")
     model, driver = sources_of(component)
     tail = resources.files(__package__).joinpath("wasm_driver.cc").read_text(encoding="utf-8")
     zig = [sys.executable, "-m", "ziglang"]

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from blysk.sim.engines.cache import cache_folder
 from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -129,7 +130,7 @@ def check_address(address: str) -> None:
     if not re.fullmatch(r"((tcp|tls|wss?)://)?([^\s/:@\[\]]+|\[[0-9a-fA-F:.%]+\]):[0-9]{1,5}", address):
         raise InputError(option, "not the address of a Dask scheduler", _START)
     if importlib.util.find_spec("distributed") is None:
-        raise InputError(option, "Dask is not installed", "pip install 'blysk[cluster]'")
+        raise InputError(option, "Dask is not installed", install_extra("cluster"))
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from blysk.golden.text import plain_text
+from blysk.sim.installation import install_extra
 from blysk.sim.meshes.gltf_arrays import MESHOPT, check_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found, color_of
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused, shown
@@ -110,7 +111,7 @@ def check_gltf(document: dict) -> None:
                 if importlib.util.find_spec("DracoPy") is None:
                     raise Refused(
                         "it is Draco-compressed and the decoder DracoPy is not installed",
-                        "pip install 'blysk[draco]'",
+                        install_extra("draco"),
                     )
 
 

@@ -11,6 +11,8 @@ from amaranth.back import rtlil
 from amaranth.hdl import Assert, Assume, DomainRenamer, Fragment, Module, ShapeLike, Signal, Value, ValueLike
 from amaranth.lib.wiring import Component, In
 
+from blysk.sim.installation import install_extra
+
 __all__ = ["Harness", "Verdict", "decide", "missing_tool"]
 
 _YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
@@ -137,7 +139,7 @@ class Verdict:
 
 def missing_tool() -> str:
     """Why nothing can be proved here; empty if it can."""
-    return "" if find_spec("pyosys") else "pyosys is not installed: pip install 'blysk[fpga]'"
+    return "" if find_spec("pyosys") else f"pyosys is not installed: {install_extra('fpga')}"
 
 
 def _run_yosys(script: str, folder: Path) -> None:

@@ -17,6 +17,7 @@ from blysk.bench.report.report import SECTIONS, about, check_folder, command, wr
 from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task
 from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
 
 from ..reader import Reader
 
@@ -261,7 +262,7 @@ def test_missing_library_is_named_before_the_work(run, tmp_path, monkeypatch, un
         monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr(report, "results_of", lambda *_: pytest.fail("work was begun"))
     result = run(tmp_path / "report")
-    assert str(result.exception) == f"bench: {module} is not installed; pip install 'blysk[report]'"
+    assert str(result.exception) == f"bench: {module} is not installed; {install_extra('report')}"
     environment.cache_clear()
 
 

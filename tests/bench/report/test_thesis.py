@@ -30,6 +30,7 @@ from blysk.bench.speed.renderer import Timing
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.renderer import render
+from blysk.sim.installation import install_extra
 from blysk.sim.meshes.teapot import teapot
 
 LEFT, RIGHT, VECTORS = thesis_ways.random_operands()
@@ -176,7 +177,7 @@ def test_units_are_in_the_table():
 def test_without_place_and_route(monkeypatch):
     found = clock_rate("forward differences", 1, {"pyosys": None})
     assert found["fmax"] is None
-    assert "pip install" in found["reason"]
+    assert install_extra("fpga") in found["reason"]
 
     def refused(name, unit, seeds):
         # A unit that nothing elaborates gives a warning.

@@ -7,6 +7,7 @@ import pytest
 from blysk.bench.speed import renderer
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
+from blysk.sim.installation import install_extra
 
 
 def test_vtk_draws_the_same_picture():
@@ -61,7 +62,7 @@ def test_without_vtk(monkeypatch, capsys):
 
     monkeypatch.setattr(renderer, "vtk_image", missing)
     assert renderer.main(triangles=100, width=16, height=12, repeats=1) == 1
-    assert "vtkmodules is not installed; install blysk[bench]" in capsys.readouterr().out
+    assert f"vtkmodules is not installed; {install_extra('bench')}" in capsys.readouterr().out
 
 
 def test_fastest_run_counts(monkeypatch):

@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from blysk.bench.speed import web_speed
+from blysk.sim.installation import install_package
 
 
 @pytest.fixture
@@ -29,7 +30,7 @@ def test_help(capsys):
             ["{0}", "chord-exp", "chord-exq"],
             "chord-exq: is no module of {0}; choose from chord-exp, linear-exp",
         ),
-        (["{0}"], "browser: playwright is not installed; pip install playwright"),
+        (["{0}"], f"browser: playwright is not installed; {install_package('playwright')}"),
     ],
     ids=["no site", "no module", "no playwright"],
 )

@@ -18,6 +18,7 @@ from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import RenderUnit
 from blysk.sim.cli.main import main
+from blysk.sim.installation import install_extra
 
 from ...sim.cli.commandline import PROGRAM, wait
 from .test_place_and_route import tools
@@ -200,7 +201,7 @@ def test_missing_tools_are_one_line_that_names_the_extra(which, family, refused,
     missing = [("pyosys", FAMILIES[family].package)[k] for k in which]
     monkeypatch.setattr(place_and_route, "version_of", lambda package: None if package in missing else "1")
     text = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not installed"
-    refused("fpga", "--unit", "gpq", "--family", family, line=f"fpga: {text}; pip install 'blysk[fpga]'\n")
+    refused("fpga", "--unit", "gpq", "--family", family, line=f"fpga: {text}; {install_extra('fpga')}\n")
 
 
 @pytest.mark.long

@@ -11,8 +11,9 @@ from amaranth.lib import stream
 from amaranth.lib.wiring import Component, In, Out
 
 from blysk.sim.engines.simulate import simulate
+from blysk.sim.installation import install_extra
 
-REMEDY = "install one, or pip install 'blysk[native]', or use the engine pysim"
+REMEDY = f"install one, or {install_extra('native')}, or use the engine pysim"
 
 
 class Scale(Component):

@@ -1,10 +1,11 @@
 # amaranth: UnusedElaboratable=no
 """WebAssembly modules: the same beats on the same cycles as the other engines."""
 
-from dataclasses import replace
+from dataclasses import re
 
 import numpy as np
 import pytest
+import replace
 from amaranth.hdl import Module, unsigned
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
@@ -20,6 +21,7 @@ from blysk.sim.engines.beats import pack, unpack
 from blysk.sim.engines.engine import CompilerMissing, SimulationError, Stimulus, StopReason
 from blysk.sim.engines.pysim import Model
 from blysk.sim.frames.frame import beats_of
+from blysk.sim.installation import install_extra
 
 wasmtime = pytest.importorskip("wasmtime", reason="wasmtime is not installed")
 
@@ -206,7 +208,7 @@ def test_needs_writes_and_a_status():
 
 def test_compiler_missing(uninstalled, component):
     uninstalled("ziglang")
-    with pytest.raises(CompilerMissing, match=r"ziglang is not installed: pip install 'blysk\[web\]'"):
+    with pytest.raises(CompilerMissing, match=re.escape(f"ziglang is not installed: {install_extra('web')}")):
         wasm.build(component)
 
 

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 from blysk.sim.engines.cache import cache_folder
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
+from blysk.sim.installation import install_extra
 
 
 def test_processors():
@@ -82,7 +84,7 @@ def test_no_address(address):
 
 def test_without_dask(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name, *rest: None)
-    with pytest.raises(InputError, match=r"Dask is not installed; pip install 'blysk\[cluster\]'"):
+    with pytest.raises(InputError, match=re.escape(f"Dask is not installed; {install_extra('cluster')}")):
         check_address("tcp://127.0.0.1:8786")
 
 

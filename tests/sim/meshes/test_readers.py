@@ -9,6 +9,7 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from blysk.sim.installation import install_extra
 from blysk.sim.meshes.mesh import SUFFIXES, load_mesh
 
 from .files import (
@@ -163,7 +164,7 @@ def test_gltf_mesh_without_data(tmp_path):
 
 def test_draco_without_its_decoder(tmp_path, uninstalled):
     uninstalled("DracoPy")
-    reason = "the decoder DracoPy is not installed; pip install 'blysk[draco]'"
+    reason = f"the decoder DracoPy is not installed; {install_extra('draco')}"
     check_refused(tmp_path / "a.glb", reason, content=draco_gltf())
 
 
