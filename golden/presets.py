@@ -18,7 +18,7 @@ from blysk.golden.methods import (
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
 from blysk.golden.pipeline import Build, Design
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
-from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS, ReflectionModel
+from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS, ReflectionModel
 
 __all__ = ["LOBES", "METHODS", "METHOD_LINES", "MODELS", "MODEL_LINES", "PUBLISHED", "preset"]
 
@@ -74,7 +74,6 @@ MODEL_LINES: dict[str, str] = {
     **{lobe.name: f"{lobe.model.summary}, from a table" for lobe in LOBES.values()},
     **{name: unit.model.summary for name, unit in MODELS.items()},
     "blinn_product": f"{BLINN.summary}, by repeated squaring",
-    PHONG.name: f"{PHONG.summary}; not every method serves it",
 }
 """A line about each reflection model, for the help of the command line."""
 

@@ -14,7 +14,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
 from blysk.golden.pixel_pipelines import PixelPipelines
-from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED, preset
+from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import BusUnit
@@ -106,10 +106,6 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         If there is no such pipeline.
     """
     method = settings["method"]
-    served = MODELS | LOBES
-    if isinstance(settings["model"], str) and settings["model"] not in served:
-        remedy = f"use one of {', '.join(served)}"
-        raise settings.refuse("model", "the pipeline finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:
         raise settings.refuse("gate", f"{method} has no error bound for one", "leave it out", "")
     options: dict[str, Any] = {name: settings[name] for name in DESIGN if name not in ("method", "model")}

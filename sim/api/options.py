@@ -19,7 +19,7 @@ from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Triple
 from blysk.golden.reference.lobes import TabulatedModel
-from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.reflection import PHONG
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
 from blysk.sim.meshes.mesh import DEFAULT_CREASE, DEFAULT_TRIANGLES
 from blysk.sim.meshes.teapot import MAX_TRIANGLES, MIN_TRIANGLES
@@ -95,11 +95,17 @@ class PartError(ValueError):
         self.key, self.remedy = key, remedy
 
 
+_INSTEAD_OF_PHONG = (
+    "use phong_coplanar, equal where N, L and V lie in a plane, elsewhere with rounder highlights, 11 LSB "
+    "off on the default teapot"
+)
+
+
 class Model(Choice):
     """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
 
     def __init__(self):
-        super().__init__("reflection model", REFLECTION_MODELS | LOBES | MODELS)
+        super().__init__("reflection model", LOBES | MODELS)
         self.points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
         self.remedy = f"{self.points}, or {self.remedy}"
 
@@ -111,6 +117,8 @@ class Model(Choice):
         """The name; or the curve of a file."""
         if isinstance(value, TabulatedModel):
             return value
+        if value == PHONG.name:
+            raise PartError("", "phong is (R.V)^n, and the pipelines find N.H, not R.V", _INSTEAD_OF_PHONG)
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
             return super().check(value)
         try:
@@ -318,7 +326,7 @@ DESIGN: dict[str, Option] = {
     "model": Option(
         Model(),
         "blinn",
-        "Reflection model; every method serves all but phong. A file holds a curve of N.H, measured.",
+        "Reflection model; every method serves each. A file holds a curve of N.H, measured.",
         "pipeline.model",
     ),
     "operand": Option(

@@ -7,7 +7,7 @@ from blysk.golden.presets import LOBES, METHOD_LINES, METHODS, MODEL_LINES, MODE
 
 def test_every_name_has_a_line():
     assert list(METHOD_LINES) == [*METHODS, *PUBLISHED]
-    assert set(MODEL_LINES) == {*MODELS, *LOBES, "phong"}
+    assert set(MODEL_LINES) == {*MODELS, *LOBES}
     for name, line in (METHOD_LINES | MODEL_LINES).items():
         assert line, name
         assert len(line) <= 80, name

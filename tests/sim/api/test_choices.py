@@ -1,0 +1,73 @@
+"""Every value that an option offers is taken in some combination with the others."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import blysk
+from blysk.golden.reference.lobes import COPLANAR_PHONG
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import PHONG
+from blysk.golden.reference.renderer import render
+from blysk.sim.api import options
+from blysk.sim.api import render as rendering
+from blysk.sim.errors import InputError, OptionError
+from blysk.sim.value_types import Choice, Few, Truth
+
+
+def offered(option):
+    """Values that an option's help lists; of a range and of free forms none."""
+    kind = option.kind
+    if isinstance(kind, Choice):
+        return kind.names
+    if isinstance(kind, Few):
+        return kind.numbers
+    return (False, True) if isinstance(kind, Truth) else ()
+
+
+def accepted(settings):
+    """Whether a rendering is prepared up to the model; refusals come before it."""
+    try:
+        read = rendering.rendering_settings("teapot", {"size": (16, 12), "triangles": 220, **settings})
+        made = rendering._design(read)
+        rendering._check_geometry(read, made)
+    except OptionError:
+        return False
+    return True
+
+
+def test_no_choice_of_a_rendering_is_always_refused():
+    table = options.DESIGN | options.RENDERING
+    choices = {name: offered(option) for name, option in table.items() if offered(option)}
+    assert {"method", "model", "operand", "gate", "style", "geometry", "pipes", "setups"} <= choices.keys()
+    taken = set()
+    crossed = ("method", "model", "gate", "geometry", "style")
+    for values in itertools.product(*(choices[name] for name in crossed)):
+        settings = dict(zip(crossed, values, strict=True))
+        # A pair that is taken once needs no further try.
+        pairs = set(itertools.combinations(settings.items(), 2))
+        if not pairs <= taken and accepted(settings):
+            taken |= pairs
+    for method in choices["method"]:
+        for model in choices["model"]:
+            assert (("method", method), ("model", model)) in taken
+    single = {pair for pairs in taken for pair in pairs}
+    for name in choices.keys() - {*crossed}:
+        for value in choices[name]:
+            needs = ({}, {"geometry": "hardware"}, {"specialise": True}, {"method": "linear"})
+            if any(accepted({name: value, **others}) for others in needs):
+                single.add((name, value))
+    missing = [(name, value) for name, of in choices.items() for value in of if (name, value) not in single]
+    assert not missing
+
+
+@pytest.mark.parametrize("given", [{"model": "phong"}, {"model": "phong", "method": "linear"}])
+def test_phong_is_refused_with_the_model_that_is_near_it(given):
+    with pytest.raises(InputError, match=r"^model: .* find N\.H, not R\.V; use phong_coplanar, .* 11 LSB"):
+        blysk.design(**given)
+    # The figure of that line: exact against exact, the default scene.
+    scene = blysk.scene("teapot")
+    raster = rasterise(scene)
+    pair = (render(scene, "phong", model, raster).image for model in (PHONG, COPLANAR_PHONG))
+    assert round(255 * np.abs(np.subtract(*pair)).max()) == 11
