@@ -20,7 +20,7 @@ from blysk.bench.report.perception import (
 )
 from blysk.bench.speed.cycle_model import frame_cycles, unit_of
 from blysk.bench.speed.renderer import timed
-from blysk.golden.frames.compare import method_in_float64
+from blysk.golden.frames.compare import border_mask, method_in_float64
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.methods.interpolator import Operand
@@ -172,7 +172,8 @@ def frames(
     -------
     list of dict
         For each exponent ``settings``, ``errors`` (keys of `ERRORS`; no PSNR of equal images), ``verdicts``
-        (whether both images look identical, by kind of error), ``pictures`` (see `section`), shaded
+        (whether both images look identical, by kind of error), ``border`` (see `border_mask`: its
+        ``pixels`` and ``lsb``, their largest total error), ``pictures`` (see `section`), shaded
         ``pixels``, ``shown`` pixels, ``spans``, ``out_of_range_spans``, ``cycles`` (``None`` if not
         simulated) and ``modelled_cycles``, by `frame_cycles`.
     """
@@ -269,6 +270,8 @@ def _judged(
         "method": (image, golden),
         "total": (image, exact.image),
     }
+    border = border_mask(scene, raster, (MODELS | LOBES)[model].model)
+    at_border = np.abs(image[border] - 255 * exact.image[border])
     values, verdicts = {}, {}
     for kind, (shown, reference) in pairs.items():
         figures = error_figures(shown, reference * 255, exact.mask)
@@ -279,6 +282,7 @@ def _judged(
     return {
         "errors": {key: value if math.isfinite(value) else None for key, value in values.items()},
         "verdicts": verdicts,
+        "border": {"pixels": int(np.count_nonzero(border)), "lsb": float(at_border.max(initial=0))},
         "pictures": _pictures(image, {"error": golden, "total": exact.image}, exact.mask),
         "shown": int(np.count_nonzero(exact.mask)),
     }

@@ -98,8 +98,8 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
     best = next((of for of in on_front if of["total_error"][1] <= 1), on_front[-1])
     scenes = max(of["samples"] for of in timed)
     sentence = (
-        f"**`{best['label']}`** shades a pixel in {best['cycles'][1]:.2f} cycles and is never more than "
-        f"{best['total_error'][1]:.2f} LSB from exact Blinn shading, over {scenes} scenes, with "
+        f"**`{best['label']}`** shades a pixel in {best['cycles'][1]:.2f} cycles; its largest error "
+        f"against exact Blinn shading, found on {scenes} scenes, is {best['total_error'][1]:.2f} LSB, with "
         f"{_costs(best)}. "
         f"None of the "
         f"other {len(timed) - 1} designs is both as fast and as exact"
@@ -178,7 +178,7 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
     figure, axes = panels(9.2, 4.4, 2, sharex=True, sharey=True)
     kinds = (
         ("method_error", "method error: the same model, exact normals"),
-        ("total_error", "total error: exact Blinn"),
+        ("total_error", "total error: Blinn's power, exact normals"),
     )
     for panel, (kind, title) in zip(axes, kinds, strict=True):
         panel.set(xscale="log", yscale="log")

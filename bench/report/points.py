@@ -201,6 +201,7 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
                     "command": _command(settings),
                     "errors": found["errors"],
                     "verdicts": found["verdicts"],
+                    "border": found["border"],
                     "times": {
                         "cycles_per_pixel": cycles,
                         "ns_per_pixel": None if None in (cycles, fmax) else cycles * 1e3 / fmax,

@@ -19,6 +19,7 @@ from blysk.bench.report.perception import (
 )
 from blysk.bench.report.section import Cell, Grade, Table
 from blysk.bench.tools.families import DEVICE
+from blysk.golden.frames.compare import BORDER
 
 __all__ = [
     "front",
@@ -152,6 +153,13 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
                 f" {title}: `{best['label']}`, {speed}, largest total error "
                 f"{errors['total_max_lsb']:.1f} LSB, method error {errors['method_max_lsb']:.2f}."
             )
+    border = max((point["border"] for point in hardware), key=itemgetter("pixels"), default=None)
+    if border and border["pixels"]:
+        most = max(point["border"]["lsb"] for point in hardware)
+        text += (
+            f" All pixels count, also {border['pixels']:,} with |N·L| at most {BORDER:g}, where a light "
+            f"begins and rounding may switch it: the largest total error of a design there is {most:.1f} LSB."
+        )
     return text
 
 

@@ -23,7 +23,7 @@ from tqdm import tqdm
 from blysk.bench.tools.board_build import Board, Built, board_named, build, packages_missing
 from blysk.bench.tools.board_design import COLOURS, OPTIONS, BoardTop, gpu_of, least_cycles
 from blysk.bench.tools.tool_runner import ToolError
-from blysk.golden.frames.compare import compare_image
+from blysk.golden.frames.compare import BORDER, compare_image
 from blysk.golden.gpu import Gpu
 from blysk.golden.reference.scene import Scene
 from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
@@ -35,7 +35,7 @@ from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.errors import InputError
 from blysk.sim.frames.display import OneClock, Shown, show
-from blysk.sim.frames.figures import ERRORS
+from blysk.sim.frames.figures import reference_of
 from blysk.sim.frames.picture import check_image_path, write_image
 from blysk.sim.installation import install_package
 from blysk.sim.output import atomic_writer, check_writable, write_json
@@ -303,10 +303,11 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
     figures = compare_image(exact, gpu.drawing.renderer.design, shown.frames[0])
     for kind, error in (("method", figures.method_error), ("total", figures.total_error)):
         yield (
-            f"{'error':<12}{kind:<7} {error.max_lsb:.2f} LSB at most, {error.p999_lsb:.2f} at 99.9 %, "
-            f"{error.psnr_db:.1f} dB, against {ERRORS[kind]}"
+            f"{'error':<12}{kind:<7} largest {error.max_lsb:.2f} LSB, {error.p999_lsb:.2f} at 99.9 %, "
+            f"{error.psnr_db:.1f} dB, against {reference_of(kind, figures.target)}"
         )
-    yield f"{'':<12}of the first frame, {figures.visible_pixels:,} pixels"
+    at_border = f"{figures.border_pixels:,} of them with {figures.border} at most {BORDER:g}"
+    yield f"{'':<12}of the first frame, {figures.visible_pixels:,} pixels, {at_border}"
 
 
 def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:

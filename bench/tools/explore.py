@@ -126,14 +126,14 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "polynomial is for narrower ones."
         )
     for given, which in (
-        (False, "The cheapest within 1 LSB of exact normals"),
+        (False, "The cheapest with an error of 1 LSB or less against exact normals in this scene"),
         (True, "The cheapest that is given values of each light with a span, and counts none of that work,"),
     ):
         those = [designs[k] for k in best if designs[k].candidate.design.takes_values == given]
         if those:
             text.append(
-                f"{which} takes {those[0].costs['cells']:,} cells and is off by "
-                f"{those[0].errors['method']['max_lsb']:.2f} LSB at most: `{those[0].candidate.command}`."
+                f"{which} takes {those[0].costs['cells']:,} cells; its largest error here is "
+                f"{those[0].errors['method']['max_lsb']:.2f} LSB: `{those[0].candidate.command}`."
             )
     rows = [
         (
@@ -154,7 +154,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     )
     note = (
         "Errors: arithmetic, against the same method and model in float64; method, against exactly "
-        "normalised interpolation with the same model; total, against the exact Blinn frame. Cycles a pixel "
+        "normalised interpolation with the same model; total, against exact normals with Blinn's power, for "
+        "a lobe with its own model. Cycles a pixel "
         "are what the units state for these spans: a frame takes fewer where long spans pay for short ones "
         "or pixels lack terms; bisection states none for spans that it divides. A cell is an operator of any "
         "width, a multiplier, too: the compact style has fewer multipliers and, with what shares them, often "
@@ -300,7 +301,7 @@ _USUAL = Sweep()
     default="method",
     show_default=True,
     help="Against the same method and model in float64, exact normals of every pixel with the same "
-    "model, or the exact Blinn frame.",
+    "model, or exact normals with Blinn's power, of a lobe with its own model.",
 )
 @click.option(
     "--cost", type=Choice("cost", COSTS), default="cells", show_default=True, help="What is to be little."

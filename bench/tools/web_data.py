@@ -126,8 +126,9 @@ REFERENCES = {
         "model": None,
     },
     "total": {
-        "title": "exact normals, Blinn's power",
-        "text": "The exact normal of every pixel, with the power that the reflection model stands for.",
+        "title": "exact normals, exact model",
+        "text": "The exact normal of every pixel, with the model that the design stands for: Blinn's power, "
+        "or ggx for ggx.",
         "curve": "exact",
         "model": "blinn",
     },

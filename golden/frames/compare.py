@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from time import perf_counter
 from typing import Any
 
@@ -10,43 +10,88 @@ import numpy as np
 
 from blysk.golden.frames.frame import Frame
 from blysk.golden.frames.local import line_ends, local_operands
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
+from blysk.golden.reference.lighting import distant_cosine, halfway_vector
+from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
-from blysk.golden.reference.raster import Raster, rasterise
+from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
-from blysk.golden.reference.renderer import render, shade_operands, shade_spans, visible_mask
+from blysk.golden.reference.renderer import (
+    fragment_positions,
+    render,
+    shade_operands,
+    shade_spans,
+    visible_mask,
+)
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["Comparison", "compare", "compare_image", "method_in_float64"]
+__all__ = [
+    "BORDER",
+    "Comparison",
+    "FrameErrors",
+    "border_mask",
+    "compare",
+    "compare_image",
+    "error_bound",
+    "has_step",
+    "method_in_float64",
+    "target_of",
+]
+
+BORDER = 0.002
+"""Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off."""
+
+_BOUNDED = ("chord", "chord-local", "renormalise")
+"""Methods whose spans are cut, or need no cut, so that `error_bound` holds."""
+
+
+@dataclass(frozen=True)
+class FrameErrors(ErrorFigures):
+    """Errors of a frame: `ErrorFigures` of all shown pixels, and the largest error off and at the border.
+
+    Parameters
+    ----------
+    max_lsb, p999_lsb, rmse_lsb, psnr_db : float
+        See `ErrorFigures`.
+    steady_lsb : float
+        Largest error of the pixels off the border of every light, see `border_mask`; 0 without any.
+    border_lsb : float
+        Largest error of the pixels at a border; 0 without any.
+    """
+
+    steady_lsb: float
+    border_lsb: float
 
 
 @dataclass(frozen=True)
 class Comparison:
     """Errors of a frame over the pixels that show the surface.
 
-    Errors are in proportion to the brightness c of the light: the sum over the lights of colour times diffuse
-    and specular reflection, in the largest channel, where 1 is the full channel. With the methods ``chord``,
-    ``chord-local`` and ``renormalise``, and where N·L is not within rounding of 0::
-
-        arithmetic_error <= 1/2 + c/16        method_error <= 1/2 + c/16 + c/4       (LSB)
-
-    The half is the rounding of the pixel, the quarter is the tolerance by which spans are cut, and the
-    sixteenth holds the rounding of operands and terms.
+    Off the border of every light the method error has a bound, see `error_bound`.
 
     Parameters
     ----------
     golden : float64 array, shape (height, width, 3)
         The exact frame with the frame's model, in [0, 1]: per-pixel normals, perspective-correct and
         normalised, of the triangles as rasterised.
-    arithmetic_error : ErrorFigures
+    arithmetic_error : FrameErrors
         Against the same method and model in float64; NaN where the spans are not known.
-    method_error : ErrorFigures
+    method_error : FrameErrors
         Against ``golden``.
-    total_error : ErrorFigures
-        Against the exact frame with Blinn's model, or with the model of a lobe's table.
+    total_error : FrameErrors
+        Against the exact frame with the model ``target``.
+    target : str
+        Name of that model, see `target_of`.
+    bound_lsb : float or None
+        Bound of ``method_error.steady_lsb``, see `error_bound`; ``None`` where the spans are not known.
     visible_pixels : int
         Pixels that show the surface.
+    border : str
+        The cosines that are near 0 at a border: ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see `has_step`.
+    border_pixels : int
+        Pixels of these at the border of a light.
     nmse : float
         Normalised mean squared error against the exact frame.
     mnse_published, mnse_published_share : float
@@ -56,10 +101,14 @@ class Comparison:
     """
 
     golden: np.ndarray
-    arithmetic_error: ErrorFigures
-    method_error: ErrorFigures
-    total_error: ErrorFigures
+    arithmetic_error: FrameErrors
+    method_error: FrameErrors
+    total_error: FrameErrors
+    target: str
+    bound_lsb: float | None
     visible_pixels: int
+    border: str
+    border_pixels: int
     nmse: float
     mnse_published: float
     mnse_published_share: float
@@ -105,6 +154,110 @@ def _model_of(design: Design) -> ReflectionModel:
     return design.specular.model
 
 
+def target_of(design: Design) -> ReflectionModel:
+    """Model of the exact frame of the total error: of a lobe its own, else Blinn's power.
+
+    The other models approximate that power; a lobe is a table of its own model.
+    """
+    return _model_of(design) if design.loads_tables else BLINN
+
+
+def error_bound(scene: Scene, design: Design) -> float | None:
+    """Bound of the error against exact normals of every pixel with the same model, in LSB.
+
+    Let c be the largest channel of all terms together: over the materials the largest sum over the lights of
+    colour times diffuse and specular reflection, where 1 is the full channel. Then::
+
+        arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
+
+    The half is the rounding of the pixel. The quarter is the tolerance by which spans are cut, which is
+    checked at some places of a span and not proved for all: docs/theory/chord.md#where-spans-are-cut. The
+    sixteenth holds the rounding of operands and terms.
+
+    The bound holds for spans from software, and off the border of every light, see `border_mask`.
+
+    Parameters
+    ----------
+    scene, design
+        As for `compare`.
+
+    Returns
+    -------
+    float or None
+        The bound of the method error; ``None`` where no bound is known: of another method than ``chord``,
+        ``chord-local`` and ``renormalise``, of a pipeline that was not made for the scene's materials, of a
+        measured curve, and of a roughness under `LEAST_ROUGHNESS`.
+    """
+    if design.method not in _BOUNDED or design.specular is None:
+        return None
+    lobe, model = design.specular, _model_of(design)
+    made = design.for_materials(scene.materials)
+    if made.interpolator != design.interpolator:
+        return None
+    if isinstance(lobe, Lobe):
+        own = made.specular
+        if model.name not in TABLE_MODELS or replace(own, banks=lobe.banks) != lobe:
+            return None
+        if model.PARAMETER == "roughness" and any(
+            design.highlight_parameter(material) < LEAST_ROUGHNESS for material in scene.materials
+        ):
+            return None
+    viewer, brightness = scene.distant_viewer, 0.0
+    for material in scene.materials:
+        total = np.zeros(3)
+        for light in scene.lights:
+            reflected = material.diffuse + material.reflection(distant_cosine(light, viewer))
+            total += light.color * reflected
+        brightness = max(brightness, float(total.max()))
+    return 0.5 + brightness / 16 + brightness / 4
+
+
+def has_step(scene: Scene, model: ReflectionModel) -> bool:
+    """Whether a highlight does not end in 0 at N·H = 0, as that of ``ggx`` at a large roughness."""
+    parameters = {material.parameter(model) for material in scene.materials}
+    return any(float(model.reflect(np.float64(1e-6), value)) > 1 / 1020 for value in parameters)
+
+
+def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndarray:
+    """Which shown pixels are at the border of a light, where its term switches between on and off.
+
+    There ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if `has_step`. An error there may be that of the term.
+
+    Parameters
+    ----------
+    scene : Scene
+        Lights, viewer and materials.
+    raster : Raster
+        The spans of `rasterise`.
+    model : ReflectionModel
+        The reflection model.
+
+    Returns
+    -------
+    bool array, shape (height, width)
+    """
+    mask = np.zeros(scene.height * scene.width, dtype=bool)
+    steps = has_step(scene, model)
+    shown = np.flatnonzero(raster.visible)
+    for start in range(0, len(shown), _CHUNK):
+        which = shown[start : start + _CHUNK]
+        normals = fragment_normals(scene, raster, which)
+        points = fragment_positions(scene, raster, which) if scene.local else None
+        near = np.zeros(len(which), dtype=bool)
+        for light in (light for light in scene.lights if light.is_on):
+            direction = np.broadcast_to(light.towards(points), normals.shape)
+            near |= np.abs(np.einsum("ij,ij->i", normals, direction)) <= BORDER
+            if steps:
+                halfway = halfway_vector(direction, scene.view_vectors(points))
+                near |= np.abs(np.einsum("ij,ij->i", normals, halfway)) <= BORDER
+        mask[raster.pixel[which]] = near
+    return mask.reshape(scene.height, scene.width)
+
+
+# Fragments looked at at once; bounds the memory.
+_CHUNK = 1 << 15
+
+
 def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     """Errors of a frame against three frames of the golden renderer; NaN if the frame shows no surface.
 
@@ -135,10 +288,12 @@ def _compare(
     scene: Scene, design: Design, image: np.ndarray, raster: Raster, cut_raster: Raster | None
 ) -> Comparison:
     """Comparison by float64 frames, one at a time, as a large frame has 400 MB."""
-    nothing = ErrorFigures(*[math.nan] * len(fields(ErrorFigures)))
+    nothing = FrameErrors(*[math.nan] * len(fields(FrameErrors)))
     mask, model = visible_mask(scene, raster), _model_of(design)
-    target = model if design.loads_tables else BLINN
-    figures: dict[str, Any] = {"visible_pixels": int(mask.sum()), "arithmetic_error": nothing}
+    target = target_of(design)
+    bound = None if cut_raster is None else error_bound(scene, design)
+    figures: dict[str, Any] = {"target": target.name, "bound_lsb": bound, "arithmetic_error": nothing}
+    figures["border"] = "|N.L| or |N.H|" if has_step(scene, model) else "|N.L|"
     seconds = 0.0
     pixels = np.flatnonzero(mask)
     image = image.reshape(-1, 3)[pixels]
@@ -150,24 +305,38 @@ def _compare(
         seconds += perf_counter() - start
         return result
 
+    border = timed(border_mask, scene, raster, model).reshape(-1)[pixels]
+    figures |= {"visible_pixels": len(pixels), "border_pixels": int(np.count_nonzero(border))}
+
     if cut_raster is not None and mask.any():
         same_method = timed(method_in_float64, scene, design, cut_raster)
-        figures["arithmetic_error"] = error_figures(image, same_method.reshape(-1, 3)[pixels], scale=255)
+        figures["arithmetic_error"] = _errors(image, same_method.reshape(-1, 3)[pixels], border)
         del same_method
     if target != model and mask.any():
         exact = timed(render, scene, "phong", target, raster).image.reshape(-1, 3)[pixels]
-        figures["total_error"] = error_figures(image, exact, scale=255)
+        figures["total_error"] = _errors(image, exact, border)
         figures |= _mean_squares(image, exact)
         del exact
     golden = timed(render, scene, "phong", model, raster).image
     if not mask.any():
-        return Comparison(golden, nothing, nothing, nothing, 0, math.nan, math.nan, math.nan, seconds)
+        figures |= dict.fromkeys(("method_error", "total_error"), nothing)
+        figures |= dict.fromkeys(("nmse", "mnse_published", "mnse_published_share"), math.nan)
+        return Comparison(golden=golden, seconds=seconds, **figures)
     exact = golden.reshape(-1, 3)[pixels]
-    figures["method_error"] = error_figures(image, exact, scale=255)
+    figures["method_error"] = _errors(image, exact, border)
     if target == model:
         figures["total_error"] = figures["method_error"]
         figures |= _mean_squares(image, exact)
     return Comparison(golden=golden, seconds=seconds, **figures)
+
+
+def _errors(image: np.ndarray, exact: np.ndarray, border: np.ndarray) -> FrameErrors:
+    """Errors of pixels against those of a frame in [0, 1]; ``border``: which are at the border of a light."""
+    parts = (
+        error_figures(image[of], exact[of], scale=255).max_lsb if of.any() else 0.0
+        for of in (~border, border)
+    )
+    return FrameErrors(*asdict(error_figures(image, exact, scale=255)).values(), *parts)
 
 
 def _mean_squares(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from blysk.golden.frames.compare import Comparison
+from blysk.golden.frames.compare import BORDER, Comparison
 from blysk.golden.frames.frame import Frame
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
@@ -20,6 +20,7 @@ __all__ = [
     "animation_figures",
     "difference_figures",
     "frame_figures",
+    "reference_of",
     "saving_figures",
     "triangle_figures",
     "worst_errors",
@@ -28,9 +29,22 @@ __all__ = [
 ERRORS = {
     "arithmetic": "the same method and model in float64",
     "method": "exact normals of every pixel, same model",
-    "total": "exact normals of every pixel, Blinn's power",
+    "total": "exact normals of every pixel, model {}",
 }
-"""Name of each error, and the frame that it compares with."""
+"""Name of each error, and the frame that it compares with; ``{}``: a model, see `reference_of`."""
+
+
+def reference_of(error: str, target: str) -> str:
+    """The frame that an error compares with, in words.
+
+    Parameters
+    ----------
+    error : str
+        One of `ERRORS`.
+    target : str
+        Name of the exact model, see `target_of`.
+    """
+    return ERRORS[error].format(target)
 
 
 def frame_figures(
@@ -147,6 +161,10 @@ def _figures(
 def _errors(comparison: Comparison, names: Iterable[str]) -> dict[str, Any]:
     return {
         **{f"{name}_error": dataclasses.asdict(getattr(comparison, f"{name}_error")) for name in names},
+        "target": comparison.target,
+        "bound_lsb": comparison.bound_lsb,
+        "border": f"{comparison.border} at most {BORDER:g}",
+        "border_pixels": comparison.border_pixels,
         "nmse": comparison.nmse,
         "mnse_published": comparison.mnse_published,
         "mnse_published_share": comparison.mnse_published_share,
@@ -163,9 +181,10 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         result is the largest of the frames.
     """
     same = ("method", "model", "exponent", "roughness", "lights", "materials", "style", "gate", "engine")
-    same += ("width", "height")
+    same += ("width", "height", "target", "border")
     same += tuple(key for key in ("pipes", "geometry", "setups", "coarse") if key in frames[0])
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
+    bounds = [frame["bound_lsb"] for frame in frames]
     return {
         **{key: frames[0][key] for key in same},
         "triangles": max(frame["triangles"] for frame in frames),
@@ -175,6 +194,8 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "cycles": cycles,
         "cycles_per_pixel": cycles / pixels if pixels else math.nan,
         **worst_errors(frames),
+        "bound_lsb": None if None in bounds else max(bounds),
+        "border_pixels": sum(frame["border_pixels"] for frame in frames),
         "counts": {key: sum(frame["counts"][key] for frame in frames) for key in frames[0]["counts"]},
         "frames": list(frames),
     }

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from blysk.sim.frames.figures import ERRORS
+from blysk.sim.frames.figures import ERRORS, reference_of
 
 __all__ = ["animation_lines", "frame_lines", "short_lines", "specialisation_lines"]
 
@@ -88,7 +88,7 @@ def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 
 def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """A frame's main figures in at most seven lines; `frame_lines` has all of them."""
+    """A frame's main figures in at most eight lines; `frame_lines` has all of them."""
     yield _line(
         "mesh",
         f"{figures['mesh']}, {_triangles(figures)}, {figures['width']}x{figures['height']}",
@@ -102,9 +102,12 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     hidden = f", {figures['visible_pixels']:,} visible" if geometry else ""
     yield _line("cycles", f"{figures['cycles']:,} for {figures['pixels']:,} shaded pixels{rate}{hidden}")
     if figures["visible_pixels"]:
-        total, method = (figures[f"{name}_error"]["max_lsb"] for name in ("total", "method"))
-        exact = f"at most {total:.2f} LSB of 8 bits from exact Blinn shading"
-        yield _line("error", f"{exact}, {method:.2f} from exact normals with this model")
+        total, method = (figures[f"{name}_error"]["steady_lsb"] for name in ("total", "method"))
+        found = f"largest {total:.2f} LSB of 8 bits from exact {figures['target']} shading"
+        if figures["target"] != figures["model"]:
+            found += f", {method:.2f} from exact normals with this model"
+        yield _line("error", f"{found}; {_bound(figures)}")
+        yield from _border_line(figures)
     else:
         yield _line("error", "none, no pixel shows the surface")
     counts = figures["counts"]
@@ -166,19 +169,38 @@ def _pixel_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("cycles", f"{figures['cycles']:,}{rate}{pipes}")
 
 
+def _bound(figures: Mapping[str, Any]) -> str:
+    bound = figures["bound_lsb"]
+    return "no bound is known" if bound is None else f"bound {bound:.2f}"
+
+
+def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:
+    """What the largest error and the bound leave out."""
+    count = figures["border_pixels"]
+    if count:
+        most = max(figures[f"{name}_error"]["border_lsb"] for name in ("total", "method"))
+        pixels = f"{count:,} pixel{'s' * (count != 1)} with {figures['border']}"
+        yield _line("left out", f"{pixels}, where a light begins: largest {most:.2f} LSB")
+
+
 def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     if not figures["visible_pixels"]:
         yield _line("error", "none, no pixel shows the surface")
         return
     yield _line("error, LSB", f"{'largest':>9}{'99.9 %':>9}{'RMSE':>9}{'PSNR, dB':>10}   against")
-    for name, against in ERRORS.items():
+    for name in ERRORS:
         error = figures.get(f"{name}_error")
         if error is None:
             continue
         yield (
             f"  {name:<10}{error['max_lsb']:>9.3f}{error['p999_lsb']:>9.3f}{error['rmse_lsb']:>9.3f}"
-            f"{error['psnr_db']:>10.2f}   {against}"
+            f"{error['psnr_db']:>10.2f}   {reference_of(name, figures['target'])}"
         )
+    method = figures["method_error"]
+    where = f"largest method error off the border of a light {method['steady_lsb']:.3f}"
+    hypothesis = "" if figures["bound_lsb"] is None else ", for spans from software"
+    yield _line("", f"{where}; {_bound(figures)}{hypothesis}")
+    yield from _border_line(figures)
 
 
 def _count_lines(counts: Mapping[str, int]) -> Iterator[str]:

@@ -170,6 +170,7 @@ def frame(rng, task, exponent, simulated):
         "verdicts": {
             kind: errors[f"{kind}_max_lsb"] < 1 for kind in ("total", "method", "arithmetic", "model")
         },
+        "border": {"pixels": 12, "lsb": 3.5},
         "pictures": {name: picture(value) for name, value in (("frame", 90), ("error", 20), ("total", 200))},
         "pixels": pixels,
         "shown": pixels - 100,

@@ -35,7 +35,8 @@ def test_errors_are_in_proportion(method, color):
         design = blysk.design(method=method, lights=number)
         errors = compare(scene, design, model_frame(scene, design))
         assert 0.4 < errors.arithmetic_error.max_lsb <= 0.5 + color / 16
-        assert errors.method_error.max_lsb <= 0.5 + color / 16 + color / 4
+        assert errors.bound_lsb == pytest.approx(0.5 + color / 16 + color / 4)
+        assert errors.method_error.max_lsb <= errors.bound_lsb
 
 
 def test_a_light_that_is_off_is_not_built():

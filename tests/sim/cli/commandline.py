@@ -22,7 +22,7 @@ DEFAULTS = {
 }
 """Of a scene that nothing is said of."""
 
-ERROR_NAMES = ["max_lsb", "p999_lsb", "rmse_lsb", "psnr_db"]
+ERROR_NAMES = ["max_lsb", "p999_lsb", "rmse_lsb", "psnr_db", "steady_lsb", "border_lsb"]
 
 
 def picture(path):

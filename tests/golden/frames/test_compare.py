@@ -1,0 +1,99 @@
+"""Errors off and at the border of a light, the bound, and the model that a frame is held against."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blysk.golden.frames.compare import BORDER, border_mask, compare, compare_image, error_bound, target_of
+from blysk.golden.frames.frame import model_frame
+from blysk.golden.presets import preset
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.lobes import GGX
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import BLINN
+from blysk.golden.reference.scene import Scene
+
+METHODS = ("chord", "chord-local", "renormalise")
+GREY = Material((0.05,) * 3, (0.02,) * 3, (0.98,) * 3, 20)
+
+
+def facing(normals, light=(0.3, 0.4, 1), depths=(0, 0, 0), **material):
+    """One triangle, seen from the front, with given normals at its corners."""
+    corners = np.array([[-1, -1, depths[0]], [1, -0.8, depths[1]], [0.1, 1, depths[2]]], dtype=float)
+    normals = np.asarray(normals, dtype=float)
+    mesh = Mesh(corners, np.array([[0, 1, 2]]), normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    camera = Camera.framing(corners, (0, 0, 1), "perspective", 4 / 3)
+    return Scene(mesh, camera, 128, 96, material=replace(GREY, **material), lights=[Light(light)])
+
+
+def made(method, model, scene):
+    return preset(method, model).for_materials(scene.materials)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("model", "name"), [("blinn", "exponent"), ("ggx", "roughness")])
+def test_steady_errors_keep_the_bound(method, model, name):
+    """Triangles at random, normals far apart, lengths that differ, a highlight of nearly the full channel."""
+    rng, largest = np.random.default_rng(7), 0.0
+    for value in (1, 30, 900) if name == "exponent" else (0.1, 0.3, 0.9):
+        normals = [0, 0, 1] + rng.uniform(-0.9, 0.9, (3, 3)) * [1, 1, 0.3]
+        scene = facing(normals, rng.normal((0, 0, 1.5)), rng.uniform(-2, 0.5, 3), **{name: value})
+        found = compare(scene, made(method, model, scene), model_frame(scene, made(method, model, scene)))
+        assert found.bound_lsb == pytest.approx(0.5 + 1 / 16 + 1 / 4)
+        assert found.target == model
+        assert found.method_error.steady_lsb <= found.bound_lsb
+        largest = max(largest, found.method_error.steady_lsb)
+    assert largest > 0.45
+
+
+def test_pixels_at_the_border_are_counted_apart():
+    """N·L goes through 0: a picture without light there differs at the border alone by its light."""
+    scene = facing([[1, 0, 0.2], [-1, 0, 0.2], [0, 0.1, 1]], (1, 0, 0), exponent=1)
+    raster = rasterise(scene)
+    border = border_mask(scene, raster, BLINN)
+    assert 0 < border.sum() < 0.05 * border.size
+    design = made("chord", "blinn", scene)
+    frame = model_frame(scene, design)
+    exact = compare(scene, design, frame)
+    assert exact.border_pixels == np.count_nonzero(border)
+    wrong = frame.image.copy()
+    wrong[border] = 255
+    found = compare_image(scene, design, wrong)
+    assert found.method_error.steady_lsb == exact.method_error.steady_lsb <= exact.bound_lsb
+    assert found.method_error.border_lsb == found.method_error.max_lsb > 200
+    assert found.bound_lsb is None
+
+
+def test_a_step_of_the_lobe_is_a_border():
+    """GGX of a large roughness is not 0 where N·H is: the pixels beside that count as well."""
+    scene = facing([[1, 0, 0.1], [-1, 0, 0.1], [0, 0.1, 1]], (1, 0, -0.4), roughness=0.9)
+    raster = rasterise(scene)
+    smooth, rough = (border_mask(scene, raster, model) for model in (BLINN, GGX))
+    assert (smooth <= rough).all()
+    assert rough.sum() > smooth.sum()
+    small = replace(scene, material=replace(GREY, roughness=0.1))
+    np.testing.assert_array_equal(border_mask(small, raster, GGX), smooth)
+
+
+def test_no_bound_where_none_is_known():
+    scene = facing(np.eye(3) + 1)
+    assert error_bound(scene, made("linear", "blinn", scene)) is None
+    assert error_bound(scene, made("quadratic", "blinn", scene)) is None
+    sharp = facing(np.eye(3) + 1, roughness=0.05)
+    assert error_bound(sharp, made("chord", "ggx", sharp)) is not None
+    assert error_bound(sharp, preset("chord", "ggx")) is None
+    sharper = facing(np.eye(3) + 1, roughness=0.03)
+    assert error_bound(sharper, made("chord", "ggx", sharper)) is None
+    two = replace(scene, lights=[Light((0, 0, 1)), Light((0, 1, 1), (2.0, 0.5, 0.5))])
+    assert error_bound(two, made("chord", "blinn", two)) == pytest.approx(0.5 + 3 * (1 / 16 + 1 / 4))
+    assert error_bound(scene, preset("chord", "cosquad")) == pytest.approx(0.5 + 5 / 16)
+
+
+def test_the_target_is_the_model_of_the_table():
+    assert target_of(preset("chord", "ggx")) is GGX
+    assert target_of(preset("chord", "phong_coplanar")).name == "phong_coplanar"
+    assert target_of(preset("chord", "cosquad")) is target_of(preset("linear", "blinn_product")) is BLINN
+    assert BORDER == 0.002
