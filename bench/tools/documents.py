@@ -1,5 +1,6 @@
 """Folders of Markdown as pages of the site: theory, guide and the pages of the units."""
 
+import html
 import posixpath
 import re
 from collections.abc import Mapping
@@ -7,7 +8,7 @@ from pathlib import Path
 
 from blysk.bench.report.page import environment
 
-__all__ = ["DOCUMENTS", "documents", "slug"]
+__all__ = ["DOCUMENTS", "PROJECT", "documents", "slug"]
 
 DOCUMENTS = {
     "guide": ("Guide", "how to use and to embed it, and its words"),
@@ -15,6 +16,9 @@ DOCUMENTS = {
     "blocks": ("Units", "equations, formats, structure, timing and errors of each"),
 }
 """Folders that a site may have: title, and contents."""
+
+PROJECT = Path(__file__).resolve().parents[2]
+"""Folder of the project, with its sources and documents if it is a checkout."""
 
 _LINK = re.compile(r'<a href="([^"#:]*)(#[^"]*)?"([^>]*)>(.*?)</a>', re.DOTALL)
 _IMAGE = re.compile(r'<img src="(\.\./[^":]*)"')
@@ -30,7 +34,8 @@ def slug(heading: str) -> str:
 def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Path]]:
     """Pages of folders as HTML, and their pictures.
 
-    Links between the folders stay; those that lead out of them become plain text.
+    Links between the folders stay. Those to Python files of the project stay as well: each file has a page
+    in the folder ``source``. Those that lead elsewhere become plain text.
 
     Parameters
     ----------
@@ -49,6 +54,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
     markdown = MarkdownIt("commonmark").enable("table")
     template = environment().get_template("web/document.html")
     pages: dict[str, str] = {}
+    sources: dict[str, Path] = {}
     pictures: dict[str, Path] = {}
     for name, folder in folders.items():
         for path in sorted(folder.rglob("*.[sp][vn]g")):
@@ -58,7 +64,9 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
         for path in sorted(folder.glob("*.md")):
             text = path.read_text(encoding="utf-8")
             title = re.search(r"^# (.+)$", text, re.MULTILINE)
-            body = _LINK.sub(lambda match, name=name: _link(match, name, folders), markdown.render(text))
+            body = _LINK.sub(
+                lambda match, name=name: _link(match, name, folders, sources), markdown.render(text)
+            )
             body = _HEADING.sub(lambda m: f'<{m[1]} id="{slug(m[2])}">{m[2]}</{m[1]}>', body)
             body = _IMAGE.sub(lambda match, at=(name, folder): _image(match, *at, pictures), body)
             body = body.replace("<img ", '<img loading="lazy" ')
@@ -73,6 +81,10 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
             pages[f"{name}/{path.stem if path.stem != 'README' else 'index'}.html"] = page
             if path.stem == first != "README":
                 pages[f"{name}/index.html"] = page
+    for name, path in sources.items():
+        text = html.escape(path.read_text(encoding="utf-8"))
+        body = f"<h1>{name}</h1>\n<pre><code>{text}</code></pre>"
+        pages[_page_of(name)] = template.render(title=name, body=body, folder=None)
     return pages, pictures
 
 
@@ -85,15 +97,20 @@ def _image(match: re.Match, name: str, folder: Path, pictures: dict[str, Path]) 
     return match[0]
 
 
-def _link(match: re.Match, name: str, folders: Mapping[str, Path]) -> str:
-    """A link of a page, changed to the files of the site."""
+def _link(match: re.Match, name: str, folders: Mapping[str, Path], sources: dict[str, Path]) -> str:
+    """A link of a page, changed to the files of the site; a source file that it leads to is added."""
     address, anchor, others, text = match[1], match[2] or "", match[3], match[4]
     if not address:
         return match[0]
-    target = posixpath.normpath(posixpath.join(name, address))
-    folder, _, file = target.partition("/")
+    # By the names of the site, or by where the files lie now: pages of the units may be anywhere.
+    folder, _, file = posixpath.normpath(posixpath.join(name, address)).partition("/")
     if folder not in folders or not file or not (folders[folder] / file).is_file():
-        return text
+        target = (folders[name] / address).resolve()
+        places = {of: place.resolve() for of, place in folders.items()}
+        folder = next((of for of, place in places.items() if target.is_relative_to(place)), "")
+        if not folder or not target.is_file():
+            return _source(match, name, target, sources)
+        file = target.relative_to(places[folder]).as_posix()
     stem, suffix = posixpath.splitext(file)
     if suffix in (".svg", ".png"):
         return match[0]
@@ -101,3 +118,17 @@ def _link(match: re.Match, name: str, folders: Mapping[str, Path]) -> str:
         return text
     page = posixpath.relpath(f"{folder}/{'index' if stem == 'README' else stem}.html", name)
     return f'<a href="{page}{anchor}"{others}>{text}</a>'
+
+
+def _source(match: re.Match, name: str, target: Path, sources: dict[str, Path]) -> str:
+    """A link to the page of a Python file of the project, which is added; of another file its text."""
+    if target.suffix != ".py" or not target.is_file() or not target.is_relative_to(PROJECT):
+        return match[4]
+    file = target.relative_to(PROJECT).as_posix()
+    sources[file] = target
+    return f'<a href="{posixpath.relpath(_page_of(file), name)}"{match[3]}>{match[4]}</a>'
+
+
+def _page_of(file: str) -> str:
+    """Page of a source file, by its path in the project."""
+    return f"source/{file.replace('/', '.')}.html"

@@ -6,6 +6,7 @@ and from the measured errors, and the list of tests from the stimuli of the reco
 """
 
 import inspect
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
@@ -28,12 +29,23 @@ from blysk.bench.tools.netlist import describe_shape
 from blysk.bench.tools.structure import graph_of
 from blysk.bench.tools.timing import draw_timing, waves_of
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable, write_text
 from blysk.sim.units.record import Record, Sample
 from blysk.sim.units.registry import RECORDS, ROOMS
 from blysk.sim.value_types import Choice
 
-__all__ = ["PROJECT", "SAMPLES", "command", "entries_shown", "index_page", "page", "pictures", "write_pages"]
+__all__ = [
+    "PROJECT",
+    "SAMPLES",
+    "command",
+    "entries_shown",
+    "index_page",
+    "page",
+    "pictures",
+    "test_command",
+    "write_pages",
+]
 
 PROJECT = Path(__file__).parents[2]
 """Folder of the project, with its tests and documents if it is a checkout."""
@@ -84,18 +96,27 @@ def _model(unit: str) -> type | None:
     return model if model.__name__ == type(component).__name__.removesuffix("Unit") else None
 
 
-def _files(unit: str) -> str:
+def _link(text: str, path: str, folder: Path) -> str:
+    """A text that leads from a page to a file of the project; the text alone where there is no checkout."""
+    file, _, anchor = path.partition("#")
+    if not (PROJECT / file).exists():
+        return text
+    address = Path(os.path.relpath(PROJECT / file, folder.resolve())).as_posix()
+    return f"[{text}]({address}{'#' * bool(anchor)}{anchor})"
+
+
+def _files(unit: str, folder: Path) -> str:
     """Links to the files of a unit."""
     path = "/".join(type(_component(unit)).__module__.split(".")[2:])
-    folder, _, name = path.rpartition("/")
+    room, _, name = path.rpartition("/")
     paths = [f"golden/{path}.py", f"hdl/{path}.py", f"sim/units/{path}.py"]
-    paths += [f"tests/{layer}/{folder}/test_{name}.py".replace("//", "/") for layer in ("golden", "hdl")]
-    return " · ".join(f"[`{path}`](../../{path})" for path in paths if (PROJECT / path).exists())
+    paths += [f"tests/{layer}/{room}/test_{name}.py".replace("//", "/") for layer in ("golden", "hdl")]
+    return " · ".join(_link(f"`{path}`", path, folder) for path in paths if (PROJECT / path).exists())
 
 
-def _with_links(text: str) -> str:
+def _with_links(text: str, folder: Path) -> str:
     """A text of Markdown whose citations of the theory are links."""
-    return re.sub(r"docs/theory/(\w+)\.md(#[\w-]+)?", r"[\g<0>](../theory/\1.md\2)", text)
+    return re.sub(r"docs/theory/\w+\.md(#[\w-]+)?", lambda cited: _link(cited[0], cited[0], folder), text)
 
 
 def _ports(unit: wiring.Component) -> list[str]:
@@ -211,13 +232,20 @@ _TIMING_NOTE = (
 )
 
 
-def _opening(unit: str) -> list[str]:
+def _opening(unit: str, folder: Path) -> list[str]:
     """First part of a page, before the measured part: names, docstring of the unit, ports."""
     component, record = _component(unit), RECORDS[unit]
     kind = type(component)
     sources = dict.fromkeys(record.source_of(name) for name in (entry.name for entry in entries_shown(unit)))
     lines = [f"# {_title(unit)}", "", f"{inline(record.title)}. `{kind.__module__}.{kind.__name__}`", ""]
-    lines += [f"Source: {'; '.join(sources)}", "", _files(unit), "", markdown(inspect.getdoc(kind)), ""]
+    lines += [
+        f"Source: {'; '.join(sources)}",
+        "",
+        _files(unit, folder),
+        "",
+        markdown(inspect.getdoc(kind)),
+        "",
+    ]
     return [*lines, "## Ports", "", *_ports(component), ""]
 
 
@@ -270,6 +298,11 @@ def _errors(unit: str, rows: Sequence[Row]) -> list[str]:
     return ["## Errors", "", text, "", f"![Errors of the {_title(unit).lower()}]({unit}-errors.svg)", ""]
 
 
+def test_command(unit: str) -> str:
+    """The shell command that tests the RTL of a unit, from the folder of a clone."""
+    return f".venv/bin/python -m pytest -m '' tests/test_units.py -k {unit}"
+
+
 def _tests(record: Record) -> list[str]:
     """Stimuli with their corner cases, waivers and idle registers, from the record."""
     rows = [
@@ -284,6 +317,8 @@ def _tests(record: Record) -> list[str]:
     ]
     lines = ["## Stimuli and corner cases", ""]
     lines += ["The RTL is held against the bit-accurate model under each, beat by beat.", ""]
+    lines += ["In a clone, after `make test`, this command runs them:", ""]
+    lines += [f"    {test_command(record.name)}", ""]
     lines += [*markdown_table(("stimulus", "what it covers", "beats or pixels", "stalls", "run"), rows), ""]
     if record.waivers:
         lines += ["Signals at which a fault may stay unseen:", ""]
@@ -298,7 +333,7 @@ def _tests(record: Record) -> list[str]:
     return lines
 
 
-def page(unit: str, rows: Sequence[Row]) -> str:
+def page(unit: str, rows: Sequence[Row], folder: Path) -> str:
     """Text of the page of a unit.
 
     Parameters
@@ -307,13 +342,15 @@ def page(unit: str, rows: Sequence[Row]) -> str:
         A key of `RECORDS`.
     rows : sequence of Row
         Rows of `entries_shown`.
+    folder : Path
+        Folder of the page, from which its links lead.
     """
-    lines = [*_opening(unit), *_variants(unit, rows), *_drawings(unit, rows), *_errors(unit, rows)]
+    lines = [*_opening(unit, folder), *_variants(unit, rows), *_drawings(unit, rows), *_errors(unit, rows)]
     lines += _tests(RECORDS[unit])
     if model := _model(unit):
         title = f"## Arithmetic: `{model.__module__}.{model.__name__}`"
         lines += [title, "", markdown(inspect.getdoc(model))]
-    return _with_links("\n".join(lines)).rstrip() + "\n"
+    return _with_links("\n".join(lines), folder).rstrip() + "\n"
 
 
 def pictures(unit: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -> Iterator[tuple[str, str]]:
@@ -338,7 +375,7 @@ def _room(record: Record) -> str:
     return parts[2] if len(parts) > 3 else ""
 
 
-def index_page() -> str:
+def index_page(folder: Path) -> str:
     """Text of the first page of the folder: the units in the order of the pipeline."""
     lines = [
         "# The units",
@@ -358,7 +395,7 @@ def index_page() -> str:
             sources = dict.fromkeys(record.source_of(name) for name in record.variants)
             picture = f'<img src="{unit}-structure.svg" alt="" height="90">'
             text = f"{record.title}<br>{count} variant{'s' * (count > 1)}".replace("|", "\\|")
-            source = _with_links("<br>".join(sources))
+            source = _with_links("<br>".join(sources), folder)
             rows.append(f"| [{_title(unit)}]({unit}.md) | {text} | {source} | {picture} |")
         if rows:
             lines += ["", f"## {_TITLES[room]}", ""]
@@ -379,7 +416,8 @@ def write_pages(
     Parameters
     ----------
     folder : Path
-        An existing folder, such as ``docs/blocks``: pages link to files two levels up.
+        Folder of the pages, such as ``docs/blocks``; it is made if there is none. Links lead from there to
+        the files of the project.
     units : sequence of str
         Keys of `RECORDS`.
     samples : int
@@ -390,8 +428,12 @@ def write_pages(
     Raises
     ------
     InputError
-        If a file cannot be written.
+        If the folder or a file cannot be written.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(str(folder), f"cannot be made ({error.strerror})", "give another folder") from None
     check_writable(folder / "README.md")
     for unit in units:
         if progress:
@@ -399,14 +441,14 @@ def write_pages(
         entries = entries_shown(unit)
         measured = [sample_of(e, samples, SEED) if e.variant.measure else None for e in entries]
         rows = [row_of(entry, sample) for entry, sample in zip(entries, measured, strict=True)]
-        files = {f"{unit}.md": page(unit, rows), **dict(pictures(unit, rows, measured))}
+        files = {f"{unit}.md": page(unit, rows, folder), **dict(pictures(unit, rows, measured))}
         for name, text in files.items():
             write_text(folder / name, text)
         for path in folder.glob(f"{unit}-*.svg"):
             of_this_page = re.fullmatch(rf"{unit}-(structure|timing|errors)(-\d+)?\.svg", path.name)
             if of_this_page and path.name not in files:
                 path.unlink()
-    write_text(folder / "README.md", index_page())
+    write_text(folder / "README.md", index_page(folder))
 
 
 @click.command(short_help="Pages of the units, with drawings.")
@@ -417,8 +459,8 @@ def write_pages(
 def command(folder, units):
     """Write a page for each unit, with drawings of structure, timing and errors, into FOLDER.
 
-    FOLDER is docs/blocks by default, and must exist. Pictures that a page no longer has are removed, other
-    files stay.
+    FOLDER is docs/blocks by default, and is made if there is none. Pictures that a page no longer has are
+    removed, other files stay.
 
     \b
     Example:

@@ -7,11 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from blysk.bench.tools import pages
 from blysk.bench.tools.blocks import ENTRIES, Entry, sample_of
 from blysk.bench.tools.docstrings import markdown
 from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, Node, likeness
-from blysk.bench.tools.pages import entries_shown, write_pages
+from blysk.bench.tools.pages import PROJECT, entries_shown, write_pages
+from blysk.sim.errors import InputError
 from blysk.sim.units.record import Decisions, Record, Sample, Variant
 from blysk.sim.units.registry import RECORDS
 
@@ -186,7 +188,13 @@ def test_a_page_has_all_of_its_record_and_the_same_bytes_each_time(tmp_path):
     assert all(
         f"[`{path}`]" in text for path in ("golden/lighting/diffuse.py", "sim/units/lighting/diffuse.py")
     )
-    assert "(../theory/models.md#lighting)" in text
+    assert pages.test_command("diffuse") in text
+    # Files of the project, wherever the pages are.
+    links = {link.partition("#") for link in re.findall(r"\]\(([^):]+)\)", text)}
+    targets = {((tmp_path / "one" / file).resolve(), anchor) for file, _, anchor in links}
+    assert all(path.is_file() for path, _ in targets)
+    assert (PROJECT / "docs/theory/models.md", "lighting") in targets
+    assert (PROJECT / "hdl/lighting/diffuse.py", "") in targets
     index = written[0]["README.md"].decode()
     assert all(f"({unit}.md)" in index for unit in RECORDS)
 
@@ -199,3 +207,12 @@ def test_every_unit_has_a_page(unit, tmp_path):
     drawings = re.findall(rf"\]\(({unit}-[^)]+)\)", text)
     assert f"{unit}-structure.svg" in drawings
     assert all((tmp_path / name).is_file() for name in drawings)
+
+
+def test_the_folder_is_made_and_a_bad_one_is_one_line(tmp_path):
+    """Where it cannot be made the line names it; nothing is left behind."""
+    write_pages(tmp_path / "new" / "pages", [])
+    assert (tmp_path / "new" / "pages" / "README.md").is_file()
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"pages: cannot be made .*; give another folder"):
+        write_pages(tmp_path / "file" / "pages", [])

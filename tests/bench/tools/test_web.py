@@ -2,9 +2,11 @@
 
 import base64
 import json
+import os
 import re
 import zlib
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -292,6 +294,7 @@ def test_documents_in_the_site(tmp_path, work, results):
         folder.mkdir()
     (guide / "use.md").write_text(
         "# To use it\n\n[a](../blocks/unit.md#a-b-c) [b](../../hdl/x.py) [c](#to-use-it)\n"
+        f"[d]({Path(os.path.relpath(web.__file__, guide)).as_posix()}) [e](../pages/unit.md)\n"
     )
     (pages / "README.md").write_text("# Units\n\n![p](p.svg) [u](unit.md)\n\n| a |\n|---|\n| 1 |\n")
     (pages / "unit.md").write_text("## A `b`, c\n\n[up](README.md) [web](https://a.example)\n")
@@ -301,6 +304,9 @@ def test_documents_in_the_site(tmp_path, work, results):
     use = (site / "guide" / "use.html").read_text()
     assert '<h1 id="to-use-it">To use it</h1>' in use
     assert '<a href="../blocks/unit.html#a-b-c">a</a> b <a href="#to-use-it">c</a>' in use
+    # By where the files lie; a source has a page of its own.
+    assert '<a href="../source/bench.tools.web.py.html">d</a> <a href="../blocks/unit.html">e</a>' in use
+    assert "&quot;&quot;&quot;" in (site / "source" / "bench.tools.web.py.html").read_text()
     assert (site / "guide" / "index.html").read_text() == use
     unit = (site / "blocks" / "unit.html").read_text()
     assert '<h2 id="a-b-c">' in unit
