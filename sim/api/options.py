@@ -118,7 +118,7 @@ class Model(Choice):
         if isinstance(value, TabulatedModel):
             return value
         if value == PHONG.name:
-            raise PartError("", "phong is (R.V)^n, and the pipelines find N.H, not R.V", _INSTEAD_OF_PHONG)
+            raise PartError("", "the pipeline finds N.H, not R.V", _INSTEAD_OF_PHONG)
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
             return super().check(value)
         try:

@@ -29,7 +29,12 @@ def main() -> int:
             os.environ["VERILATOR_ROOT"] = root
             os.environ["PATH"] = os.pathsep.join([str(Path(root) / "bin"), os.environ["PATH"]])
     runner = get_runner(options.simulator)
-    build = {"build_dir": FOLDER / "sim_build" / options.simulator, "waves": options.waves}
+    # A model that was built without waveforms would be taken as it is: with them it has its own folder.
+    folder = FOLDER / "sim_build" / (options.simulator + "-waves" * options.waves)
+    build = {"build_dir": folder, "waves": options.waves}
+    traced = options.waves and options.simulator == "verilator"
+    waves = folder / ("dump.vcd" if traced else f"{source.stem}.fst")
+    waves.unlink(missing_ok=True)
     runner.build(
         sources=[source], hdl_toplevel=source.stem, build_args=arguments, timescale=("1ns", "1ps"), **build
     )
@@ -38,10 +43,14 @@ def main() -> int:
         hdl_toplevel=source.stem,
         test_dir=FOLDER,
         seed=options.seed,
-        results_xml=str(build["build_dir"] / "results.xml"),
+        test_args=["--trace-file", str(waves)] if traced else [],
+        results_xml=str(folder / "results.xml"),
         **build,
     )
     tests, failed = get_results(results)
+    if options.waves:
+        failed += not waves.is_file()
+        print(f"waves {waves}" if waves.is_file() else "no waves were written")
     return 0 if tests and not failed else 1
 
 

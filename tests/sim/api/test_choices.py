@@ -64,7 +64,7 @@ def test_no_choice_of_a_rendering_is_always_refused():
 
 @pytest.mark.parametrize("given", [{"model": "phong"}, {"model": "phong", "method": "linear"}])
 def test_phong_is_refused_with_the_model_that_is_near_it(given):
-    with pytest.raises(InputError, match=r"^model: .* find N\.H, not R\.V; use phong_coplanar, .* 11 LSB"):
+    with pytest.raises(InputError, match=r"^model: .* finds N\.H, not R\.V; use phong_coplanar, .* 11 LSB"):
         blysk.design(**given)
     # The figure of that line: exact against exact, the default scene.
     scene = blysk.scene("teapot")

@@ -197,6 +197,22 @@ def test_passes_in_both(run, tmp_path, simulator, options):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("simulator", ["icarus", "verilator"])
+def test_waves_are_written_after_a_run_without_them(run, folder, simulator):
+    """Each time: the model that a run leaves behind writes none."""
+    for options in ([], ["--waves"], [], ["--waves"]):
+        done = run(folder, simulator, *options)
+        assert done.returncode == 0, done.stdout
+        named = re.findall(r"^waves (.+)$", done.stdout, re.MULTILINE)
+        assert len(named) == bool(options)
+        for name in named:
+            waves = Path(name)
+            assert waves.is_relative_to(folder / "sim_build")
+            assert waves.stat().st_size > 1000
+            waves.unlink()
+
+
+@pytest.mark.long
 def test_finds_one_bit_of_an_expected_pixel(run, folder):
     path = folder / "vectors" / "pixels.csv"
     lines = path.read_text().splitlines()
