@@ -40,7 +40,7 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
         (["--size", "abc"], "--size abc", "not a size"),
         (["--size", "-1x5"], "--size -1x5", "not a size"),
         (["--method", "slurp"], "--method slurp", KNOWN_METHODS),
-        (["--model", "shiny"], "--model shiny", "use one of phong, blinn, cosquad, cosquad7, "),
+        (["--model", "shiny"], "--model shiny", "use one of blinn, phong_coplanar, "),
         (["--engine", "steam"], "--engine steam", "use one of auto, cxxrtl, pysim"),
         (["--projection", "flat"], "--projection flat", "orthographic"),
         (["--back-faces", "hide"], "--back-faces hide", "flip, show, cull"),
@@ -87,7 +87,7 @@ def test_bad_option(refused, options, thing, says):
 
 @pytest.mark.parametrize("command", [["render", "teapot"], ["verilog", "-o", "core.v"]])
 def test_design_that_cannot_be(refused, command):
-    says = "the pipeline finds N.H, not R.V; use one of cosquad, "
+    says = "the pipeline finds N.H, not R.V; use phong_coplanar, "
     refused(*command, "--model", "phong", thing="--model phong", says=says)
     says = "method chord finds no normals"
     refused(*command, "--method", "chord", "--operand", "cosine", thing="--operand cosine", says=says)
