@@ -276,8 +276,8 @@ def shade_spans(
     """Picture from spans alone, as in hardware.
 
     The normal of a fragment is the curve between its span's ends at ``t = offset / (length - 1)`` (0 for a
-    span of one pixel), with the length that the curve gives it. With ``normalised`` this is the reference
-    of the method error.
+    span of one pixel), with the length that the curve gives it. With ``normalised`` and unit ends this is
+    not the exact frame, whose line has ends with lengths (docs/theory/interpolation.md#true-spans).
 
     Parameters
     ----------
