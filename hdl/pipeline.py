@@ -35,7 +35,7 @@ PORT_DESCRIPTIONS = {
     "i_normal_right": "normal at the last pixel centre, see above",
     "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
     "i_factors": "codes of a, each light's that fades, at the same three pixels",
-    "i_material": "index of the span's material",
+    "i_material": "index of the span's material; past the last it counts as the last",
     "o_x": "column of the pixel",
     "o_y": "row",
     "o_r": "red",
@@ -344,7 +344,9 @@ class ShadingPipelineUnit(wiring.Component):
         ]
         if self.parameters.materials > 1:
             # Constants follow the index one cycle later, the slope of the exponent some more.
-            material, waited = self.i.payload.material, Signal(2)
+            material, waited, last = self.i.payload.material, Signal(2), self.parameters.materials - 1
+            if last + 1 < 1 << len(material):
+                material = Mux(material > last, last, material)
             with m.If(self.i.valid & (material != frame.material)):
                 m.d.sync += waited.eq(0)
                 with m.If(idle):

@@ -26,7 +26,7 @@ PORT_DESCRIPTIONS = {
     "i_y": "their rows",
     "i_depth": "their depths, less is nearer",
     "i_normal": "component (second index) of a corner's (first index) N/W",
-    "i_material": "index of the triangle's material",
+    "i_material": "index of the triangle's material; past the last it counts as the last",
     "i_two_sided": "with back_faces 2: 1 turns the normals of the triangle's back in place of culling it",
     "o_x": "column of the pixel",
     "o_y": "row",
@@ -42,7 +42,7 @@ PORT_DESCRIPTIONS = {
     "constants_bottom": "the row after the last",
     "constants_back_faces": "see above",
     "constants_limit": "chord of the widest span in 1/1024, see above",
-    "constants_picture": "changes with each picture: the coarse depth test begins anew",
+    "constants_picture": "changes with each picture: depths begin anew",
     "status_empty": "triangles that cover no pixel",
     "status_zero_area": "triangles without area",
     "status_culled": "back faces left out",
@@ -60,7 +60,7 @@ PORT_DESCRIPTIONS = {
     "memory_read_data": "its depth, on the next clock",
     "memory_write_place": "pixel whose depth is written",
     "memory_write_enable": "writes",
-    "memory_write_data": "its depth",
+    "memory_write_data": "its depth; all ones where the memory is cleared",
 }
 """Ports without a ``size``, for the table in Verilog."""
 
@@ -98,6 +98,9 @@ class RenderUnit(wiring.Component):
         As for `GeometryUnit`.
     compact : bool or None
         Style of the geometry; ``None``: that of the design's build.
+    clears : bool
+        Whether the memory of depths is cleared for each picture, see `DepthTestUnit`. Else the unit is right
+        for one picture, unless the memory outside is cleared between two.
 
     Members
     -------
@@ -108,8 +111,8 @@ class RenderUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants of the shading pipeline.
     constants : :py:`In(frame_shape())`
-        The picture's borders and options; constant while triangles are inside. With a coarse depth test also
-        a bit ``picture``, which changes from picture to picture.
+        The picture's borders and options; constant while triangles are inside. With a coarse depth test, or
+        if the unit clears, also a bit ``picture``, which changes from picture to picture.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
@@ -129,6 +132,7 @@ class RenderUnit(wiring.Component):
         size: tuple[int, int] | None = None,
         setups: int = 1,
         compact: bool | None = None,
+        clears: bool = False,
     ):
         self.parameters = parameters or Renderer()
         design, grid = self.parameters.design, self.parameters.geometry.grid
@@ -137,12 +141,12 @@ class RenderUnit(wiring.Component):
         self.pipeline = ShadingPipelineUnit(design)
         coarse, bits = self.parameters.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
-        self.depth = DepthTestUnit(*bits, size)
+        self.depth = DepthTestUnit(*bits, size, clears)
         members = {
             "i": In(stream.Signature(triangle_shape(grid))),
             "o": Out(stream.Signature(drawn_pixel_shape(design.x_bits, design.y_bits))),
             "write": In(stream.Signature(write_shape())),
-            "constants": In(_constants_shape(self.parameters)),
+            "constants": In(_constants_shape(clears or coarse is not None)),
             "status": Out(counters_shape(*STATUS)),
         }
         if size is None:
@@ -161,6 +165,13 @@ class RenderUnit(wiring.Component):
         connect(m, depth.o, wiring.flipped(self.o))
         if depth.size is None:
             wiring.connect(m, depth.memory, wiring.flipped(self.memory))
+        if depth.clears:
+            given = self.constants
+            m.d.comb += [
+                depth.picture.number.eq(given.picture),
+                depth.picture.width.eq(given.right - given.left),
+                depth.picture.height.eq(given.bottom - given.top),
+            ]
 
         deep = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
         span = stream.Signature(data.StructLayout({"span": pipeline.i.payload.shape(), **deep}))
@@ -231,11 +242,17 @@ class RenderUnit(wiring.Component):
             return Const(1), Const(0)
         m.submodules.coarse = coarse = self.coarse
         span, place = self.geometry.o, coarse.i.payload
+        # A number that changes with the first span of a picture: a picture without spans may turn it back.
+        number, before, turned = (Signal(name=name) for name in ("number", "picture_before", "turned"))
+        turns = turned | (self.constants.picture != before)
+        m.d.sync += [before.eq(self.constants.picture), turned.eq(turns)]
+        with m.If(coarse.i.valid & coarse.i.ready):
+            m.d.sync += [number.eq(place.picture), turned.eq(0)]
         answers = stream.Signature(1).create(path=("answers",))
         connect_fifo(m, "answers", coarse.o, answers, depth=WAITING_SPANS)
         m.d.comb += [
             *(place[name].eq(span.payload[name]) for name in ("x", "y", "length", "depth", "depth_step")),
-            place.picture.eq(self.constants.picture),
+            place.picture.eq(number ^ turns),
             coarse.i.valid.eq(span.valid & taken),
             room.eq(coarse.i.ready),
             answers.ready.eq(head.valid & head.ready),
@@ -246,6 +263,6 @@ class RenderUnit(wiring.Component):
         return answers.valid, answers.payload
 
 
-def _constants_shape(parameters: Renderer) -> data.StructLayout:
+def _constants_shape(picture: bool) -> data.StructLayout:
     shape = frame_shape()
-    return data.StructLayout(shape.members | {"picture": unsigned(1)}) if parameters.coarse else shape
+    return data.StructLayout(shape.members | {"picture": unsigned(1)}) if picture else shape

@@ -4,7 +4,7 @@ module triangle (input clk, input rst, output done);
   reg [23:0] picture [0:1023], depths [0:1023], depth;
   reg [4:0] n;   // frame constants written; then the triangle
   integer k;
-  initial for (k = 0; k < 1024; k = k + 1) begin picture[k] = 24'h1a1c20; depths[k] = ~24'd0; end
+  initial for (k = 0; k < 1024; k = k + 1) picture[k] = 24'h1a1c20;   // the core clears the depths
 
   // Ambient 0.05, diffuse 0.4, specular 0.55, exponent 50, white light along the viewer.
   wire [8:0] address = n < 4 ? n : n + 12;
@@ -18,7 +18,7 @@ module triangle (input clk, input rst, output done);
   wire [7:0] r, g, b;
   wire [23:0] o_depth, new_depth;
   wire write;
-  reg [9:0] quiet;   // clocks since the last pixel: of one triangle none comes later than these
+  reg [10:0] quiet;   // clocks since the last pixel: of one triangle none comes later than these
   assign done = &quiet;
   always @(posedge clk) begin
     if (o_valid) picture[{y[4:0], x[4:0]}] <= {r, g, b};
@@ -38,7 +38,7 @@ module triangle (input clk, input rst, output done);
     .i_normal_1_0(-24'sd838861), .i_normal_1_1(-24'sd5033165), .i_normal_1_2(24'sd6658042),
     .i_normal_2_0(24'sd5872026), .i_normal_2_1(24'sd1677722), .i_normal_2_2(24'sd5751001),
     .constants_left(-13'sd16), .constants_top(-13'sd12), .constants_right(13'sd16), .constants_bottom(13'sd12),
-    .constants_back_faces(2'd0), .constants_limit(10'd178),
+    .constants_back_faces(2'd0), .constants_limit(10'd178), .constants_picture(1'b0),
     .o_valid(o_valid), .o_ready(1'b1), .o_x(x), .o_y(y), .o_r(r), .o_g(g), .o_b(b), .o_depth(o_depth),
     .memory_read_enable(read), .memory_read_place_x(rx), .memory_read_place_y(ry), .memory_read_data(depth),
     .memory_write_enable(write), .memory_write_place_x(wx), .memory_write_place_y(wy), .memory_write_data(new_depth));

@@ -25,6 +25,8 @@ class Field:
         Sizes of the array, the outer one first; empty for a single number.
     format : str
         Number format, for people.
+    below : int, optional
+        Where not all codes are values: how many are, from 0 on. Low bits past the last are read as the last.
 
     Raises
     ------
@@ -37,6 +39,7 @@ class Field:
     signed: bool = False
     shape: tuple[int, ...] = ()
     format: str = ""
+    below: int | None = None
 
     def __post_init__(self):
         if not 1 <= self.width <= 64:
@@ -51,6 +54,11 @@ class Field:
     def count(self) -> int:
         """How many numbers the field has."""
         return prod(self.shape)
+
+    @property
+    def values(self) -> str:
+        """What its numbers are, for people."""
+        return self.format or (f"0 to {self.below - 1}" if self.below else f"{self.width} bits")
 
     @property
     def c_type(self) -> str:
@@ -114,7 +122,7 @@ class ByteLayout:
             low, high = (
                 (-(1 << field.width - 1), (1 << field.width - 1) - 1)
                 if field.signed
-                else (0, (1 << field.width) - 1)
+                else (0, (field.below or 1 << field.width) - 1)
             )
             if codes.size and not low <= codes.min() <= codes.max() <= high:
                 raise ValueError(f"field {field.name} holds {low} to {high}")
@@ -127,7 +135,8 @@ class ByteLayout:
         for name, (field, codes) in self._numbers(data).items():
             low = codes & ((1 << field.width) - 1)
             sign = low >> (field.width - 1) & int(field.signed)
-            found[name] = low - (sign << field.width)
+            code = low - (sign << field.width)
+            found[name] = code if field.below is None else np.minimum(code, field.below - 1)
         return found
 
     def fits(self, data: np.ndarray) -> np.ndarray:

@@ -48,7 +48,7 @@ WORD_BITS = 32
 IDENTITY = int.from_bytes(b"BLSK", "big")
 """Value of the first register."""
 
-VERSION = 1
+VERSION = 2
 """Version of the map."""
 
 FRAME, COUNTERS, CONSTANTS = 0x040, 0x080, 0x800
@@ -116,13 +116,13 @@ class Register:
         return code | ((1 << WORD_BITS) - (1 << self.width) if negative else 0)
 
 
-def frame_registers(picture: bool = False) -> list[Register]:
+def frame_registers(keep: bool = False) -> list[Register]:
     """Registers of the picture, of a core that takes triangles; see `Frame`.
 
     Parameters
     ----------
-    picture : bool
-        Whether the core has a coarse depth test, which needs a bit that changes with each picture.
+    keep : bool
+        Whether the core tests depths, which begin anew with each frame unless they are kept.
     """
     borders = {
         "left": "first column of the picture on the grid",
@@ -137,8 +137,8 @@ def frame_registers(picture: bool = False) -> list[Register]:
         ("back_faces", 2, False, f"back faces, {kinds}"),
         ("limit", LIMIT_BITS, False, "largest chord between the unit normals of a span's ends, in 1/1024"),
     ]
-    if picture:
-        rows.append(("picture", 1, False, "changes with each picture: the coarse depth test begins anew"))
+    if keep:
+        rows.append(("keep", 1, False, "1: the next frame adds to the picture; 0: its depths begin anew"))
     ranges = dict.fromkeys(borders, (-most, most)) | {"back_faces": (0, len(BACK_FACES) - 1)}
     return [
         Register(name, FRAME + 4 * k, "read-write", width, signed, text, range=ranges.get(name))

@@ -92,12 +92,12 @@ class BusUnit(wiring.Component):
             if name != "busy"
         ]
         of_core = self.framing.core.signature.members
-        constants = of_core["constants"].shape if "constants" in of_core else None
+        constants = self.framing.constants.shape() if "constants" in of_core else None
         design = parameters.design if isinstance(parameters, Renderer) else parameters
         self.map = RegisterMap(
             self.framing.top.title,
             counters,
-            frame_registers("picture" in constants.members) if constants else (),
+            frame_registers("keep" in constants.members) if constants else (),
             constant_registers(design) if "write" in of_core else (),
         )
         self._registers = RegistersUnit(self.map)
@@ -168,5 +168,5 @@ _TEXTS = {
     "empty_spans": "spans of length 0",
     "overrun": "whether a span went past the largest column",
     "frames": "frames that have ended",
-    "misfits": "beats of which a number did not fit its field; its low bits were taken",
+    "misfits": "beats of which a number did not fit its field; its low bits were taken, or the last material",
 }

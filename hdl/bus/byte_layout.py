@@ -1,6 +1,7 @@
 """Conversion between bytes of a bus and fields of a payload; the layout follows from the payload's shape."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from amaranth.hdl import Cat, Const, Shape, ShapeLike, Value
 from amaranth.lib import data
@@ -10,7 +11,9 @@ from blysk.golden.bus.byte_layout import ByteLayout, Field
 __all__ = ["bytes_of", "fields_of", "layout_of", "misfits"]
 
 
-def layout_of(shape: ShapeLike, without: Sequence[str] = ()) -> ByteLayout:
+def layout_of(
+    shape: ShapeLike, without: Sequence[str] = (), below: Mapping[str, int] | None = None
+) -> ByteLayout:
     """Layout of the bytes of a payload.
 
     A member of a nested structure is named by both names, with an underscore between; an array of structures
@@ -22,8 +25,11 @@ def layout_of(shape: ShapeLike, without: Sequence[str] = ()) -> ByteLayout:
         Shape of the payload, a structure.
     without : sequence of str
         Members that are elsewhere on the bus.
+    below : mapping of str to int, optional
+        `Field.below` of fields by name.
     """
-    return ByteLayout(tuple(field for field, _ in _fields(shape, without)))
+    fields = [field for field, _ in _fields(shape, without)]
+    return ByteLayout(tuple(replace(field, below=(below or {}).get(field.name)) for field in fields))
 
 
 def _fields(shape: ShapeLike, without: Sequence[str] = ()) -> Iterator[tuple[Field, int]]:
@@ -70,14 +76,18 @@ def fields_of(shape: ShapeLike, word: Value) -> Value:
     return Cat(parts)
 
 
-def misfits(shape: ShapeLike, word: Value) -> Value:
+def misfits(layout: ByteLayout, word: Value) -> Value:
     """Whether a number on the bus does not fit its field."""
     wrong = []
-    for field, _, place in _places(shape, ()):
-        above = word[place + field.width : place + 8 * field.size]
-        if len(above):
-            sign = word[place + field.width - 1].replicate(len(above)) if field.signed else 0
-            wrong.append(above != sign)
+    for field, byte in zip(layout.fields, layout.offsets, strict=True):
+        for k in range(field.count):
+            number = word[8 * (byte + k * field.size) :][: 8 * field.size]
+            above = number[field.width :]
+            if len(above):
+                sign = number[field.width - 1].replicate(len(above)) if field.signed else 0
+                wrong.append(above != sign)
+            if field.below is not None:
+                wrong.append(number[: field.width] >= field.below)
     return Cat(wrong).any()
 
 

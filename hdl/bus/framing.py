@@ -1,6 +1,6 @@
 """Framing: a core between streams of bytes, which tell where packets and frames begin and end."""
 
-from amaranth.hdl import Module, Signal, Value, unsigned
+from amaranth.hdl import Const, Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -29,6 +29,10 @@ def made_shape(layout: ByteLayout) -> data.StructLayout:
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1, "first": 1, "end": 1})
 
 
+def _design_of(core) -> Design:
+    return core.parameters.design if isinstance(core.parameters, Renderer) else core.parameters
+
+
 class FramingUnit(wiring.Component):
     """A core between streams of bytes with the borders of frames: `Framing` is the bit-accurate model.
 
@@ -36,7 +40,8 @@ class FramingUnit(wiring.Component):
     frame's last beat has been accepted at the output, so that beats of two frames are never inside together,
     and constants can change in between. One output beat is held back until the next one comes or the frame
     ends: only then is it known whether it is the last. This costs 2 cycles of latency, and no throughput. A
-    frame without output gives no beat; ``frames`` counts it.
+    frame without output gives no beat; ``frames`` counts it. Depths begin anew with each frame, unless the
+    constant ``keep`` is 1: then the frame adds to the picture of the one before it.
 
     Parameters
     ----------
@@ -54,10 +59,11 @@ class FramingUnit(wiring.Component):
     o : :py:`Out(stream.Signature(made_shape(layout)))`
         Pixels or spans.
     write, constants, memory
-        Members of the core, if it has them.
+        Members of the core, if it has them; in place of ``picture`` the constants have ``keep``.
     status : :py:`Out(...)`
         Counters of the core; ``frames``, which have ended; ``misfits``, the beats with a number that did not
-        fit its field (its low bits were taken); and ``busy``.
+        fit its field (its low bits were taken; of the index of a material past the last the last one); and
+        ``busy``.
 
     Source: docs/theory/bus.md#streams; not in the documents.
     """
@@ -67,7 +73,8 @@ class FramingUnit(wiring.Component):
         self.core = self.top.unit(parameters, **options)
         payloads = self.core.i.payload.shape(), self.core.o.payload.shape()
         self._without = ("last",) if self.packets == "span" else ()
-        given, made = layout_of(payloads[0]), layout_of(payloads[1], self._without)
+        below = {} if top == "geometry" else {"material": _design_of(self.core).materials}
+        given, made = layout_of(payloads[0], below=below), layout_of(payloads[1], self._without)
         self.parameters = Framing(given, made, self.packets)
         counters = {"frames": unsigned(COUNTER_BITS), "misfits": unsigned(COUNTER_BITS), "busy": unsigned(1)}
         members = {
@@ -76,7 +83,12 @@ class FramingUnit(wiring.Component):
             "status": Out(data.StructLayout(self.core.status.shape().members | counters)),
         }
         of_core = self.core.signature.members
-        members |= {name: of_core[name] for name in ("write", "constants", "memory") if name in of_core}
+        members |= {name: of_core[name] for name in ("write", "memory") if name in of_core}
+        if "constants" in of_core:
+            constants = of_core["constants"].shape.members
+            names = {name: "keep" if name == "picture" else name for name in constants}
+            shape = data.StructLayout({names[name]: shape for name, shape in constants.items()})
+            members["constants"] = In(shape)
         super().__init__(members)
 
     def elaborate(self, platform):
@@ -87,8 +99,12 @@ class FramingUnit(wiring.Component):
         for name in ("write", "memory"):
             if name in self.signature.members:
                 wiring.connect(m, wiring.flipped(getattr(self, name)), getattr(core, name))
+        picture, keep = Signal(name="picture"), Const(1)
         if "constants" in self.signature.members:
-            m.d.comb += core.constants.eq(self.constants)
+            given = {name: self.constants[name] for name in self.constants.shape().members}
+            if "keep" in given:
+                keep, given["picture"] = given.pop("keep"), picture
+            m.d.comb += [core.constants[name].eq(value) for name, value in given.items()]
 
         active, ending, accept = Signal(name="active"), Signal(name="ending"), Signal(name="accept")
         settles = Signal(range(_SETTLES + 1), name="settles")
@@ -99,6 +115,7 @@ class FramingUnit(wiring.Component):
             self.i.ready.eq(core.i.ready & ~ending),
             accept.eq(self.i.valid & self.i.ready),
         ]
+        m.d.sync += picture.eq(picture ^ (accept & ~active & ~keep))
         with m.If(accept):
             m.d.sync += [active.eq(1), ending.eq(self.i.payload.last), settles.eq(_SETTLES)]
         with m.Elif(settles != 0):
@@ -111,7 +128,7 @@ class FramingUnit(wiring.Component):
             m.d.sync += [active.eq(0), ending.eq(0)]
 
         misfit = Signal(name="misfit")
-        m.d.sync += misfit.eq(accept & misfits(shape, word))
+        m.d.sync += misfit.eq(accept & misfits(self.parameters.given, word))
         count_events(m, self.status, frames=done, misfits=misfit)
         m.d.comb += [
             *(self.status[name].eq(core.status[name]) for name in core.status.shape().members),

@@ -48,10 +48,14 @@ def _shader(parameters: Design) -> ShadingPipelineUnit:
     return ShadingPipelineUnit(parameters)
 
 
+def _render(parameters: Renderer, **options) -> RenderUnit:
+    return RenderUnit(parameters, clears=True, **options)
+
+
 TOPS = {
     # A write is accepted while no span is inside.
     "shader": Top("spans to pixels", _shader, False, lambda core: ~core.write.ready),
     "geometry": Top("triangles to spans", _geometry, True, lambda core: ~core.idle),
-    "render": Top("triangles to pixels", RenderUnit, True, lambda core: ~core.idle),
+    "render": Top("triangles to pixels", _render, True, lambda core: ~core.idle),
 }
 """Cores by name; those of `PACKETS`."""

@@ -75,8 +75,8 @@ class LineAdapterUnit(PipelinedUnit):
 def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
     """Wire a span of geometry to a span of the shading pipeline: `shading_spans` in hardware.
 
-    Coordinates, lengths and materials are cut to the pipeline's widths, which hold them in any of its
-    pictures.
+    Coordinates and lengths are cut to the pipeline's widths, which hold them in any of its pictures. A
+    material that the pipeline has no code for gets the largest one.
 
     Parameters
     ----------
@@ -96,4 +96,7 @@ def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
     for name, shape in shaded.shape().members.items():
         if name.startswith("normal") and shape != given[name]:
             raise TypeError(f"{name} is {given[name]!r} on one side, {shape!r} on the other")
-        m.d.comb += Value.cast(shaded[name]).eq(Value.cast(span[name]))
+        code, width = Value.cast(span[name]), len(Value.cast(shaded[name]))
+        if name == "material":
+            code = code | code[width:].any().replicate(width)
+        m.d.comb += Value.cast(shaded[name]).eq(code)

@@ -39,7 +39,7 @@ def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
 def layout_lines(layout: ByteLayout) -> list[str]:
     """A line for each field of TDATA: first byte, C type, name, number format."""
     return [
-        f"{offset:>4}  {_declared(field):<28} {field.format or f'{field.width} bits'}"
+        f"{offset:>4}  {_declared(field):<28} {field.values}"
         for field, offset in zip(layout.fields, layout.offsets, strict=True)
     ]
 
@@ -80,7 +80,7 @@ def _markdown(unit: BusUnit, name: str) -> str:
             "| ---: | --- | --- |",
         ]
         for field, offset in zip(layout.fields, layout.offsets, strict=True):
-            form = field.format or f"{field.width} bits"
+            form = field.values
             lines.append(f"| {offset} | `{_declared(field)}` | {form} |")
     return "\n".join(lines) + "\n"
 
@@ -114,7 +114,7 @@ def _header(unit: BusUnit, name: str) -> str:
     for kind, (title, layout) in zip(("input", "output"), _layouts(unit), strict=True):
         lines += ["", f"/* A beat of {title}. */", f"struct {name}_{kind} {{"]
         for field in layout.fields:
-            lines.append(f"    {_declared(field)}; /* {field.format or f'{field.width} bits'} */")
+            lines.append(f"    {_declared(field)}; /* {field.values} */")
         lines.append("};")
     return "\n".join([*lines, "", "#endif", ""])
 

@@ -17,6 +17,8 @@ _MARKS = {
     "run": "a pixel that the next one does not follow on its right, or the last of the frame",
     "frame": "the last one of the frame",
 }
+_DEPTHS = "Depths begin anew with each frame; a frame that is sent with 1 in keep adds to the picture."
+
 _PATHS = {
     "axi": "AXI4-Lite, s_axil_*",
     "wishbone": "Wishbone B4, wb_*, classic or pipelined; wb_adr counts words",
@@ -105,6 +107,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
         "A refused access (SLVERR, err) changes nothing but errors and refused: no register at the address,",
         "the wrong direction, part of a word, a value that does not fit, a write while a frame is inside.",
         "errors takes any word or byte at any time: all ones clear it.",
+        *([_DEPTHS] if "keep" in map.by_name else []),
         "",
         "Registers, by address of a byte:",
         *registers,

@@ -254,7 +254,9 @@ def _render_header(unit: RenderUnit) -> list[str]:
         *lines,
         *_geometry_lines(unit.geometry),
         *_coarse_lines(unit),
-        "memory_*: a depth for each pixel; read data a clock after the place; all ones before a frame",
+        "memory_*: a depth for each pixel; read data a clock after the place; before a picture's first pixel "
+        "the core writes all ones to every pixel of the picture, one a clock",
+        "constants_picture changes with each picture: depths begin anew, as after rst; else it is added to",
     ]
 
 
@@ -264,8 +266,7 @@ def _coarse_lines(unit: RenderUnit) -> list[str]:
     given = unit.coarse.parameters
     return [
         f"coarse depth test: pictures of at most {given.width}x{given.height}, {given.blocks:,} words of "
-        f"{given.word_bits} bits; constants_picture changes with each picture, is 0 for the first; the first "
-        f"span of a picture waits for {given.swept:,} cycles"
+        f"{given.word_bits} bits; the first span of a picture waits for {given.swept:,} cycles"
     ]
 
 
@@ -296,8 +297,7 @@ def _geometry_header(unit: GeometryUnit) -> list[str]:
 def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, str]:
     """Descriptions of the ports of a core with pixels as output."""
     if isinstance(unit, RenderUnit):
-        picture = [] if unit.coarse else ["constants_picture"]
-        return {port: text for port, text in RENDER_PORT_DESCRIPTIONS.items() if port not in picture}
+        return dict(RENDER_PORT_DESCRIPTIONS)
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
     return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}

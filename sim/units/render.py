@@ -47,8 +47,8 @@ def _triangles(unit, rng, count, size=6.0, spread=0.2):
     triangles.material[:] = rng.integers(0, design.materials, count)
     frame = Frame.centred(*_SIZE, limit=Frame.limit_of(15.0))
     write = writes_of(list(_constants(np.random.default_rng(_SEED), design)))
-    picture = {} if unit.coarse is None else {"picture": 0}
-    return Case(triangles.beats, frame.codes | picture, write)
+    codes = frame.codes | {"picture": 0}
+    return Case(triangles.beats, {name: codes[name] for name in unit.constants.shape().members}, write)
 
 
 def _tiny(unit, rng, count):

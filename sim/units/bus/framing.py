@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from blysk.golden.render import Renderer
 from blysk.hdl.bus.framing import FramingUnit
 from blysk.sim.units.geometry.geometry import RECORD as GEOMETRY
 from blysk.sim.units.pipeline import RECORD as SHADER
-from blysk.sim.units.record import PAUSED, Case, Record, Stimulus, Variant, first, length_of
+from blysk.sim.units.record import PAUSED, Case, Record, Stimulus, Variant, first, length_of, together
 from blysk.sim.units.render import RECORD as RENDER
 
 __all__ = ["RECORD"]
@@ -40,26 +41,23 @@ def _columns(layout: ByteLayout, beats) -> dict:
     return {field.name: found[field.name] for field in layout.fields}
 
 
-def _core_case(unit, case) -> Case:
-    """Input of the core inside a unit."""
+def _core_cases(unit, case) -> list[Case]:
+    """Input of the core inside a unit, frame by frame: nothing of a frame is left in the next."""
     data = np.asarray(case.beats["data"], dtype=np.uint8)
-    return replace(case, beats=unit.parameters.given.unpack(data))
-
-
-def _frame_of(unit, case) -> np.ndarray:
-    """Frame of each output beat, from the numbers of output beats up to the end of each input frame."""
-    record, inner = _RECORDS[unit.packets], _core_case(unit, case)
-    begins = np.flatnonzero(np.r_[True, case.beats["last"][:-1]])
-    counts = [
-        length_of(record.expect(unit.core, inner.first(end)))
-        for end in [*begins[1:], len(case.beats["last"])]
+    beats = unit.parameters.given.unpack(data)
+    ends = [*np.flatnonzero(case.beats["last"][:-1]) + 1, len(data)]
+    constants = case.constants and {name: code for name, code in case.constants.items() if name != "keep"}
+    return [
+        replace(case, beats={name: codes[begin:end] for name, codes in beats.items()}, constants=constants)
+        for begin, end in pairwise([0, *ends])
     ]
-    return np.repeat(np.arange(len(begins)), np.diff([0, *counts]))
 
 
 def _expect(unit, case):
-    record, frame = _RECORDS[unit.packets], _frame_of(unit, case)
-    made = unit.parameters.compute(record.expect(unit.core, _core_case(unit, case)), frame)
+    record = _RECORDS[unit.packets]
+    frames = [record.expect(unit.core, each) for each in _core_cases(unit, case)]
+    frame = np.repeat(np.arange(len(frames)), [length_of(each) for each in frames])
+    made = unit.parameters.compute(together(frames), frame)
     # The last beat of a frame that has not ended is held back.
     begun = np.count_nonzero(case.beats["last"]) if not case.beats["last"][-1] else -1
     return first(made, len(frame) - int(len(frame) > 0 and frame[-1] == begun))
@@ -70,7 +68,10 @@ def _status(unit, case):
     ended = int(np.count_nonzero(case.beats["last"]))
     misfits = int(np.count_nonzero(~unit.parameters.given.fits(np.asarray(case.beats["data"], np.uint8))))
     mine = {"frames": ended, "misfits": misfits, "busy": int(not case.beats["last"][-1])}
-    return dict(record.status(unit.core, _core_case(unit, case))) | mine
+    counts = [record.status(unit.core, each) for each in _core_cases(unit, case)]
+    # A flag, where the others are counters.
+    flags = {"overrun": max}
+    return {name: flags.get(name, sum)([each[name] for each in counts]) for name in counts[0]} | mine
 
 
 def _case(unit, rng, count, length):
@@ -78,6 +79,9 @@ def _case(unit, rng, count, length):
     # For spans the stimulus counts pixels.
     count *= 10 if unit.packets == "span" else 1
     inner = next(iter(record.stimuli.values())).make(unit.core, rng, count)
+    if unit.packets == "run":
+        constants = {name: code for name, code in inner.constants.items() if name != "picture"}
+        inner = replace(inner, constants=constants | {"keep": 0})
     data = unit.parameters.given.pack(_columns(unit.parameters.given, inner.beats))
     ends = np.cumsum(rng.integers(1, 2 * length, len(data) + 1)) - 1
     last = np.isin(np.arange(len(data)), ends)

@@ -5,6 +5,7 @@ import ctypes
 import numpy as np
 import pytest
 from amaranth.hdl import Module, Shape, Signal, Value
+from amaranth.lib import data
 from amaranth.sim import Simulator
 
 from blysk.golden.bus.byte_layout import ByteLayout, Field
@@ -68,7 +69,7 @@ def test_hardware_packs_as_the_model(name):
     m.d.comb += [
         payload.eq(fields_of(shape, word)),
         back.eq(bytes_of(shape, payload)),
-        wrong.eq(misfits(shape, word)),
+        wrong.eq(misfits(layout, word)),
     ]
     simulator = Simulator(m)
 
@@ -87,6 +88,31 @@ def test_hardware_packs_as_the_model(name):
 
     simulator.add_testbench(run)
     simulator.run()
+
+
+def test_an_index_past_the_last_is_a_misfit():
+    """It is read as the last; a bit beside the field does not make it less."""
+    layout = layout_of(data.StructLayout({"a": 3, "index": 10}), below={"index": 3})
+    given = np.array([(0, 0), (7, 2), (7, 3), (0, 1023), (0, 1024), (0, 1 << 15 | 3)])
+    words = np.zeros(len(given), layout.dtype)
+    words["a"], words["index"] = given.T
+    packed = words.view(np.uint8).reshape(len(given), layout.size)
+    fits = [True, True, False, False, False, False]
+    assert layout.fits(packed).tolist() == fits
+    assert layout.unpack(packed)["index"].tolist() == [0, 2, 2, 2, 0, 2]
+    m, word, wrong = Module(), Signal(8 * layout.size), Signal()
+    m.d.comb += wrong.eq(misfits(layout, word))
+    simulator = Simulator(m)
+
+    async def run(context):
+        for row, fit in zip(packed, fits, strict=True):
+            context.set(word, int.from_bytes(row.tobytes(), "little"))
+            assert context.get(wrong) != fit
+
+    simulator.add_testbench(run)
+    simulator.run()
+    with pytest.raises(ValueError, match="field index holds 0 to 2"):
+        layout.pack({"a": np.array([0]), "index": np.array([3])})
 
 
 def test_bad_fields_and_codes():
