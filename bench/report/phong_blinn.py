@@ -371,7 +371,7 @@ def _exponent_drawing(found: dict[str, list[float]]) -> Drawing:
         "[P] figure 5: Blinn's exponent over Phong's for the same brightness",
         svg(figure),
         "For coplanar vectors, where R and V are twice as far apart as N and H; at 45 degrees Phong's model "
-        "is dark. No one factor serves every angle: 4 is that of the peak.",
+        "is dark. 4 is the factor of the peak; [P] itself says that it does not hold towards pi/2.",
     )
 
 

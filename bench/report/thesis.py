@@ -102,8 +102,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     first, one = by[square_errors][0]
     turned = _turned(squares)
     text = [
-        "[T] claims speed for four of its methods, each against classical normalisation, in software. "
-        + " ".join(reached),
+        "[T] states of four of its methods how much faster they are than classical normalisation, in "
+        "software. We know neither its programs nor its machine. What follows is measured in NumPy on this "
+        "machine, and does not refute it. " + " ".join(reached),
         "NumPy does an operation at a time on whole arrays, so that a root costs what its unit takes and no "
         "more: "
         + ", ".join(f"{kind} {cost:.2g}" for kind, cost in by[prices][0][1].items())
@@ -132,7 +133,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         _shares_table(by[shading_share]),
         squares,
     ]
-    return Section("thesis", "Claims of [T]: speed, table 1.1, MNSE", text, parts, appendix=True)
+    return Section("thesis", "[T]: speed, table 1.1, MNSE", text, parts, appendix=True)
 
 
 _CLAIM_OF = {(way, baseline): claim for claim in CLAIMS for way in claim.ways for baseline in claim.baselines}
@@ -379,7 +380,7 @@ def _turned(squares: Table) -> str:
                 and better["MNSE as published"] > worse["MNSE as published"]
             ):
                 return (
-                    f"Among the methods it misleads, too: it puts `{worse['method']}` "
+                    f"Of the methods, too, it puts `{worse['method']}` "
                     f"({worse['MNSE as published']:.5g}) before `{better['method']}` "
                     f"({better['MNSE as published']:.5g}), which has the smaller NMSE "
                     f"({better['NMSE']:.5g} against {worse['NMSE']:.5g}) and a largest error of "

@@ -153,8 +153,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         *(f"front of {error} error and {cost}" for error, cost in fronts),
     )
     note = (
-        "Errors: arithmetic, against the same method and model in float64; method, against exactly "
-        "normalised interpolation with the same model; total, against exact normals with Blinn's power, for "
+        "Errors: arithmetic, against the same method and model in float64; method, against exact "
+        "normals of every pixel with the same model; total, against exact normals with Blinn's power, for "
         "a lobe with its own model. Cycles a pixel "
         "are what the units state for these spans: a frame takes fewer where long spans pay for short ones "
         "or pixels lack terms; bisection states none for spans that it divides. A cell is an operator of any "
