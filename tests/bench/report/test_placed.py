@@ -1,6 +1,8 @@
 """The store of place and route: names, merging, what the report takes from it."""
 
 import json
+import re
+from pathlib import Path
 
 from click.testing import CliRunner
 
@@ -8,6 +10,24 @@ from blysk.bench.report import placed as module
 from blysk.bench.report.placed import STORE, design_of, merged, placed, read_store
 from blysk.bench.tools.families import DEVICE
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
+
+GUIDE = Path(__file__).parents[3] / "docs/guide/fpga.md"
+
+
+def test_table_of_the_guide_is_the_store():
+    """Every row of a pipeline, as placed: parts, and a clock rate a seed."""
+    store = {entry["design"]: entry for entry in read_store() if entry["device"] == DEVICE}
+    rows = re.findall(
+        r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)? \| ([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d)",
+        GUIDE.read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    for method, model, chord, *parts, rates in rows:
+        entry = store[f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * bool(chord)}"]
+        shown = [int(part.replace(",", "")) for part in parts]
+        assert shown == [entry[name] for name in ("luts", "flip_flops", "multipliers", "block_rams")], entry
+        assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
+    assert len(rows) == sum(name.startswith("pipeline ") for name in store)
 
 
 def measured(name, *rates):
