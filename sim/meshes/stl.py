@@ -33,28 +33,35 @@ def read_stl(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray]:
 
 def _text(data: bytes, found: Found) -> np.ndarray:
     text = plain_text(data, "replace").lower().encode()
-    solids = len(re.findall(rb"^[ \t]*+solid\b", text, re.MULTILINE))
-    if not solids and b"facet" not in text:
-        raise Refused("it is no STL file: a text without solid and facet")
-    if len(re.findall(rb"\bend[ \t]*+solid\b", text)) < max(solids, 1):
-        raise Refused("it is cut short: the end of the solid is missing")
+    solids = {True: 0, False: 0}
+
+    def without_name(line):
+        solids[line[1] is None] += 1
+        return b""
+
     # A solid's name may hold any word.
-    text = re.sub(rb"^[ \t]*+(?:end[ \t]*+)?solid\b(?:(?!\bfacet\s)[^\n])*+", b"", text, flags=re.MULTILINE)
-    first_words = re.findall(rb"^[ \t]*+([a-z_]++)", text, re.MULTILINE)
-    found.tell_names("keywords", dict.fromkeys(word.decode() for word in first_words), _KNOWN)
-    words = np.array(re.findall(rb"\b(?:facet|vertex)\b", text), dtype="S6")
-    if len(words) % 4 or not (words.reshape(-1, 4) == [b"facet", b"vertex", b"vertex", b"vertex"]).all():
+    text = re.sub(
+        rb"^[ \t]*+(end[ \t]*+)?solid\b(?:(?!\bfacet\s)[^\n])*+", without_name, text, flags=re.MULTILINE
+    )
+    if not solids[True] and b"facet" not in text:
+        raise Refused("it is no STL file: a text without solid and facet")
+    ends = solids[False] or len(re.findall(rb"\bend[ \t]*+solid\b", text))
+    if ends < max(solids[True], 1):
+        raise Refused("it is cut short: the end of the solid is missing")
+    first_words = set(re.findall(rb"^[ \t]*+([a-z_]++)", text, re.MULTILINE))
+    found.tell_names("keywords", sorted(word.decode() for word in first_words), _KNOWN)
+    if not {part.count(b"vertex") for part in text.split(b"facet")} <= {0, 3}:
         raise Refused("a facet has another number of vertices than 3")
     numbers = re.findall(rb"\bvertex\s++(\S++)\s++(\S++)\s++(\S++)", text)
-    if re.search(rb"\bvertex\s[^\n]*_", text):
+    if len(numbers) != text.count(b"vertex"):
+        raise Refused("a vertex has fewer than 3 numbers")
+    words = [word for row in numbers for word in row]
+    if b"_" in b"".join(words):
         raise Refused("a vertex has a number with the character _")
     try:
-        vertices = np.array(numbers, dtype="S").astype(np.float64).reshape(-1, 3)
+        return np.fromiter(map(float, words), np.float64, len(words)).reshape(-1, 3)
     except ValueError as error:
         raise Refused(f"a vertex holds no number ({shown(str(error))})") from None
-    if 4 * len(vertices) != 3 * len(words):
-        raise Refused("a vertex has fewer than 3 numbers")
-    return vertices
 
 
 def _binary(data: bytes, found: Found) -> np.ndarray:

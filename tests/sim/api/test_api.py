@@ -47,6 +47,15 @@ def test_every_option_has_a_type_for_checkers():
     assert len(set(keys)) == len(keys)
 
 
+def test_a_scene_warns_of_what_is_not_read(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\np 1\n")
+    with pytest.warns(RuntimeWarning, match="^a is drawn without: statements: p$"):
+        blysk.scene(path)
+    (told,) = blysk.render(path, size=(16, 12)).figures["ignored"]
+    assert told == "statements: p"
+
+
 def test_frame_is_that_of_the_model(frame):
     expected = model_frame(frame.scene, frame.design)
     np.testing.assert_array_equal(frame.image, expected.image)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
@@ -144,6 +145,38 @@ def test_repairs_are_counted(capsys):
     assert (counts["repaired_normals"], counts["dropped_faces"]) == (2, 1)
     assert re.search(r"^counted +stored normals repaired: 2$", output, re.MULTILINE)
     assert re.search(r"^counted +faces without area dropped: 1$", output, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "options", [[], ["-v"], ["--frames", "1", "--jobs", "1"]], ids=["short", "-v", "frames"]
+)
+def test_what_is_not_read_is_told_in_one_line(capsys, options):
+    Path("a.obj").write_bytes(CORNERS + b"usemtl a\ns off\nf 1 2 3\nl 1 2\nSurf 1\n")
+    assert main(["render", "a.obj", "--size", "16x12", "--json", "a.json", *options]) == 0
+    output, errors = capsys.readouterr()
+    told = [
+        "smoothing groups (--crease says which edges are sharp)",
+        "1 material name without a definition",
+        "statements: l, Surf",
+    ]
+    assert re.findall(r"^ignored +(.*)$", output, re.MULTILINE) == ["; ".join(told)]
+    assert json.loads(Path("a.json").read_text())["ignored"] == told
+    assert errors == ""
+
+
+def test_normals_that_turn_a_mesh_black_are_told(capsys):
+    """A ball wound inwards whose normals point outwards; the named option lights it."""
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    trimesh.Trimesh(ball.vertices, ball.faces[:, ::-1], vertex_normals=ball.vertices, process=False).export(
+        "a.ply", vertex_normal=True
+    )
+    light = []
+    for options in ([], ["--back-faces", "show"]):
+        assert main(["render", "a.ply", "--size", "32x24", *options]) == 0
+        light.append(int(picture("a-blysk.png").max()))
+    (line,) = re.findall(r"^noticed +(.*)$", capsys.readouterr().out.partition("seconds")[0], re.MULTILINE)
+    assert line.startswith("triangles with normals against their winding: 80; --back-faces show takes")
+    assert light[1] > 3 * light[0]
 
 
 def test_no_pixel_shows_the_surface(capsys):
