@@ -133,7 +133,7 @@ def test_default_output_is_named_like_the_mesh(capsys):
 
 def test_repairs_are_counted(capsys):
     rows = ["0 0 0 0 0 1", "1 0 0 0 0 0", "1 1 0 nan 0 1", "0 1 0 0 0.6 0.8", "0 2 0 0 0 1"]
-    faces = ["3 0 1 2", "3 0 2 3", "3 0 3 4"]
+    faces = ["3 0 1 2", "3 0 2 3", "3 0 3 3"]
     names = ("x", "y", "z", "nx", "ny", "nz")
     header = ["ply", "format ascii 1.0", f"element vertex {len(rows)}"]
     header += [f"property float {name}" for name in names]
@@ -173,7 +173,7 @@ def test_normals_that_turn_a_mesh_black_are_told(capsys):
     light = []
     for options in ([], ["--back-faces", "show"]):
         assert main(["render", "a.ply", "--size", "32x24", *options]) == 0
-        light.append(int(picture("a-blysk.png").max()))
+        light.append(picture("a-blysk.png")[8:16, 12:20].mean())
     (line,) = re.findall(r"^noticed +(.*)$", capsys.readouterr().out.partition("seconds")[0], re.MULTILINE)
     assert line.startswith("triangles with normals against their winding: 80; --back-faces show takes")
     assert light[1] > 3 * light[0]
