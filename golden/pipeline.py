@@ -43,7 +43,8 @@ class Build:
         One pixel a cycle, or few multipliers.
     setup_interval : int or None
         Least number of cycles from a span to the next, for methods with that choice: a smaller number needs
-        more multipliers. ``None``: the largest up to 4, or the largest of all in the compact style.
+        more multipliers. ``None``: the largest up to 4 (``renormalise``: 3), or the largest of all in the
+        compact style.
     exponent : int or None
         Specular exponent, fixed at build time; ``None``: the exponent is a frame constant.
 

@@ -47,8 +47,8 @@ class InterpolatorUnit(wiring.Component):
     lights : int
         Number of lights, at least 1.
     setup_interval : int or None
-        Least cycles from a span to the next, one of `setup_intervals`. ``None``: the largest of them up to 4,
-        or the only one of a method without a choice.
+        Least cycles from a span to the next, one of `setup_intervals`. ``None``: the largest of them up to
+        `DEFAULT_INTERVAL`, or the only one of a method without a choice.
     highlights : bool
         Whether there is specular light; without it there are no operands of it.
     length_bits : int
@@ -83,6 +83,9 @@ class InterpolatorUnit(wiring.Component):
     """Unit of each method, by the class of its model; `registry` fills it."""
 
     cycles_per_pixel = 1
+
+    DEFAULT_INTERVAL = 4
+    """Largest `setup_interval` that is taken where none is given."""
 
     shortest_interval: int | None = None
     """Least cycles from a span to the next, where a short one takes fewer than `setup_interval`."""
@@ -145,7 +148,10 @@ class InterpolatorUnit(wiring.Component):
             choice = spelled(intervals) if intervals else "left out"
             raise ValueError(f"setup_interval of {parameters.name} must be {choice}, not {setup_interval}")
         if intervals:
-            self.setup_interval = setup_interval or max(interval for interval in intervals if interval <= 4)
+            most = self.DEFAULT_INTERVAL
+            self.setup_interval = setup_interval or max(
+                interval for interval in intervals if interval <= most
+            )
         self.parameters = parameters
         self.lights = lights
         self.highlights = highlights

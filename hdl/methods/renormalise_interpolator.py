@@ -66,6 +66,9 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
     Source: docs/theory/interpolation.md#renormaliser.
     """
 
+    DEFAULT_INTERVAL = 3
+    """An interval of 4 takes as many multipliers."""
+
     @classmethod
     def setup_intervals(cls, parameters):
         """Initiation intervals of the line setup that save multipliers."""
