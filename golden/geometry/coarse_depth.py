@@ -37,7 +37,7 @@ class CoarseDepth:
     Parameters
     ----------
     width, height : int
-        Size of the largest picture, 1 to 4096.
+        Size of the largest picture, 1 to 4096. A span that goes out of it is kept, and bounds nothing.
     block : int
         Pixels of a block, one of `BLOCKS`. Pixels of the last block outside the picture count as marked.
     depth_bits : int
@@ -80,6 +80,11 @@ class CoarseDepth:
         return self.blocks_per_line * self.height
 
     @property
+    def deepest(self) -> int:
+        """Bound of a cleared block, which is that of no depth."""
+        return (1 << self.depth_bits) - 1
+
+    @property
     def word_bits(self) -> int:
         """Bits of a word: bound, candidate, mask and tag; by default 36, as of a block RAM of the ECP5."""
         return 2 * self.depth_bits + self.block + self.tag_bits
@@ -103,7 +108,7 @@ class CoarseDepth:
         Parameters
         ----------
         x, y, length : int64 arrays, shape (S,)
-            First pixel and pixels of each span, inside the picture, 1 pixel or more.
+            First pixel and pixels of each span, 1 pixel or more.
         depth : int64 array, shape (S,)
             Depth at the first pixel, UQ(24, 9).
         depth_step : int64 array, shape (S,)
@@ -128,7 +133,9 @@ class CoarseDepth:
         end = np.where(ends[1] == self.width - 1, self.block - 1, ends[1] - start)
         mask = (np.int64(2) << end) - (np.int64(1) << (ends[0] - start))
         place = (number * self.blocks + y * self.blocks_per_line + block)[span] + k
-        behind = self._behind(place, upper.min(axis=0), upper.max(axis=0), mask)
+        outside = ((x + length > self.width) | (y >= self.height))[span]
+        lo, hi = np.where(outside, 0, upper.min(axis=0)), np.where(outside, self.deepest, upper.max(axis=0))
+        behind = self._behind(place, lo, hi, mask)
         first = np.cumsum(last - block + 1) - (last - block + 1)
         return np.logical_and.reduceat(behind, first) if len(first) else np.zeros(0, dtype=bool)
 
@@ -137,7 +144,7 @@ class CoarseDepth:
         order = np.argsort(place, kind="stable")
         _, block, count = np.unique(place[order], return_inverse=True, return_counts=True)
         rank = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-        bound = np.full(len(count), (1 << self.depth_bits) - 1)
+        bound = np.full(len(count), self.deepest)
         candidate, marked = np.zeros_like(bound), np.zeros_like(bound)
         full = (1 << self.block) - 1
         behind = np.zeros(len(order), dtype=bool)

@@ -95,7 +95,17 @@ class BandBuffer:
             Channels of 8 bits, with the background where nothing is drawn.
         late : collection of int
             Indices of bands that were late.
+
+        Raises
+        ------
+        ValueError
+            If the picture has another size than the display, or there is no band of an index.
         """
+        size = (self.mode.vertical.visible, self.mode.horizontal.visible, 3)
+        if np.shape(picture) != size:
+            raise ValueError(f"a picture of the display has shape {size}, not {np.shape(picture)}")
+        for wrong in set(late) - set(range(self.bands)):
+            raise ValueError(f"bands are 0 to {self.bands - 1}, not {wrong}")
         shown = self.shown(self.kept(picture))
         for band in late:
             shown[band * self.lines : (band + 1) * self.lines] = self.shown(self.kept(self.background))

@@ -64,7 +64,14 @@ class BandDepth:
             Steps that write ``depth`` after they have read.
         place, depth : int64 arrays, shape (N,)
             Index of the word, and depth.
+
+        Raises
+        ------
+        ValueError
+            If there is no word of an index.
         """
+        for wrong in place[(place < 0) | (place >= self.words)][:1]:
+            raise ValueError(f"a band has words 0 to {self.words - 1}, not {wrong}")
         band = np.cumsum(begins)
         key = band * self.words + place
         order = np.argsort(key, kind="stable")

@@ -45,7 +45,8 @@ class DrawCommands:
     Raises
     ------
     ValueError
-        If a field does not fit, a kind is unknown, or the last command is not ``end``.
+        If a field does not fit, a kind is unknown, the last command is not ``end``, or a list begins at no
+        command.
 
     Source: docs/theory/video.md#bands; [T] chapter 4.
     """
@@ -60,6 +61,28 @@ class DrawCommands:
                 raise ValueError(f"a command's {name} must be 0 to {(1 << bits) - 1}, not {values.max()}")
         if self.words[-1, 0] != KINDS.index("end") or self.words[:, 0].max() >= len(KINDS):
             raise ValueError("commands must be known, and the last must be an end")
+        for wrong in set(self.starts) - set(range(len(self.words))):
+            raise ValueError(f"a list must begin at a command, 0 to {len(self.words) - 1}, not {wrong}")
+
+    def check(self, kind: str, **most: int) -> None:
+        """Refuse commands of a kind with an index or a range that goes past the end of what it is for.
+
+        Parameters
+        ----------
+        kind : str
+            One of `KINDS`.
+        **most : int
+            ``index``: how many indices there are; ``range``: how many elements a range is of.
+
+        Raises
+        ------
+        ValueError
+            If a command goes past the end.
+        """
+        rows = self.words[self.words[:, 0] == KINDS.index(kind)]
+        for name, past in (("index", rows[:, 1] + 1), ("range", rows[:, 2] + rows[:, 3])):
+            for wrong in past[past > most[name]][:1]:
+                raise ValueError(f"a command {kind} has {name} up to {wrong - 1}, past {most[name] - 1}")
 
     @classmethod
     def of(

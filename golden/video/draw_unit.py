@@ -82,7 +82,8 @@ class Drawing:
     ------
     ValueError
         If the design is made for another size, the numbers of lists, presets and frames are not that of the
-        controls, or the numbers of slots and parts differ.
+        controls, the numbers of slots and parts differ, or a command goes past the end of the slots, the
+        materials, the vertices or the triangles.
 
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
@@ -110,6 +111,8 @@ class Drawing:
             raise ValueError(f"the controls choose from {wanted} lists, there are {len(self.presets)}")
         if self.motion.slots != len(self.mesh.parts):
             raise ValueError(f"{len(self.mesh.parts)} meshes need as many slots, not {self.motion.slots}")
+        self.commands.check("transform", index=self.motion.slots, range=self.mesh.vertices)
+        self.commands.check("draw", index=design.materials, range=self.mesh.triangles)
 
     @staticmethod
     def place_bits(size: tuple[int, int], lines: int) -> tuple[int, int]:

@@ -67,6 +67,11 @@ class MeshMemory:
     parts : tuple of Part
         The meshes.
 
+    Raises
+    ------
+    ValueError
+        If there are too few or too many vertices or triangles, or a corner is no vertex.
+
     Source: docs/theory/video.md#vertices; not in the documents.
     """
 
@@ -82,6 +87,8 @@ class MeshMemory:
         for name, count in (("vertices", len(self.position)), ("triangles", len(self.faces))):
             if not 1 <= count < self.LARGEST:
                 raise ValueError(f"a mesh memory holds 1 to {self.LARGEST - 1} {name}, not {count}")
+        for wrong in self.faces[(self.faces < 0) | (self.faces >= self.vertices)][:1]:
+            raise ValueError(f"a corner must be a vertex, 0 to {self.vertices - 1}, not {wrong}")
 
     @classmethod
     def of(cls, meshes: Sequence[Mesh]) -> "MeshMemory":

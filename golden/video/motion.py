@@ -158,7 +158,14 @@ class Motion:
         ----------
         slot, angle : int64 arrays
             Indices of slots; codes of angles.
+
+        Raises
+        ------
+        ValueError
+            If there is no slot of an index.
         """
+        if np.size(slot) and not 0 <= np.min(slot) <= np.max(slot) < self.slots:
+            raise ValueError(f"slots are 0 to {self.slots - 1}, not {np.min(slot)} to {np.max(slot)}")
         cosine, sine = (Fixed(ENTRY, value[..., np.newaxis]) for value in self.turn(angle))
         total = Fixed(OFFSET, self.constant[slot]) + (
             Fixed(ENTRY, self.cosine[slot]) * cosine + Fixed(ENTRY, self.sine[slot]) * sine

@@ -50,7 +50,7 @@ class CoarseDepthUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(deep_span_shape(x_bits, y_bits)))`
-        Spans of one pixel or more, inside the picture.
+        Spans of one pixel or more. One that goes out of the largest picture is kept, and bounds nothing.
     o : :py:`Out(stream.Signature(1))`
         For each span, in order, 1 if it is hidden.
 
@@ -155,7 +155,7 @@ class CoarseDepthUnit(wiring.Component):
         """The span taken in, and whether it must wait for its picture; the words that are cleared."""
         given = self.parameters
         shape = {"x": self.x_bits, "last": self.x_bits, "line": range(given.blocks), "picture": 1}
-        shape |= {"depth": SPAN_DEPTH.width, "step": DEPTH_STEP.width}
+        shape |= {"depth": SPAN_DEPTH.width, "step": DEPTH_STEP.width, "outside": 1}
         span = Signal(data.StructLayout(shape), name="span", reset_less=True)
         span_valid, picture = Signal(name="span_valid"), Signal(name="picture")
         fresh, used = Signal(name="fresh", init=1), Signal(name="used", reset_less=True)
@@ -181,7 +181,7 @@ class CoarseDepthUnit(wiring.Component):
         """Spans split into blocks, one a cycle; also whether a block is there or will follow."""
         given, incoming = self.parameters, self.i.payload
         span, span_valid, held = given_span
-        step = {"step": DEPTH_STEP.width}
+        step = {"step": DEPTH_STEP.width, "outside": 1}
         ends = {"first": bits, "last": bits, "border": 1, "left": self.x_bits - bits}
         ends |= {"place": range(given.blocks)} | step
         next_shape = ends | {"depth": SPAN_DEPTH.width, "back": _SUM_BITS}
@@ -204,6 +204,7 @@ class CoarseDepthUnit(wiring.Component):
                 span.picture.eq(incoming.picture),
                 span.depth.eq(Value.cast(incoming.depth)),
                 span.step.eq(Value.cast(incoming.depth_step)),
+                span.outside.eq((incoming.x + incoming.length > given.width) | (incoming.y >= given.height)),
             ]
         with m.If(advance & goes):
             m.d.sync += [
@@ -216,6 +217,7 @@ class CoarseDepthUnit(wiring.Component):
                 following.depth.eq(span.depth),
                 following.back.eq(_times(span.step.as_signed(), span.x[:bits])),
                 following.step.eq(span.step),
+                following.outside.eq(span.outside),
             ]
         with m.If(advance & taken):
             m.d.sync += [
@@ -241,8 +243,9 @@ class CoarseDepthUnit(wiring.Component):
         """Three stages: depth changes to both ends of a part; depths there; the least and the largest."""
         given, last = self.parameters, self.parameters.block - 1
         common = {"valid": 1, "begins": 1, "ends": 1, "place": range(given.blocks), "mask": given.block}
+        copied = ("valid", "begins", "ends", "place", "depth", "outside")
         both = dict.fromkeys(("near", "far"), _SUM_BITS)
-        shape = common | {"falls": 1} | both
+        shape = common | {"falls": 1, "outside": 1} | both
         steps = Signal(data.StructLayout(shape | {"depth": _SUM_BITS}), name="steps")
         ends = Signal(data.StructLayout(shape), name="ends")
         bounds = dict.fromkeys(("lo", "hi"), given.depth_bits)
@@ -254,16 +257,19 @@ class CoarseDepthUnit(wiring.Component):
         not_over = [Const(1)] + [marked >= k for k in range(1, given.block)]
         with m.If(advance):
             m.d.sync += [
-                *(steps[name].eq(block[name]) for name in ("valid", "begins", "ends", "place", "depth")),
+                *(steps[name].eq(block[name]) for name in copied),
                 steps.mask.eq(Cat(map(and_, begun, not_over))),
                 steps.falls.eq(slope < 0),
                 steps.near.eq(_times(slope, block.first)),
                 steps.far.eq(_times(slope, Mux(block.ends, block.last, last))),
-                *(ends[name].eq(steps[name]) for name in (*common, "falls")),
+                *(ends[name].eq(steps[name]) for name in (*common, "falls", "outside")),
                 *(ends[name].eq(steps.depth + steps[name]) for name in both),
                 *(bound[name].eq(ends[name]) for name in common),
-                bound.lo.eq(self._upper(Mux(ends.falls, ends.far, ends.near))),
-                bound.hi.eq(self._upper(Mux(ends.falls, ends.near, ends.far))),
+                # Never behind a bound, and never before it: what is there stays.
+                bound.lo.eq(Mux(ends.outside, 0, self._upper(Mux(ends.falls, ends.far, ends.near)))),
+                bound.hi.eq(
+                    Mux(ends.outside, given.deepest, self._upper(Mux(ends.falls, ends.near, ends.far)))
+                ),
             ]
         return steps, ends, bound
 

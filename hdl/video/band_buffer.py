@@ -7,6 +7,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.band_buffer import BandBuffer
+from blysk.hdl.geometry.depth_test import is_inside
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.video.display_timing import timing_shape
 
@@ -54,7 +55,7 @@ class BandBufferUnit(wiring.Component):
     request : :py:`Out(stream.Signature(band))`
         Bands to draw, in the order of the picture, without those whose slot has begun.
     pixels : :py:`In(stream.Signature(band_pixel_shape(parameters)))`
-        Pixels of the band asked for last.
+        Pixels of the band asked for last; one that is outside it is lost.
     done : :py:`In(stream.Signature(band))`
         Number of that band, when all its pixels have been taken.
     timing : :py:`In(timing_shape(parameters.mode))`
@@ -129,7 +130,7 @@ class BandBufferUnit(wiring.Component):
 
         coming, after_slot = self._plus_one(last), self._plus_one(slot)
         worth = (coming == after_slot) | (coming == self._plus_one(after_slot))
-        pixel = self.pixels.payload
+        pixel, size = self.pixels.payload, (given.mode.horizontal.visible, given.lines)
         place = Signal(range(2 * given.pixels), name="place")
         word = Cat(pixel[channel][8 - bits :] for channel, bits in zip("rgb", given.colour_bits, strict=True))
         m.d.comb += self.request.payload.eq(last)
@@ -150,7 +151,7 @@ class BandBufferUnit(wiring.Component):
                     self.pixels.ready.eq(1),
                     self.done.ready.eq(1),
                     place.eq(_times(pixel.y, given.mode.horizontal.visible) + pixel.x),
-                    write.en.eq(self.pixels.valid),
+                    write.en.eq(self.pixels.valid & is_inside(pixel, size)),
                     write.data.eq(word ^ self._clear),
                 ]
                 m.d.sync += asked.eq(asked | self.request.ready)

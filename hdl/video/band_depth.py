@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.depth_test import DepthTest
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.golden.video.band_depth import BandDepth
-from blysk.hdl.geometry.depth_test import DepthMemory
+from blysk.hdl.geometry.depth_test import DepthMemory, is_inside
 
 __all__ = ["BandDepthUnit"]
 
@@ -29,7 +29,7 @@ class BandDepthUnit(wiring.Component):
     Members
     -------
     memory : :py:`In(DepthMemory(x_bits, y_bits))`
-        Depths of the band.
+        Depths of the band. A place outside it is clear, and what is written there is lost.
     begin : :py:`In(1)`
         A band begins; only while ``busy`` is low.
     busy : :py:`Out(1)`
@@ -62,12 +62,15 @@ class BandDepthUnit(wiring.Component):
         def address(place) -> Value:
             return (place.y * given.size[0] + place.x)[: len(read.addr)]
 
+        outside = Signal(name="read_outside")
+        with m.If(port.read_enable):
+            m.d.sync += outside.eq(~is_inside(port.read_place, given.size))
         depth, its_tag = read.data[: DEPTH.width], read.data[DEPTH.width :]
         m.d.comb += [
             read.addr.eq(address(port.read_place)),
             read.en.eq(port.read_enable),
-            port.read_data.eq(Mux(its_tag == tag, depth, DepthTest.CLEARED)),
-            write.en.eq(port.write_enable | self.busy),
+            port.read_data.eq(Mux((its_tag == tag) & ~outside, depth, DepthTest.CLEARED)),
+            write.en.eq((port.write_enable & is_inside(port.write_place, given.size)) | self.busy),
             write.addr.eq(Mux(self.busy, place, address(port.write_place))),
             write.data.eq(Mux(self.busy, Cat(port.write_data, before), Cat(port.write_data, tag))),
         ]

@@ -37,6 +37,20 @@ def _short(unit, rng, count):
     return _spans(unit, rng, count, 6, lines=1)
 
 
+def _outside(unit, rng, count):
+    """Spans of a small picture, of which every fourth or so goes out of it, on the right or below."""
+    case = _spans(unit, rng, count, 20, lines=2)
+    beats, given = case.beats, unit.parameters
+    far, low = rng.random((2, count)) < 0.15
+    most = 1 << unit.x_bits
+    beats["x"] = np.where(far, rng.integers(given.width - 3, most, count), beats["x"])
+    beats["length"] = np.where(far, rng.integers(4, most, count), beats["length"])
+    below = 1 << unit.y_bits
+    if given.height < below:
+        beats["y"] = np.where(low, rng.integers(given.height, below, count), beats["y"])
+    return case
+
+
 def _near(unit, rng, count):
     """Depths of 15 bits, which differ in few of the upper bits that are compared."""
     return _spans(unit, rng, count, 12, 1 << 15, lines=1)
@@ -117,6 +131,7 @@ RECORD = Record(
         "spans": Stimulus(_spans, 600),
         "short": Stimulus(_short, 900),
         "near": Stimulus(_near, 600),
+        "outside": Stimulus(_outside, 600),
         "edges": Stimulus(_edges, 2000),
     },
     axis="",

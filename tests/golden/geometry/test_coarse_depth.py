@@ -63,6 +63,21 @@ def test_pictures_begin_cleared():
     assert not np.array_equal(test.compute(**spans), np.concatenate(parts))
 
 
+def test_spans_that_go_out_of_the_picture_are_kept_and_change_nothing():
+    """Their blocks would be those of the next scanline, or of the first."""
+    rng = np.random.default_rng(4)
+    test, spans = CoarseDepth(40, 3), spans_of(rng, 600, 40, 3, 1.0)
+    beside, below = rng.random((2, 600)) < 0.2
+    spans["x"], spans["y"] = spans["x"] + 40 * beside, spans["y"] + 3 * below
+    spans["length"][::50] = 64
+    outside = (spans["x"] + spans["length"] > 40) | below
+    dropped = test.compute(**spans)
+    assert not dropped[outside].any()
+    alone = test.compute(**{name: values[~outside] for name, values in spans.items()})
+    np.testing.assert_array_equal(dropped[~outside], alone)
+    assert alone.mean() > 0.2
+
+
 @pytest.mark.parametrize(("back_faces", "least"), [("flip", 0.3), ("cull", 0.01)])
 def test_frames_are_the_same(back_faces, least):
     """The picture of a teapot to the bit, with fewer pixels shaded."""

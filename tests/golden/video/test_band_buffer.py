@@ -23,6 +23,19 @@ def test_colours(bits):
         assert len(set(shown[:, channel].tolist())) == 1 << count
 
 
+@pytest.mark.parametrize(
+    ("shape", "late", "message"),
+    [
+        ((16, 8, 3), (4,), "bands are 0 to 3, not 4"),
+        ((16, 8, 3), (-1,), "bands are 0 to 3, not -1"),
+        ((16, 9, 3), (), r"has shape \(16, 8, 3\), not \(16, 9, 3\)"),
+    ],
+)
+def test_what_is_beside_the_display(shape, late, message):
+    with pytest.raises(ValueError, match=message):
+        BandBuffer(MODE, 4).compute(np.zeros(shape, dtype=int), late)
+
+
 def test_late_bands_are_background():
     buffer = BandBuffer(MODE, 4, background=(1, 2, 3))
     picture = np.full((16, 8, 3), 200)

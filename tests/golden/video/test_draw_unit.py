@@ -113,3 +113,39 @@ def test_what_does_not_fit_is_refused():
         replace(drawing, controls=Controls(lights=2))
     with pytest.raises(ValueError, match="last must be an end"):
         DrawCommands(np.array([[1, 0, 0, 1]]), (0,))
+
+
+@pytest.mark.parametrize(
+    ("words", "starts", "message"),
+    [
+        ([["transform", 1, 0, 10]], (0,), "transform has index up to 1, past 0"),
+        ([["transform", 0, 1, 10]], (0,), "transform has range up to 10, past 9"),
+        ([["draw", 3, 0, 6]], (0,), "draw has index up to 3, past 2"),
+        ([["draw", 0, 4, 3]], (0,), "draw has range up to 6, past 5"),
+        ([["draw", 0, 0, 6]], (0, 2), "must begin at a command, 0 to 1, not 2"),
+        ([["draw", 0, 0, 6]], (-1,), "must begin at a command, 0 to 1, not -1"),
+    ],
+)
+def test_commands_past_an_end(words, starts, message):
+    """In hardware they would wrap to other slots, materials, vertices, triangles, or commands."""
+    rows = [[KINDS.index(kind), *rest] for kind, *rest in words] + [[0, 0, 0, 0]]
+
+    def check():
+        commands = DrawCommands(np.array(rows), starts)
+        commands.check("transform", index=1, range=10)
+        commands.check("draw", index=3, range=6)
+
+    with pytest.raises(ValueError, match=message):
+        check()
+
+
+def test_drawings_refuse_what_is_past_an_end():
+    drawing = Drawing.of([scene(64)], preset(model="cosquad"))
+    mesh, words = drawing.mesh, drawing.commands.words.copy()
+    with pytest.raises(ValueError, match="a corner must be a vertex"):
+        replace(mesh, faces=np.where(mesh.faces == 0, mesh.vertices, mesh.faces))
+    with pytest.raises(ValueError, match="slots are 0 to 0, not -1 to -1"):
+        drawing.motion.matrix(-1, 0)
+    words[words[:, 0] == KINDS.index("draw"), 3] += 1
+    with pytest.raises(ValueError, match="a command draw has range up to"):
+        replace(drawing, commands=replace(drawing.commands, words=words))

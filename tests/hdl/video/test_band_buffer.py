@@ -17,7 +17,7 @@ FRAMES = 3
 
 
 class Drawing:
-    """Pixels of any band of any frame: two of three, some drawn twice; what a band was drawn as last."""
+    """Pixels of any band of any frame, some drawn twice, some beside it; what a band was drawn as last."""
 
     def __init__(self, parameters):
         self.parameters, self.frame, self.asked = parameters, -1, []
@@ -30,11 +30,13 @@ class Drawing:
         self.frame += band == 0
         self.asked.append(band)
         rng = np.random.default_rng([self.frame + 1, band])
-        x, y = rng.integers(0, given.mode.size[0], given.pixels), rng.integers(0, given.lines, given.pixels)
+        width = given.mode.size[0]
+        x = rng.integers(0, 1 << (width - 1).bit_length(), given.pixels)
+        y = rng.integers(0, given.lines, given.pixels)
         colour = rng.integers(0, 256, (given.pixels, 3))
         lines = self.picture[band * given.lines : (band + 1) * given.lines]
         lines[:] = given.background
-        for k in range(given.pixels):
+        for k in np.flatnonzero(x < width):
             lines[y[k], x[k]] = colour[k]
         return np.c_[x, y, colour].tolist()
 

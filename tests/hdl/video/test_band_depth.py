@@ -13,7 +13,10 @@ SIZE = 5, 3
 
 @pytest.mark.parametrize("tag_bits", [2, 3])
 def test_reads_are_those_of_the_band(tag_bits):
-    """40 bands, some without a write: a tag that came round unswept would show an old depth."""
+    """40 bands, some without a write: a tag that came round unswept would show an old depth.
+
+    Places outside a band are clear, and what is written there is lost.
+    """
     model, rng = BandDepth(SIZE, tag_bits), np.random.default_rng(tag_bits)
     count = 600
     begins = rng.random(count) < 0.1
@@ -21,9 +24,13 @@ def test_reads_are_those_of_the_band(tag_bits):
     writes = rng.random(count) < 0.3
     # Long runs of bands without a write at all: words of the bands before wait for their sweep.
     writes[200:400] = False
-    x, y = rng.integers(0, SIZE[0], count), rng.integers(0, SIZE[1], count)
+    anywhere = rng.random(count) < 0.3
+    x = rng.integers(0, np.where(anywhere, 8, SIZE[0]))
+    y = rng.integers(0, np.where(anywhere, 4, SIZE[1]))
+    inside = (x < SIZE[0]) & (y < SIZE[1])
     depth = rng.integers(0, DepthTest.FARTHEST, count)
-    expected = model.compute(begins, writes, y * SIZE[0] + x, depth)
+    expected = model.compute(begins, writes & inside, np.where(inside, y * SIZE[0] + x, 0), depth)
+    expected[~inside] = DepthTest.CLEARED
     dut, found = BandDepthUnit(model, 3, 2), []
 
     async def bench(ctx):
@@ -58,6 +65,13 @@ def test_reads_are_those_of_the_band(tag_bits):
     simulator.run()
     np.testing.assert_array_equal(found, expected[~begins])
     assert 0.05 < np.mean(np.array(found) != DepthTest.CLEARED) < 0.9
+
+
+def test_words_that_there_are_not():
+    none = np.zeros(1, dtype=bool)
+    for place in (-1, 15):
+        with pytest.raises(ValueError, match=f"a band has words 0 to 14, not {place}"):
+            BandDepth(SIZE).compute(none, none, np.array([place]), np.array([3]))
 
 
 def test_tag_bits_out_of_range():
