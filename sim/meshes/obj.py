@@ -207,7 +207,7 @@ def tidy_obj(data: bytes, found: Found) -> bytes:
     """An OBJ file in the form that trimesh reads: positions of 3 numbers, and faces of 3 corners.
 
     Lines that trimesh would read wrongly are refused: numbers in another form than C's, positions with a
-    weight other than 1, indices that are 0.
+    weight other than 1, indices that are 0, normals that are not there, for which it leaves out all others.
     """
     if re.search(rb"^(?:[ \t]++(?:vn?|f)[ \t]|(?:vn?|f)(?:\t| [ \t]))", data, re.MULTILINE):
         data = re.sub(rb"^[ \t]*(v|vn|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
@@ -222,6 +222,13 @@ def tidy_obj(data: bytes, found: Found) -> bytes:
         raise Refused("a face has the vertex index 0; they count from 1")
     if re.search(rb"^f .*[ /]-\d", data, re.MULTILINE):
         data = _absolute(data)
+    normals, faces = (
+        len(re.findall(rb"^vn ", data, re.MULTILINE)),
+        re.findall(rb"^f [^\n]*", data, re.MULTILINE),
+    )
+    used = map(int, set(re.findall(rb"\d/\d*/(\d+)", b"\n".join(faces))))
+    if wrong := [index for index in used if not 1 <= index <= normals]:
+        raise Refused(f"a face has the normal {max(wrong)}, there are {normals}")
     return _triangular(data)
 
 
