@@ -55,7 +55,7 @@ _KNOWN = {
 _ATTRIBUTES = re.compile("POSITION|NORMAL|TANGENT|(TEXCOORD|JOINTS|WEIGHTS|COLOR)_[0-9]+|_.*")
 
 
-def gltf_document(data: bytes, suffix: str) -> dict:
+def gltf_document(data: bytes, suffix: str, found: Found) -> dict:
     """The JSON part of a GLB or glTF file, of version 2."""
     if suffix == ".glb":
         if len(data) < 20 or data[:4] != b"glTF":
@@ -65,6 +65,7 @@ def gltf_document(data: bytes, suffix: str) -> dict:
             raise _of_version(f"{version}.0")
         if len(data) < (said := max(length, 20 + json_length)):
             raise Refused(f"it is cut short: the header says {said} bytes, there are {len(data)}")
+        found.tell("byte after its end", "bytes after its end", len(data) - said)
         data = data[20 : 20 + json_length]
     try:
         document = json.loads(plain_text(data))

@@ -284,7 +284,10 @@ def _plain_primitive(primitive: dict, arrays: _Arrays, found: Found) -> dict:
         if any(accessors[index]["componentType"] != _FLOAT for index in given.values()):
             raise Refused("its POSITION is compressed and quantised, too", "export it with one of both")
         decoded, corners = arrays.decoded(primitive)
-        vectors = {name: decoded[name].astype(np.float64) for name in given}
+        vectors = {
+            name: decoded[name].astype(np.float64) if name in decoded else arrays.vectors(index, name)
+            for name, index in given.items()
+        }
     if len({len(values) for values in vectors.values()}) > 1:
         found.tell("normals of another number than positions")
         del vectors["NORMAL"]
@@ -295,6 +298,8 @@ def _plain_primitive(primitive: dict, arrays: _Arrays, found: Found) -> dict:
         corners = np.stack([corners[1:-1], corners[2:], np.full(len(corners) - 2, corners[0])], axis=1)
     elif mode == _STRIP:
         corners = strip_triangles(corners)
+    elif len(corners) % 3:
+        raise Refused(f"a part of triangles has {len(corners)} corners, no multiple of 3")
     plain = {"attributes": {name: arrays.add(values) for name, values in vectors.items()}}
     plain["indices"] = arrays.add(corners.ravel())
     return plain | ({"material": primitive["material"]} if "material" in primitive else {})

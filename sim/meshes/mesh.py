@@ -240,7 +240,7 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     elif suffix == ".stl":
         return trimesh.Scene(trimesh.Trimesh(*read_stl(data, found), process=False)), found
     else:
-        document = gltf_document(data, suffix)
+        document = gltf_document(data, suffix, found)
         check_gltf(document)
         buffers = gltf_buffers(document, data, suffix, path.parent)
         complete_scene(document, found)

@@ -108,7 +108,7 @@ def _library_files(name: str, folder: Path, found: Found) -> list[Path]:
     files, told = [], {}
     for part in dict.fromkeys([name, bare, *bare.split()]):
         try:
-            target = inside(folder, part)
+            target = inside(folder, part, part.replace("\\", "/"))
         except Refused:
             told[part] = _REASONS[1]
             continue

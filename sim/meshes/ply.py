@@ -68,8 +68,10 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
     """
     order, elements, body = _header(data, found)
     columns: dict[str, _Columns] = {}
-    rows = [line for line in body.splitlines() if line.strip()] if not order else []
+    rows = []
     if not order:
+        body = plain_text(body, "replace").encode()
+        rows = [line for line in body.split(b"\n") if line.strip()]
         expected = sum(element.rows for element in elements)
         if len(rows) < expected:
             raise Refused(f"it is cut short: the header says {expected} lines of data, there are {len(rows)}")
@@ -84,6 +86,9 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
             start += element.rows
         if element.rows:
             _tell(element, columns[element.name], found)
+    unit = "byte" if order else "line"
+    rest = len(body if order else rows) - start
+    found.tell(f"{unit} after the last element", f"{unit}s after the last element", rest)
     vertex = columns.get("vertex", {})
     if not all(isinstance(vertex.get(name), np.ndarray) for name in "xyz"):
         raise Refused("its vertices have no x, y and z")

@@ -166,6 +166,20 @@ def test_gltf_contents_that_are_not_read(tmp_path, name):
     assert (loaded.ignored, loaded.mesh.vertices.tolist()) == (told, TRIANGLE)
 
 
+def test_odd_counts_of_corners(tmp_path):
+    content = mesh_gltf(faces=[0, 1, 2, 0])
+    check_refused(tmp_path / "a.glb", "a part of triangles has 4 corners, no multiple of 3", content=content)
+    document, buffer = mesh_gltf()
+    empty = {**document["accessors"][1], "count": 0}
+    document["accessors"].append(empty)
+    document["meshes"][0]["primitives"].append({"attributes": {"POSITION": 0}, "indices": 2})
+    assert len(load(tmp_path / "a.glb", (document, buffer)).mesh.faces) == 1
+
+
+def test_bytes_after_the_end(tmp_path):
+    assert load(tmp_path / "a.glb", glb(*mesh_gltf()) + b"\n").ignored == ("1 byte after its end",)
+
+
 def test_several_scenes(tmp_path):
     document, buffer = mesh_gltf(nodes=[{"mesh": 0}, {"mesh": 0}])
     document["scenes"].append({"nodes": [1]})

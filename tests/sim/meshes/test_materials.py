@@ -88,6 +88,10 @@ def test_obj_materials(tmp_path):
             "mtllib a.mtl\nmtllib ./b.mtl\r",
             {"a.mtl": "newmtl a\r\nKd 1 0 0\r", "b.mtl": "newmtl b\nKd 0 1 0"},
         ),
+        (
+            "mtllib .\\sub\\a.mtl\nmtllib b.mtl",
+            {"sub/a.mtl": "newmtl a\nKd 1 0 0", "b.mtl": "newmtl b\nKd 0 1 0"},
+        ),
         ("mtllib a.mtl # of a\nmtllib b.mtl", {"a.mtl": "newmtl a\nKd 1 0 0", "b.mtl": "newmtl b\nKd 0 1 0"}),
         ("  mtllib\tsub/c d.mtl", {"sub/c d.mtl": "\ufeffnewmtl a\nKd 1 0 0\n  newmtl\tb \nKd 0 1 0"}),
     ],

@@ -113,3 +113,4 @@ def binary_ply(end, newline="\n", comment="", order="little", tail=b""):
 def test_ends_of_a_ply_header(tmp_path, data):
     mesh = load(tmp_path / "a.ply", data).mesh
     np.testing.assert_allclose(mesh.vertices[mesh.faces], [TRIANGLE], atol=1e-40)
+    assert load(tmp_path / "a.ply", data + b"\n").ignored == ("1 byte after the last element",)

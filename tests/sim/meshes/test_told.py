@@ -130,6 +130,7 @@ PLY_TOLD = {
         ply_of(elements="property int material\n", faces="3 0 1 2 9\n"),
         ("face properties: material",),
     ),
+    "lines behind": (ply_of(tail="3 0 1 2\n\n3 0 1 2\n"), ("2 lines after the last element",)),
     "texture": (
         ply_of().replace("1.0\n", "1.0\ncomment TextureFile a.png\ncomment texturefile b.png\n", 1),
         ("2 textures",),
