@@ -32,8 +32,6 @@ __all__ = [
     "refuse_too_large",
 ]
 
-_REMEDY = install_extra("board")
-
 PERIODS = 1
 """Periods of the reader's clock that a path between two clocks may take; crossing words stay longer."""
 
@@ -133,7 +131,7 @@ class Board:
         try:
             module = importlib.import_module(f"amaranth_boards.{self.module}")
         except ModuleNotFoundError as error:
-            raise InputError("board", f"{error.name} is not installed", _REMEDY) from error
+            raise InputError("board", f"{error.name} is not installed", install_extra("board")) from error
         return getattr(module, self.platform)(toolchain="Trellis")
 
 
@@ -217,7 +215,7 @@ def packages_missing() -> None:
     missing = [package for package in needed if version_of(package) is None]
     if missing:
         verb = "is" if len(missing) == 1 else "are"
-        raise InputError("board", f"{' and '.join(missing)} {verb} not installed", _REMEDY)
+        raise InputError("board", f"{' and '.join(missing)} {verb} not installed", install_extra("board"))
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ class RenderedFrame:
         subtitle = "no pixel shows the surface"
         if self.figures["visible_pixels"]:
             subtitle = (
-                "simulated RTL beside exact normals of every pixel in float64: largest error "
+                "simulated RTL beside exact normals of every pixel, same model, in float64: largest error "
                 f"{self.error.max_lsb:.2f} LSB, {self.cycles:,} cycles for {self.pixels:,} pixels"
             )
         title = f"{self.name}: {self.design.method}, {self.design.model}{highlight}"
@@ -188,7 +188,7 @@ class RenderedFrame:
             "cycles": f"{self.cycles:,}",
             "spans": f"{self.spans:,}",
             "pixels": f"{self.pixels:,}",
-            "largest error": f"{self.error.max_lsb:.3f} LSB",
+            "largest error, exact normals, same model": f"{self.error.max_lsb:.3f} LSB",
             "PSNR": f"{self.error.psnr_db:.2f} dB",
         }
         table = "".join(

@@ -1,5 +1,6 @@
 """Figures of frames as text, line by line."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -171,7 +172,8 @@ def _pixel_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 def _bound(figures: Mapping[str, Any]) -> str:
     bound = figures["bound_lsb"]
-    return "no bound is known" if bound is None else f"bound {bound:.2f}"
+    # Rounded up: a bound stays one.
+    return "no bound is known" if bound is None else f"bound {math.ceil(100 * bound - 1e-6) / 100:.2f}"
 
 
 def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:

@@ -20,7 +20,7 @@ def test_every_page_fits_a_phone(watching, tmp_path):
     write_pages(tmp_path / "pages", ["dot_product"], samples=500)
     texts, pictures = documents(web.folders_of(tmp_path / "pages"))
     texts["style.css"] = web._read("report.css") + web._read("web/site.css")
-    for name in dict.fromkeys(Path(name).parent for name in texts):
+    for name in dict.fromkeys(Path(name).parent for name in [*texts, *pictures]):
         (tmp_path / "site" / name).mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         (tmp_path / "site" / name).write_text(text, encoding="utf-8")
