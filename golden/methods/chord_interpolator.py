@@ -269,6 +269,6 @@ class ChordInterpolator(Interpolator):
 
 
 METHODS = {
-    ChordInterpolator(): "no normals: 1 - N.H is nearly a quadratic along a span; exact, a pixel a cycle"
+    ChordInterpolator(): "no normals: 1 - N.H is nearly a quadratic along a span; a pixel a cycle"
 }
 """The method of this module, and a line about it."""
