@@ -321,7 +321,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 for mesh, model, row in frames
             ],
             "White light, k_d 0.4 and k_s 0.55; pixels with |N·L| over 0.002, but for the last column. "
-            "*Units*: against the method and the model in float64, the rounding of a pixel included.",
+            "*Units*: against the method and the model in float64, the rounding of a pixel included. *Total* "
+            "and *anywhere*: against exact normals of every pixel with Blinn's power, `ggx` and `beckmann` "
+            "with their own model.",
         ),
         _front(pipelines, worst),
     ]

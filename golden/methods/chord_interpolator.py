@@ -268,7 +268,5 @@ class ChordInterpolator(Interpolator):
         return self.DIFFUSE_BUDGET / 255
 
 
-METHODS = {
-    ChordInterpolator(): "no normals: 1 - N.H is nearly a quadratic along a span; a pixel a cycle"
-}
+METHODS = {ChordInterpolator(): "no normals: 1 - N.H is nearly a quadratic along a span; a pixel a cycle"}
 """The method of this module, and a line about it."""
