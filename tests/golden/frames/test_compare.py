@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blysk.golden.frames.compare import BORDER, border_mask, compare, compare_image, error_bound, target_of
+from blysk.golden.frames.compare import (
+    BORDER,
+    border_mask,
+    compare,
+    compare_image,
+    error_bound,
+    has_step,
+    target_of,
+)
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
@@ -74,6 +82,7 @@ def test_a_step_of_the_lobe_is_a_border():
     smooth, rough = (border_mask(scene, raster, model) for model in (BLINN, GGX))
     assert (smooth <= rough).all()
     assert rough.sum() > smooth.sum()
+    assert not has_step(facing(np.eye(3) + 1, exponent=1), preset("chord", "cosquad").specular.model)
     small = replace(scene, material=replace(GREY, roughness=0.1))
     np.testing.assert_array_equal(border_mask(small, raster, GGX), smooth)
 
