@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from blysk.sim.errors import InputError
+from blysk.sim.run_files import writes
 
 __all__ = [
     "all_or_none",
@@ -59,8 +60,9 @@ def check_writable(path: str | os.PathLike) -> None:
     ------
     InputError
         If the parent is missing, is no folder or may not be written, or the path is a folder or a file
-        that may not be written.
+        that may not be written; or a file that the run reads, see `RunFiles`.
     """
+    writes(path)
     path = Path(path)
     parent = path.parent
     try:

@@ -186,7 +186,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
     Raises
     ------
     InputError
-        If a file cannot be written, or a library is missing.
+        If a file cannot be written, or would replace a file of no report, or a library is missing.
     """
     files = {f"{table.name}.csv": _as_csv(table) for table in _tables(sections)}
     drawings = [section.conclusion.drawing for section in sections if section.conclusion]
@@ -194,6 +194,9 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
     text = page(sections, about)
     check_folder(folder)
     earlier = _earlier(folder) or {}
+    for name in files.keys() - set(earlier.get("files", ())):
+        if (folder / name).exists():
+            raise InputError(str(folder / name), "is of no report, and would be replaced", "move it")
     folder.mkdir(exist_ok=True)
     figures = {
         section.name: {
@@ -210,12 +213,15 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
         for section in sections
     }
     # First: it tells that the folder is ours.
-    write_json(folder / _JSON, {**about, "files": [_PAGE, _JSON, *files], "sections": figures})
+    mine = [_PAGE, _JSON, *files]
+    known = list(dict.fromkeys([*mine, *earlier.get("files", ())]))
+    write_json(folder / _JSON, {**about, "files": known, "sections": figures})
     for name, content in files.items():
         write_text(folder / name, content)
     for name in earlier.get("files", ()):
         if name.endswith((".csv", ".svg")) and name not in files and Path(name).name == name:
             (folder / name).unlink(missing_ok=True)
+    write_json(folder / _JSON, {**about, "files": mine, "sections": figures})
     write_text(folder / _PAGE, text)
 
 

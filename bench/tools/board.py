@@ -31,6 +31,7 @@ from blysk.golden.video.draw_unit import turned
 from blysk.hdl.emit.processes import run_program
 from blysk.hdl.gpu import GpuUnit
 from blysk.sim.cli.options import given_options, lights_of, options_of
+from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.errors import InputError
@@ -39,6 +40,7 @@ from blysk.sim.frames.figures import reference_of
 from blysk.sim.frames.picture import check_image_path, write_image
 from blysk.sim.installation import install_package
 from blysk.sim.output import atomic_writer, check_writable, write_json
+from blysk.sim.run_files import check_beside
 from blysk.sim.value_types import Choice, Number, OutputFile, Whole
 
 __all__ = ["built_lines", "command", "missed", "shown_lines", "too_heavy"]
@@ -110,7 +112,7 @@ def command(
         raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
     if not simulate:
         packages_missing()
-        check_writable(output)
+        check_outputs([], pictures=[], others=[output, record])
     recorded = _recorded(record)
     gpu, scenes = gpu_of(board, mesh, given, colours)
     try:
@@ -221,6 +223,7 @@ def _simulate(
     try:
         for path in paths:
             check_image_path(path)
+        check_beside(paths)
         start = perf_counter()
         rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
         mode = gpu.buffer.mode

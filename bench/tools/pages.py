@@ -53,6 +53,8 @@ PROJECT = Path(__file__).parents[2]
 SAMPLES = 100_000
 """Random operands of each variant, enough for the drawings."""
 
+_MADE = "made by `blysk pages`"
+
 _TITLES = {
     "geometry": "Triangles to spans",
     "normals": "Normals of a span",
@@ -380,7 +382,7 @@ def index_page(folder: Path) -> str:
     lines = [
         "# The units",
         "",
-        "One page a unit, made by `blysk pages` from the code itself: text from the docstrings, figures as "
+        f"One page a unit, {_MADE} from the code itself: text from the docstrings, figures as "
         "`blysk blocks` measures them, drawings from netlists and simulations. The units are in the order in "
         "which a span passes them; of those that do the same a pipeline has one.",
     ]
@@ -401,6 +403,19 @@ def index_page(folder: Path) -> str:
             lines += ["", f"## {_TITLES[room]}", ""]
             lines += ["| unit | what it does | source | structure |", "| --- | --- | --- | --- |", *rows]
     return "\n".join([*lines, ""])
+
+
+def _check_ours(folder: Path, units: Sequence[str]) -> None:
+    """Refuse a folder whose first page, or without one whose page of a unit, is of somebody else."""
+    first = folder / "README.md"
+    if first.is_file() and _MADE not in first.read_text(encoding="utf-8", errors="replace"):
+        others = [first]
+    else:
+        others = [] if first.is_file() else [folder / f"{unit}.md" for unit in units]
+    for path in others:
+        if path.exists():
+            reason = "would be replaced, and `blysk pages` did not write it"
+            raise InputError(str(path), reason, "give a folder of its own")
 
 
 def write_pages(
@@ -435,6 +450,7 @@ def write_pages(
     except OSError as error:
         raise InputError(str(folder), f"cannot be made ({error.strerror})", "give another folder") from None
     check_writable(folder / "README.md")
+    _check_ours(folder, units)
     for unit in units:
         if progress:
             progress(unit)

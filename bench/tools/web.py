@@ -48,6 +48,7 @@ from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
 from blysk.sim.installation import install_extra
 from blysk.sim.output import atomic_writer, files_within, write_json, write_text
+from blysk.sim.run_files import reads
 from blysk.sim.value_types import Whole
 
 __all__ = [
@@ -133,6 +134,8 @@ def _report_files(folder: Path) -> list[Path]:
     files = [folder / name for name in names if Path(name).name == name]
     if not files or not all(path.is_file() for path in files):
         raise InputError(f"--report {folder}", "is no report", "make one with `blysk bench FOLDER`")
+    for path in files:
+        reads(path)
     return files
 
 

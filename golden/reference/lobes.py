@@ -99,7 +99,7 @@ class MicrofacetModel(ReflectionModel):
         ValueError
             If the roughness is not greater than 0 and at most 1.
         """
-        return self._peak(checked_roughness(roughness) ** 2)
+        return self._peak(_alpha(checked_roughness(roughness)))
 
     def _peak(self, alpha: float) -> float:
         return 1 / (math.pi * alpha * alpha)
@@ -117,7 +117,7 @@ class TrowbridgeReitz(MicrofacetModel):
     """
 
     def _lobe(self, cosine, roughness):
-        alpha = roughness**2
+        alpha = _alpha(roughness)
         spread = (1 - cosine) * (1 + cosine) * ((1 - alpha) * (1 + alpha) / alpha**2)
         return np.where(cosine > 0, (1 + np.maximum(spread, 0.0)) ** -2.0, 0.0)
 
@@ -136,7 +136,7 @@ class Beckmann(MicrofacetModel):
     """
 
     def _lobe(self, cosine, roughness):
-        alpha = roughness**2
+        alpha = _alpha(roughness)
         # Below the limit the exponential is 0: tan^2 / alpha^2 is nearly 800.
         square = np.maximum(cosine * cosine, 1 / (1 + 800 * alpha**2))
         tangent = (1 - cosine) * (1 + cosine) / square
@@ -324,9 +324,17 @@ def checked_roughness(roughness: float) -> float:
     return roughness
 
 
+def _alpha(roughness: float) -> float:
+    """``roughness^2``, large enough that its powers are numbers.
+
+    The lobes are then 0 but at N·H = 1, as they are for any smaller roughness: the next cosine gives 1e-100.
+    """
+    return max(roughness, 2.0**-96) ** 2
+
+
 def _energy_of_ggx(roughness: float) -> float:
     """``1 / (4 pi I)`` with ``I = (z - ln(1 + z)) / (2 z^2)``, ``z = (1 - alpha^2) / (2 alpha^2)``."""
-    alpha = roughness**2
+    alpha = _alpha(roughness)
     z = (1 - alpha) * (1 + alpha) / (2 * alpha * alpha)
     # Near z = 0 the difference has lost its digits; the series is off by less than z^3 / 10.
     integral = (z - math.log1p(z)) / (2 * z * z) if z > 1e-4 else 0.25 - z / 6 + z * z / 8
@@ -340,7 +348,7 @@ def _energy_of_beckmann(roughness: float) -> float:
     ``4 / alpha^2 integral_0^1 exp(-t/alpha^2) (2/(1 + t) - 1) dt``. The part with t over 40 alpha^2 is under
     e^-40.
     """
-    alpha = roughness**2
+    alpha = _alpha(roughness)
     half = min(1.0, 40 * alpha * alpha) / 2
     nodes, weights = np.polynomial.legendre.leggauss(64)
     t = (nodes + 1) * half
@@ -380,7 +388,7 @@ def exponent_of_roughness(roughness: float) -> float:
     -----
     Source: docs/theory/models.md#reflection-models; Walter 2007.
     """
-    return 2 / checked_roughness(roughness) ** 4 - 2
+    return 2 / _alpha(checked_roughness(roughness)) ** 2 - 2
 
 
 def roughness_of_exponent(exponent: float) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from blysk.golden.bus.byte_layout import ByteLayout
 from blysk.golden.bus.registers import ADDRESS_BITS, ERRORS, WORD_BITS, Register
 from blysk.hdl.bus.bus import BusUnit
+from blysk.sim.run_files import MARK
 
 __all__ = ["DOCUMENTS", "documents_of", "layout_lines"]
 
@@ -56,6 +57,8 @@ def _markdown(unit: BusUnit, name: str) -> str:
     lines = [
         f"# Registers of {name}",
         "",
+        f"<!-- {MARK} -->",
+        "",
         f"{unit.map.core.capitalize()}. Words of {WORD_BITS} bits, little endian, in {_SPACE} bytes. Signed "
         "values are extended by their sign. An access that is refused (SLVERR, ERR) changes nothing but "
         "`errors` and `refused`. `errors` takes any word or byte at any time: all ones clear it.",
@@ -94,7 +97,7 @@ def _layouts(unit: BusUnit) -> Iterator[tuple[str, ByteLayout]]:
 def _header(unit: BusUnit, name: str) -> str:
     upper = name.upper()
     lines = [
-        f"/* {name}: registers and the layouts of its streams, written by blysk. */",
+        f"/* {name}: registers and the layouts of its streams, {MARK}. */",
         f"#ifndef {upper}_REGISTERS_H",
         f"#define {upper}_REGISTERS_H",
         "",
@@ -157,7 +160,8 @@ def _svd(unit: BusUnit, name: str) -> str:
                 bitWidth=width,
             )
     ET.indent(device)
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(device, encoding="unicode")}\n'
+    head = f'<?xml version="1.0" encoding="utf-8"?>\n<!-- {MARK} -->\n'
+    return f"{head}{ET.tostring(device, encoding='unicode')}\n"
 
 
 def _texts(parent: ET.Element, **texts: object) -> None:

@@ -1,7 +1,8 @@
 """Designs by the options of the command line, and their Verilog."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any, Literal, Unpack, cast
@@ -39,6 +40,7 @@ __all__ = [
     "design_of",
     "header_of",
     "pixel_pipelines",
+    "refused_counts",
     "renderer_of",
     "verilog",
     "verilog_and_unit",
@@ -427,3 +429,16 @@ def verilog_and_unit(
         header = [*lines, "", "Frame constants, through the write port:", *words]
         descriptions = _descriptions(unit, pipes)
     return emit(unit, name, header=header, descriptions=descriptions), unit
+
+
+@contextmanager
+def refused_counts(design: Design | None) -> Iterator[None]:
+    """Turn the refusal of a scene by the caller's own design, if there is one, into an `OptionError`."""
+    try:
+        yield
+    except ValueError as error:
+        if design is None:
+            raise
+        raise OptionError(
+            "design", "", str(error), "make another for the scene's lights and materials"
+        ) from error

@@ -23,6 +23,7 @@ from blysk.golden.reference.reflection import PHONG
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
 from blysk.sim.meshes.mesh import DEFAULT_CREASE, DEFAULT_TRIANGLES
 from blysk.sim.meshes.teapot import MAX_TRIANGLES, MIN_TRIANGLES
+from blysk.sim.run_files import reads
 from blysk.sim.value_types import Choice, Color, Few, Number, Size, Truth, Value, Vector, Whole, shown
 
 __all__ = [
@@ -122,6 +123,7 @@ class Model(Choice):
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
             return super().check(value)
         try:
+            reads(value)
             return TabulatedModel.of_csv(value)
         except OSError as error:
             raise PartError("", f"{shown(value)} cannot be opened ({error.strerror})", self.points) from None

@@ -6,8 +6,7 @@ import io
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -23,7 +22,7 @@ from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import ErrorFigures
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
-from blysk.sim.api.design import design_of
+from blysk.sim.api.design import design_of, refused_counts
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, RenderOptions, Source
 from blysk.sim.api.scene import load, scenes_of
 from blysk.sim.api.settings import Settings, read_settings
@@ -37,6 +36,7 @@ from blysk.sim.frames.summary import frame_lines, specialisation_lines
 from blysk.sim.frames.triangles import SimulatedTriangleFrame, TriangleSimulator
 from blysk.sim.meshes.mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
+from blysk.sim.run_files import RunFiles
 
 __all__ = [
     "BUILDING",
@@ -76,6 +76,8 @@ class RenderedFrame:
         Name of the mesh.
     details : dict
         ``ignored`` and ``counts`` of `LoadedMesh`, ``seconds`` of its parts, perhaps ``specialisation``.
+    files : RunFiles
+        The files that were read, which `save` does not replace.
     """
 
     scene: Scene
@@ -83,6 +85,7 @@ class RenderedFrame:
     simulated: SimulatedFrame | SimulatedTriangleFrame
     name: str
     details: dict[str, Any]
+    files: RunFiles = field(default_factory=RunFiles)
 
     @property
     def image(self) -> np.ndarray:
@@ -142,9 +145,10 @@ class RenderedFrame:
         Raises
         ------
         InputError
-            If the suffix names no picture format, or the file cannot be written.
+            If the suffix names no picture format, or the file cannot be written, or was read for the frame.
         """
-        write_image(path, self.image)
+        with self.files.active():
+            write_image(path, self.image)
 
     def save_comparison(self, path: str | os.PathLike[str]) -> None:
         """Write one picture of the simulated frame, the golden frame and the error map; see `save`."""
@@ -158,7 +162,8 @@ class RenderedFrame:
                 f"{self.error.max_lsb:.2f} LSB, {self.cycles:,} cycles for {self.pixels:,} pixels"
             )
         title = f"{self.name}: {self.design.method}, {self.design.model}{highlight}"
-        write_comparison(path, self.image, self.comparison.golden, title=title, subtitle=subtitle)
+        with self.files.active():
+            write_comparison(path, self.image, self.comparison.golden, title=title, subtitle=subtitle)
 
     def lines(self) -> Iterator[str]:
         """The figures as the command line prints them."""
@@ -271,7 +276,8 @@ class Rendering:
                 whole = FrameSimulator(self.design, self.engine, self.pipes).render(self.scenes[0])
                 details["specialisation"]["full_cycles"] = whole.cycles
                 details["specialisation"] |= difference_figures(cast(SimulatedFrame, frame), whole)
-        return RenderedFrame(self.scenes[0], self.design, frame, self.loaded.name, details)
+        files = RunFiles.current()
+        return RenderedFrame(self.scenes[0], self.design, frame, self.loaded.name, details, files)
 
 
 def rendering_settings(
@@ -478,23 +484,10 @@ def render(
             raise OptionError(name, "", "the design has its own", "leave out one of them")
     if vcd is not None and engine == "cxxrtl":
         raise OptionError("vcd", "", "the engine cxxrtl writes no waveforms", 'use engine="pysim"')
-    settings = rendering_settings(source, dict(options), vcd)
-    with _refused_counts(design):
+    with RunFiles.current().active(), refused_counts(design):
+        settings = rendering_settings(source, dict(options), vcd)
         ready = prepare_rendering(settings, design=design, engine="pysim" if vcd else engine)
         if vcd is None:
             return ready.render(progress)
         with atomic_writer(Path(vcd)) as waves:
             return ready.render(progress, vcd=str(waves))
-
-
-@contextmanager
-def _refused_counts(design: Design | None) -> Iterator[None]:
-    """Turn the refusal of a scene by the caller's own design into an `OptionError`."""
-    try:
-        yield
-    except ValueError as error:
-        if design is None:
-            raise
-        raise OptionError(
-            "design", "", str(error), "make another for the scene's lights and materials"
-        ) from error

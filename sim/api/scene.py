@@ -20,6 +20,7 @@ from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import equal_distance, turned, turntable
 from blysk.sim.meshes.materials import surfaces
 from blysk.sim.meshes.mesh import LoadedMesh, load_mesh
+from blysk.sim.run_files import OutputIsInput
 
 __all__ = ["load", "scene", "scenes_of"]
 
@@ -105,7 +106,7 @@ def load(settings: Settings) -> LoadedMesh:
             materials=settings["materials"] == "file",
         )
     except InputError as error:
-        if "mesh" not in settings.origins:
+        if "mesh" not in settings.origins or isinstance(error, OutputIsInput):
             raise
         reason = f"{error.thing}, {error.reason}"
         raise InputError(settings.origins["mesh"], reason, error.remedy) from error

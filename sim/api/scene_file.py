@@ -10,6 +10,7 @@ from typing import Any
 from blysk.golden.text import plain_text
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, Lights, PartError, shown_key
 from blysk.sim.errors import InputError
+from blysk.sim.run_files import reads
 from blysk.sim.value_types import Value, shown
 
 __all__ = ["MAX_BYTES", "SceneFile", "key_lines", "read_scene_file"]
@@ -132,6 +133,7 @@ def _parse(path: Path) -> dict:
             raise PartError("", "is a folder", "name a scene file in it")
         if not path.is_file():
             raise PartError("", "is not a regular file", "name a scene file")
+        reads(path)
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
     except PartError:

@@ -19,6 +19,7 @@ from blysk.sim.cli.options import option_error
 from blysk.sim.engines.cache import provide_caches
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
 from blysk.sim.errors import InputError, OptionError, one_line
+from blysk.sim.run_files import RunFiles
 
 __all__ = ["cli", "main"]
 
@@ -64,7 +65,7 @@ def cli():
 def _run(arguments: list[str]) -> int:
     """`cli.main` without click's handling of an interrupt and a closed pipe."""
     try:
-        with cli.make_context("blysk", arguments) as context:
+        with RunFiles().active(), cli.make_context("blysk", arguments) as context:
             cli.invoke(context)
     except click.exceptions.Exit as stop:
         return stop.exit_code

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from blysk.sim.errors import InputError
 from blysk.sim.frames.picture import check_image_path
 from blysk.sim.output import check_writable
+from blysk.sim.run_files import reads
 
 __all__ = ["animation_paths", "check_outputs"]
 
@@ -13,12 +14,12 @@ __all__ = ["animation_paths", "check_outputs"]
 def check_outputs(
     inputs: Sequence[str], pictures: Sequence[str | None], others: Sequence[str | None]
 ) -> None:
-    """Refuse an output that cannot be written, or that is an input or another output.
+    """Refuse an output that cannot be written, or that is another output, or read by the run.
 
     Parameters
     ----------
     inputs : sequence of str
-        Files that are read.
+        Files that are read, as far as they are known; a mesh names others.
     pictures, others : sequences of str or None
         Files to be written.
 
@@ -27,11 +28,13 @@ def check_outputs(
     InputError
         If an output is refused.
     """
-    seen = {os.path.realpath(path) for path in inputs}
+    for path in inputs:
+        reads(path)
+    seen = set()
     for path in [*pictures, *others]:
         if path:
             if os.path.realpath(path) in seen:
-                raise InputError(path, "is the mesh or another output", "choose another file")
+                raise InputError(path, "is another output, too", "choose another file")
             seen.add(os.path.realpath(path))
             (check_image_path if path in pictures else check_writable)(path)
 

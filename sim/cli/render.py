@@ -31,6 +31,7 @@ from blysk.sim.frames.picture import write_image
 from blysk.sim.frames.summary import animation_lines, short_lines, specialisation_lines
 from blysk.sim.frames.workers import check_address, processors
 from blysk.sim.output import all_or_none, atomic_writer, write_json
+from blysk.sim.run_files import check_beside
 from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = ["command"]
@@ -134,6 +135,7 @@ def command(
         if jobs and address:
             raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")
         check_outputs(inputs, pictures=[gif, *pictures], others=[figures])
+        check_beside(path for path in (gif, *pictures) if path != output)
         written = {"frames": f"{pictures[0]} to {pictures[-1]}", "animation": gif}
     elif jobs or address is not None:
         raise InputError("--jobs" if jobs else "--cluster", "is for many frames", "give --frames, too")

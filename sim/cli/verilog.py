@@ -1,5 +1,8 @@
 """``blysk verilog``: the pipeline as Verilog."""
 
+import os
+from pathlib import Path
+
 import click
 
 from blysk.sim.api.bus_documents import DOCUMENTS, documents_of
@@ -10,6 +13,7 @@ from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
 from blysk.sim.frames.testbench import check_folder, write_testbench
 from blysk.sim.output import all_or_none, write_text
+from blysk.sim.run_files import check_beside
 from blysk.sim.value_types import OutputFile
 
 __all__ = ["command"]
@@ -65,8 +69,11 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
         )
     made = design(**given_options(context, [*DESIGN, *COUNTS]))
     beside = [f"{output[:-2]}{suffix}" for suffix in DOCUMENTS] if output and bus != "native" else []
-    check_outputs([testbench] if testbench else [], pictures=[], others=[output, *beside])
+    check_outputs([], pictures=[], others=[output, *beside])
+    check_beside(beside)
     if testbench is not None:
+        if output and Path(os.path.realpath(output)).is_relative_to(os.path.realpath(testbench)):
+            raise InputError(output, "lies in the folder of --testbench", "choose another file")
         check_folder(testbench)
     text, unit = verilog_and_unit(made, name, geometry, pipes, merged, top, bus, setups, coarse)
     with all_or_none():

@@ -26,6 +26,7 @@ from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.triangles import TriangleSimulator
 from blysk.sim.frames.workers import cluster_client, local_executor
 from blysk.sim.output import atomic_writer
+from blysk.sim.run_files import MARK
 
 __all__ = [
     "Animation",
@@ -343,4 +344,5 @@ def write_gif(path: str | os.PathLike, frames: Iterable[str | os.PathLike], mill
             append_images=(indexed(frame) for frame in frames[1:]),
             duration=milliseconds,
             loop=0,
+            comment=MARK,
         )

@@ -1,17 +1,35 @@
 """Frames as picture files, and a simulated frame beside the golden frame."""
 
 import os
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from blysk.sim.errors import InputError
 from blysk.sim.output import atomic_writer, check_writable
+from blysk.sim.run_files import MARK
 
 __all__ = ["check_image_path", "write_comparison", "write_image"]
 
-_COMMON = ".png, .jpg, .bmp, .ppm, .tiff or .webp"
+_COMMON = ".png, .webp, .tiff, .bmp, .ppm, or .jpg, which is not exact"
+_EXACT: dict[str, dict[str, Any]] = {
+    **{name: {} for name in ("BMP", "DDS", "DIB", "JPEG2000", "PCX", "PPM", "QOI", "SGI", "TGA", "TIFF")},
+    "PNG": {},
+    "WEBP": {"lossless": True, "exact": True},
+}
+"""Formats that keep every pixel, with Pillow's options for it."""
+
+_LOSSY: dict[str, dict[str, Any]] = {
+    "AVIF": {"quality": 100, "subsampling": "4:4:4"},
+    "GIF": {"comment": MARK},
+    "JPEG": {"quality": 95, "subsampling": "4:4:4"},
+}
+"""Formats that change pixels, which is told, with options for a small change."""
+
 _COLOR_MAP = "inferno"
 
 
@@ -30,8 +48,10 @@ def check_image_path(path: str | os.PathLike) -> None:
 def _picture_format(path: str | os.PathLike) -> str:
     suffix = Path(path).suffix.lower()
     name = Image.registered_extensions().get(suffix)
-    if name not in Image.SAVE:
+    if name not in Image.SAVE or name not in {**_EXACT, **_LOSSY}:
         reason = f"the suffix {suffix} is no picture format" if suffix else "the name has no suffix"
+        if name in Image.SAVE:
+            reason = f"{name} does not hold a frame as it is"
         raise InputError(str(path), reason, f"use {_COMMON}")
     return name
 
@@ -39,7 +59,8 @@ def _picture_format(path: str | os.PathLike) -> str:
 def write_image(path: str | os.PathLike, image: np.ndarray) -> None:
     """Write a frame as a picture; the suffix chooses the format. The file is whole or not there at all.
 
-    PNG, BMP, PPM and TIFF keep every pixel to the bit.
+    PNG, WebP, TIFF, BMP, PPM, TGA, QOI, JPEG 2000, PCX, SGI and DDS keep every pixel to the bit. JPEG, AVIF
+    and GIF may not: a ``RuntimeWarning`` then tells how far a channel of the file is off at most.
 
     Parameters
     ----------
@@ -57,8 +78,18 @@ def write_image(path: str | os.PathLike, image: np.ndarray) -> None:
     """
     _check_frame(image)
     name = _picture_format(path)
+    options = _EXACT.get(name) or _LOSSY.get(name) or {}
+    if name == "PNG":
+        options = {"pnginfo": PngInfo()}
+        options["pnginfo"].add_text("Software", MARK)
     with atomic_writer(path) as temporary:
-        Image.fromarray(image).save(temporary, format=name)
+        Image.fromarray(image).save(temporary, format=name, **options)
+        if name in _LOSSY and temporary.is_file():
+            with Image.open(temporary) as kept:
+                off = np.abs(np.asarray(kept.convert("RGB")).astype(int) - image).max()
+            if off:
+                text = f"{path}: {name} changes pixels, here by up to {off} LSB; .png keeps all of them"
+                warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 
 def write_comparison(
@@ -120,6 +151,7 @@ def write_comparison(
     canvas = FigureCanvasAgg(figure)
 
     def place(x: float, y: float, content: str, **options):
+        content = _drawable(content, options.get("weight", "normal"))
         figure.text(
             x / total_width, 1 - y / (above + below), content, parse_math=False, ha="center", **options
         )
@@ -146,6 +178,14 @@ def write_comparison(
         x += (column - width) // 2
         picture[above : above + height, x : x + width] = panel
     write_image(path, picture)
+
+
+def _drawable(text: str, weight: str) -> str:
+    """A text with ``?`` for what Matplotlib's font cannot draw, such as letters of a file's name."""
+    from matplotlib.font_manager import FontProperties, findfont, get_font
+
+    known = get_font(findfont(FontProperties(weight=weight))).get_charmap()
+    return "".join(letter if ord(letter) in known else "?" for letter in text)
 
 
 def _panels(simulated: np.ndarray, golden: np.ndarray) -> tuple[dict[str, np.ndarray], float]:

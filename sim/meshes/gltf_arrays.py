@@ -14,6 +14,7 @@ import numpy as np
 from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.refusal import REEXPORT, Refused, inside, shown
 from blysk.sim.meshes.strips import strip_triangles
+from blysk.sim.run_files import reads
 
 __all__ = ["MESHOPT", "check_arrays", "gltf_buffers", "plain_arrays"]
 
@@ -111,6 +112,7 @@ def _beside(folder: Path, uri: str) -> bytes:
     target = inside(folder, uri, unquote(uri))
     if not os.path.isfile(target):
         raise Refused(f"it refers to {uri!r}, which does not exist", "put that file beside it")
+    reads(target)
     return target.read_bytes()
 
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -27,9 +28,10 @@ from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.normals import crease_normals, face_directions, repaired_normals, transformed
 from blysk.sim.meshes.obj import find_obj_materials, split_obj, tidy_obj
 from blysk.sim.meshes.ply import read_ply
-from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused
+from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused, refers
 from blysk.sim.meshes.stl import read_stl
 from blysk.sim.meshes.teapot import teapot
+from blysk.sim.run_files import OutputIsInput, reads
 
 if TYPE_CHECKING:
     import trimesh
@@ -159,6 +161,8 @@ def load_mesh(
             return _assemble(scene, found, path, data, crease_angle)
     except Refused as refusal:
         raise InputError(source, refusal.reason, refusal.remedy) from None
+    except OutputIsInput:
+        raise
     except RecursionError as error:
         raise InputError(source, "is nested too deeply", REEXPORT) from error
     # The loaders raise whatever a damaged file makes them trip over.
@@ -212,6 +216,7 @@ def _read(path: Path) -> bytes:
                 f"unknown mesh type {path.suffix!r}" if path.suffix else "the name has no suffix",
                 f"use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}",
             )
+        reads(path)
         data = path.read_bytes()
     except OSError as error:
         raise Refused(f"cannot be opened ({error.strerror})", "check the path and its permissions") from error
@@ -229,11 +234,15 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     references, options, found = {}, {"skip_materials": True}, Found()
     if suffix == ".obj":
         data, libraries = split_obj(data, found)
+        for name in libraries:
+            refers(path.parent, name, *name.split())
         if materials and len(found.names) > 1:
             find_obj_materials(libraries, path.parent, found)
         data = tidy_obj(data, found)
         options["split_objects"] = True
     elif suffix == ".ply":
+        head = data.partition(b"end_header")[0].decode("utf-8", "replace")
+        refers(path.parent, *re.findall(r"^comment TextureFile (.+?)\s*$", head, re.MULTILINE))
         vertices, normals, faces = read_ply(data, found)
         mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
         return trimesh.Scene(mesh), found
@@ -242,6 +251,8 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     else:
         document = gltf_document(data, suffix, found)
         check_gltf(document)
+        uris = [image.get("uri") for image in document.get("images", []) if isinstance(image, dict)]
+        refers(path.parent, *(unquote(uri) for uri in uris if isinstance(uri, str) and len(uri) < 4096))
         buffers = gltf_buffers(document, data, suffix, path.parent)
         complete_scene(document, found)
         find_gltf_materials(document, materials, found)

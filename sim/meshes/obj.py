@@ -13,7 +13,8 @@ from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.text import plain_text
 from blysk.sim.meshes.materials import FileMaterial, Found, color_of
 from blysk.sim.meshes.polygons import check_corners, triangulated
-from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, shown
+from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, refers, shown
+from blysk.sim.run_files import reads
 
 __all__ = ["find_obj_materials", "split_obj", "tidy_obj"]
 
@@ -37,6 +38,9 @@ _UNREAD = {
 _REASONS = ("which does not exist", "outside its folder")
 # Bytes of a material file; 100,000 materials take less.
 _MAX_LIBRARY = 16_000_000
+_IMAGE = re.compile(
+    r"^[ \t]*(?:map_\w+|norm|bump|disp|decal|refl)[ \t]+(\S.*)$", re.MULTILINE | re.IGNORECASE
+)
 
 
 def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
@@ -90,7 +94,10 @@ def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None
             raise Refused(
                 f"its material file {shown(target.name)!r} is over {_MAX_LIBRARY:,} bytes", "shorten it"
             )
+        reads(target)
         library = plain_text(target.read_bytes(), "replace")
+        for rest in _IMAGE.findall(library):
+            refers(folder, rest.strip(), rest.split()[-1])
         for block in re.split(r"^[ \t]*newmtl(?!\S)", library, flags=re.MULTILINE)[1:]:
             first, _, text = block.partition("\n")
             texts.setdefault(first.strip(), text)

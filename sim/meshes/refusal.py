@@ -5,8 +5,9 @@ import re
 from pathlib import Path
 
 from blysk.sim.errors import one_line
+from blysk.sim.run_files import reads
 
-__all__ = ["MAX_FACES", "ONE_MATERIAL", "REEXPORT", "Refused", "inside", "shown"]
+__all__ = ["MAX_FACES", "ONE_MATERIAL", "REEXPORT", "Refused", "inside", "refers", "shown"]
 
 MAX_FACES = 20_000_000
 """Largest number of triangles of a mesh."""
@@ -27,6 +28,13 @@ class Refused(Exception):
 def shown(text: str) -> str:
     """Text of a file for a message: in one line, and at most 60 characters."""
     return one_line(text, 60)
+
+
+def refers(folder: Path, *names: str) -> None:
+    """Record files that a file refers to, read or not, if they exist: no output replaces them."""
+    for name in names:
+        if os.path.isfile(folder / name):
+            reads(folder / name)
 
 
 def inside(folder: Path, reference: str, name: str | None = None) -> Path:

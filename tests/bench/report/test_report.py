@@ -133,6 +133,14 @@ def test_an_earlier_report_is_replaced(tmp_path, points_section, plain_section):
     write_report(tmp_path, [plain_section], ABOUT)
     names = {"index.html", "report.json", "graded.csv", "long.csv", "mine.csv"}
     assert {path.name for path in tmp_path.iterdir()} == names
+    # A table of the other section would have the name of a file that no report wrote.
+    other = json.loads((tmp_path / "report.json").read_text())["files"]
+    tables = (f"{part.name}.csv" for part in points_section.parts if hasattr(part, "rows"))
+    clash = next(name for name in tables if name not in other)
+    (tmp_path / clash).write_text("kept")
+    with pytest.raises(InputError, match=f"{clash}: is of no report, and would be replaced; move it"):
+        write_report(tmp_path, [points_section], ABOUT)
+    assert (tmp_path / clash).read_text() == "kept"
 
 
 @pytest.mark.parametrize("name", ["notes.txt", "index.html", "report.json", "a.csv"])

@@ -147,10 +147,10 @@ def test_wrong_suffix_of_picture(refused):
 
 
 def test_output_over_the_mesh_or_another_output(refused):
-    says = "is the mesh or another output; choose another file"
+    says = "is another output, too; choose another file"
     refused("render", *TINY, "-o", "a.png", "--compare", "./a.png", thing="./a.png", says=says)
     refused("render", *TINY, "--json", "a", "--vcd", "a", thing="a", says=says)
     Path("link.png").symlink_to("a.png")
     refused("render", *TINY, "-o", "a.png", "--compare", "link.png", thing="link.png", says=says)
     Path("a.obj").write_bytes(CORNERS + b"f 1 2 3\n")
-    refused("render", "a.obj", "--json", "a.obj", thing="a.obj", says="is the mesh")
+    refused("render", "a.obj", "--json", "a.obj", thing="a.obj", says="is a file that this run reads")
