@@ -285,8 +285,7 @@ class Lobe(HighlightOperand):
         if all(slope.max() <= self.SHARP for _, _, slope in lines):
             return 0
         dark = max(u[np.flatnonzero(value > self.VALUE_FORMAT.step / 4)[-1]] for u, value, _ in lines)
-        # A lobe may be dark everywhere but at its peak.
-        return int(max(np.floor(-np.log2(max(dark, 2.0**-self.MOST_SCALE))), 0))
+        return int(np.floor(-np.log2(np.clip(dark, 2.0**-self.MOST_SCALE, 1))))
 
     def for_parameters(self, parameters: Sequence[float | None]) -> "Lobe":
         """The unit with `FINER` steps in place of the default ones, if the error of a table is over 1/4 LSB.
