@@ -67,8 +67,8 @@ LOBES: dict[str, Lobe] = {
     )
 }
 """Specular units with a table that is written for each frame, by name; every method serves each. At their
-size (704 words for ``phong_coplanar``, 336 for the others) tables are within 0.06 LSB of their model at every
-exponent; for roughness see `Lobe`."""
+size (704 words for ``phong_coplanar``, 336 for the others) the largest error of a table found at any
+exponent is 0.06 LSB against its model; for roughness see `Lobe`."""
 
 MODEL_LINES: dict[str, str] = {
     **{lobe.name: f"{lobe.model.summary}, from a table" for lobe in LOBES.values()},

@@ -173,8 +173,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 "Each mark is a pipeline; the line is the Pareto front of those that no other beats in both, "
                 "whose marks are edged in black. Those of chord-local are not on it: they are given values "
                 "of each light with a span, and what it takes to work these out is not counted. Above: "
-                "against exact normals of every pixel with the same model. Below: against the exact "
-                "Blinn frame.",
+                "against exact normals of every pixel with the same model. Below: against exact normals "
+                "with Blinn's power, of a lobe with its own model.",
             ),
             Table("design-space", "Designs", columns, rows, note),
         ],
@@ -393,7 +393,7 @@ def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, fi
             "the scene has spans wider than they can shade"
         )
     best = cheapest(designs, error, largest, cost)
-    print(f"designs     {len(best)} of {len(designs)} have a {error} error of at most {largest:g} LSB")
+    print(f"designs     {len(best)} of {len(designs)} have a {error} error of at most {largest:g} LSB here")
     if not best:
         usable = [one.errors[error]["max_lsb"] for one in designs if not one.out_of_range_spans]
         least = f"the least is {min(usable):.2f} LSB" if usable else "all of them flag spans as too wide"

@@ -17,7 +17,7 @@ def largest_span_angle(exponent: int) -> float:
     """Widest span, in degrees, for which the quadratic fit is good: ``min(15, 20 n^(-1/6))``.
 
     At full reflection the fit differs from exactly normalised interpolation by about ``c sqrt(n) psi^3`` LSB
-    in the specular term, at most 0.25 LSB at this angle, and by at most 0.12 LSB in the diffuse term. This
+    in the specular term, 0.25 LSB at this angle, and by up to 0.12 LSB in the diffuse term. This
     holds if the lengths of the two normals, before they are normalised, are nearly equal.
 
     Parameters

@@ -73,7 +73,7 @@ class Lobe(HighlightOperand):
     20 16 336   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 0.03 0.02 0.02 0.02 0.02 0.02 0.02
     == == ===== ======================== ======================== =======================================
 
-    The error of the default table is at most 0.05 LSB for every exponent from 1 to 1000 and for ``ggx`` from
+    The largest error found of the default table is 0.05 LSB at exponents from 1 to 1000 and for ``ggx`` from
     alpha = 0.0025 (roughness 0.05) on, without the error of u. Beckmann's distribution with a large
     alpha falls to 0 just before u = 1, where steps are long: 0.55 LSB at alpha = 1.
 

@@ -40,8 +40,9 @@ class ChordInterpolator(Interpolator):
       search: with equal lengths the largest error at any t was 1.31 times that at 1/4 and 3/4, and with
       lengths in the ratio g up to ``1.03 max(4/3, g)`` times.
 
-    The errors of fit and arithmetic together are then within 0.4 LSB of exactly normalised interpolation in
-    the specular term and 0.12 in the diffuse one, at full reflection.
+    The budget of fit and arithmetic together is 0.4 LSB against exactly normalised interpolation in the
+    specular term and 0.12 in the diffuse one, at full reflection. It is checked at these places, and not
+    proved for every pixel; see `blysk.golden.frames.compare.error_bound` for what a frame keeps.
 
     Where N·L changes its sign the highlight ends, however bright it is. A pixel whose N·L is as near to 0 as
     the error may have the highlight or not; a span with such pixels where `is_lit` should be cut further.

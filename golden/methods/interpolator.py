@@ -80,7 +80,7 @@ class Interpolator:
         Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
         differ from pixel to pixel.
     CUT_BY_ERROR : bool
-        Whether spans are cut until the method's curve is within a quarter of an LSB of exact normals; else
+        Whether spans are cut until the curve keeps its tolerance, a quarter of an LSB, where checked; else
         they are cut by their angle alone.
     END_FORMAT : Format
         Format of the normals at a span's ends: ``SQ(1, 17)`` for unit normals; another format for ends of the
