@@ -120,6 +120,7 @@ def triangle_figures(
             "cut_spans": counts["cut"],
             "hidden_pixels": counts["hidden"],
             "dropped_pixels": counts["dropped"],
+            "far_triangles": sent.far,
             "missed_pieces": counts["missed_pieces"],
             "short_normals": counts["short_normals"],
             "wide_spans": counts["wide_spans"],
@@ -164,6 +165,7 @@ def _errors(comparison: Comparison, names: Iterable[str]) -> dict[str, Any]:
         "target": comparison.target,
         "bound_lsb": comparison.bound_lsb,
         "border": f"{comparison.border} at most {BORDER:g}",
+        "step_lsb": comparison.step_lsb,
         "border_pixels": comparison.border_pixels,
         "nmse": comparison.nmse,
         "mnse_published": comparison.mnse_published,
@@ -181,7 +183,7 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         result is the largest of the frames.
     """
     same = ("method", "model", "exponent", "roughness", "lights", "materials", "style", "gate", "engine")
-    same += ("width", "height", "target", "border")
+    same += ("width", "height", "target", "border", "step_lsb")
     same += tuple(key for key in ("pipes", "geometry", "setups", "coarse") if key in frames[0])
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
     bounds = [frame["bound_lsb"] for frame in frames]

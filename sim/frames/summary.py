@@ -19,6 +19,7 @@ _COUNTS = {
     "repaired_span_normals": "span ends whose normal was 0",
     "clipped_triangles": "triangles cut by the near plane or at the ends of the grid",
     "sliver_triangles": "triangles at most 1/256 pixel wide",
+    "far_triangles": "triangles beyond 1,000 times the nearest W, where surfaces 0.1 % apart may swap",
     "hidden_spans": "spans wholly hidden, left out",
     "hidden_pixels": "pixels shaded behind what was drawn before",
     "dropped_pixels": "pixels of hidden spans dropped before shading",
@@ -32,6 +33,7 @@ _COUNTS = {
 
 _REMEDIES = {
     "opposed_faces": "--back-faces show takes their normals as they are; if they stay dark, export them anew",
+    "far_triangles": "leave out what is nearest, or use geometry software",
     "missed_spans": "use chord or renormalise",
     "missed_pieces": "use geometry software, or smaller triangles",
     "short_normals": "use geometry software, or divide the triangles",
@@ -42,7 +44,7 @@ _REMEDIES = {
 
 _WARNINGS = (
     *("opposed_faces", "repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals"),
-    *("wide_spans", "out_of_range_spans"),
+    *("wide_spans", "out_of_range_spans", "far_triangles"),
 )
 """Counts that may come from a fault of the mesh or the design."""
 
@@ -182,7 +184,10 @@ def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:
     if count:
         most = max(figures[f"{name}_error"]["border_lsb"] for name in ("total", "method"))
         pixels = f"{count:,} pixel{'s' * (count != 1)} with {figures['border']}"
-        yield _line("left out", f"{pixels}, where a light begins: largest {most:.2f} LSB")
+        where = "where a light begins"
+        if figures["step_lsb"]:
+            where += f", or where a highlight ends in a step of {figures['step_lsb']:.1f} LSB"
+        yield _line("left out", f"{pixels}, {where}: largest {most:.2f} LSB")
 
 
 def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:

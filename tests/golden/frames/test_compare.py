@@ -11,7 +11,7 @@ from blysk.golden.frames.compare import (
     compare,
     compare_image,
     error_bound,
-    has_step,
+    highlight_step,
     target_of,
 )
 from blysk.golden.frames.frame import model_frame
@@ -19,9 +19,9 @@ from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.lobes import GGX
+from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX, TabulatedModel
 from blysk.golden.reference.raster import rasterise
-from blysk.golden.reference.reflection import BLINN
+from blysk.golden.reference.reflection import BLINN, COSQUAD, REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
 
 METHODS = ("chord", "chord-local", "renormalise")
@@ -82,9 +82,20 @@ def test_a_step_of_the_lobe_is_a_border():
     smooth, rough = (border_mask(scene, raster, model) for model in (BLINN, GGX))
     assert (smooth <= rough).all()
     assert rough.sum() > smooth.sum()
-    assert not has_step(facing(np.eye(3) + 1, exponent=1), preset("chord", "cosquad").specular.model)
     small = replace(scene, material=replace(GREY, roughness=0.1))
     np.testing.assert_array_equal(border_mask(small, raster, GGX), smooth)
+
+
+def test_the_step_is_that_of_the_curve():
+    """``r^8`` of the full channel for GGX; none of a polynomial that goes on behind."""
+    scene = facing(np.eye(3) + 1, roughness=0.83)
+    dim = replace(scene, material=replace(scene.materials[0], specular=(0.73, 0.1, 0.1), exponent=1))
+    assert highlight_step(dim, GGX) == pytest.approx(255 * 0.73 * 0.83**8, rel=1e-4)
+    assert highlight_step(
+        dim, TabulatedModel.of_points("flat", np.array([0.0, 1.0]), np.array([0.5, 0.5]))
+    ) == pytest.approx(255 * 0.73 * 0.5)
+    for model in (BLINN, COSQUAD, REFLECTION_MODELS["exp"], BECKMANN, COPLANAR_PHONG):
+        assert highlight_step(dim, model) == 0
 
 
 def test_no_bound_where_none_is_known():

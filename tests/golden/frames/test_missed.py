@@ -1,12 +1,14 @@
 """Spans that are counted because a bound does not hold for them: unequal lengths, and W of 1 to 100,000."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.missed import missed_pieces
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles
+from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles, triangle_frame
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
@@ -121,6 +123,22 @@ def test_no_method_is_silently_wrong_in_any_depth(method):
         if not design.takes_values:
             error, counts = by_hardware(scene, design)
             assert error.max() < PROMISED or any(counts.values())
+
+
+@pytest.mark.parametrize(("far", "wrong"), [(500, False), (1e5, True)])
+def test_far_surfaces_that_change_places_are_counted(far, wrong):
+    """Two sheets 0.1 % apart, the nearer one second, and a near triangle that sets the range of 1/W."""
+    corner = [(2, 2), (98, 2), (50, 38)]
+    tilted = np.array([1, 1.0006, 1.0003])
+    w = np.array([np.full(3, 0.9), 1.001 * far * tilted, far * tilted])
+    scene = scene_of([corner] * 3, w, np.zeros((3, 3, 2)), 10)
+    corners = scene.mesh.vertices.reshape(-1, 3, 3).copy()
+    # The second sheet lies before the first one.
+    corners[2] = corners[1] / 1.001
+    scene = replace(scene, mesh=replace(scene.mesh, vertices=corners.reshape(-1, 3)))
+    frame = triangle_frame(scene, Renderer(preset("chord", "blinn")))
+    assert (frame.owner == 1).any() == wrong
+    assert frame.sent.far == 2 * wrong
 
 
 def test_lengths_beyond_the_words_of_renormalise_are_cut():

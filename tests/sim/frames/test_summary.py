@@ -42,6 +42,7 @@ def figures(model, target, bound=0.92, border=3):
         **{"method": "chord", "model": model, "exponent": 50, "roughness": None, "engine": "cxxrtl"},
         **{"cycles": 9, "pixels": 9, "cycles_per_pixel": 1.0, "visible_pixels": 9, "spans": 3},
         **{"target": target, "bound_lsb": bound, "border": "|N.L| at most 0.002", "border_pixels": border},
+        "step_lsb": 0.0,
         **{"nmse": 0.1, "mnse_published": 0.1, "mnse_published_share": 1.0, "counts": {}},
         **{"simulated_pixels_per_second": 9.0, "seconds": {"total": 1.0}},
     }
