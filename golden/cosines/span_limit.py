@@ -25,6 +25,10 @@ class SpanLimit:
       ``2 min(u_l, u_r) - max(u_l + u_r - 2 u_m, 0)``, twice the least u of the quadratic or less, is under
       twice `lit` of the exponent.
 
+    The limit by the exponent holds for normals of *equal length* at the ends: no length comes with a span.
+    For lengths in the ratio g the error may be about ``12 n (g - 1) psi^2`` LSB more, and the span is not
+    wide. Software cuts by the error itself; geometry in hardware does not, and `missed_pieces` counts.
+
     Both limits have one value for all exponents from ``2^k`` to ``2^(k+1) - 1``, the safer of those at the
     two ends, so that a small table holds them. A light is behind if N·L is under `BEHIND` at all three
     places. psi is compared as half the squared chord of the two normals, with `SLACK` steps for their

@@ -217,7 +217,8 @@ def header_of(unit: ShadingUnit) -> list[str]:
     elif made.interpolator.takes_line:
         lines.append(
             "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
-            f"in {made.interpolator.END_FORMAT}"
+            f"in {made.interpolator.END_FORMAT}; pixels under 1/256 of it are wrong, and their spans are "
+            "counted in status_out_of_range_spans"
         )
     elif made.lights:
         lines.append("i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)")
@@ -225,7 +226,8 @@ def header_of(unit: ShadingUnit) -> list[str]:
         angles = ", ".join(f"{n}: {made.span_limit.angle(n):.1f}" for n in (1, 10, 50, 100, 200, 500, 1000))
         lines += [
             f"safe angle of a lit span of 4 pixels or more, degrees by exponent: {angles}; unlit: "
-            f"{made.span_limit.WIDEST:g}; wider ones are counted in status_wide_spans",
+            f"{made.span_limit.WIDEST:g}; wider ones are counted in status_wide_spans; N/W is taken to be of "
+            "equal length at both ends",
         ]
     lines += [
         f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
