@@ -25,7 +25,16 @@ from blysk.sim.engines.beats import pack, unpack
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import Ports
 
-__all__ = ["SIMULATORS", "BenchError", "Found", "VerilogBench", "assert_beats", "missing_tool", "pauses"]
+__all__ = [
+    "SIMULATORS",
+    "BenchError",
+    "Found",
+    "VerilogBench",
+    "assert_beats",
+    "missing_tool",
+    "pauses",
+    "without_initial_values",
+]
 
 SIMULATORS = ("icarus", "verilator")
 
@@ -260,6 +269,36 @@ class VerilogBench:
         for path in folder.glob("*.hex"):
             path.unlink()
         return Found(unpack(shapes.o, words), cycles, counted)
+
+
+def without_initial_values(text: str, keep: tuple[int, ...] = ()) -> str:
+    """Verilog whose registers and written memories begin undefined, as in a device that sets none of them.
+
+    Memories that nothing writes are tables, and keep their words.
+
+    Parameters
+    ----------
+    text : str
+        As `emit` writes it.
+    keep : tuple of int
+        Sizes, in words, of written memories that keep theirs: somebody else clears them.
+    """
+
+    def strip(module: re.Match) -> str:
+        body = module[0]
+        written = set(re.findall(r"^\s+(\w+)(?:\[[^\]]*\])+ <= ", body, re.MULTILINE))
+        sizes = dict(re.findall(r"^  reg (?:\[\d+:0\] )?(\w+) \[(\d+):0\];", body, re.MULTILINE))
+        written -= {name for name in written if int(sizes.get(name, -1)) + 1 in keep}
+
+        def block(found: re.Match) -> str:
+            return "" if found[1] in written else found[0]
+
+        body = re.sub(r"^  initial \w+ = .*;\n", "", body, flags=re.MULTILINE)
+        return re.sub(
+            r"^  initial begin\n    (\w+)\[.*\n(?:    \w+\[.*\n)*  end\n", block, body, flags=re.MULTILINE
+        )
+
+    return re.sub(r"^module .*?^endmodule", strip, text, flags=re.MULTILINE | re.DOTALL)
 
 
 def assert_beats(found: np.ndarray, expected: np.ndarray | Mapping, path: str = "beat") -> None:

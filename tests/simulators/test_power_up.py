@@ -1,0 +1,74 @@
+"""Power-up: registers and written memories begin undefined, and one cycle of reset is enough.
+
+Icarus Verilog, from text without the initial values of registers and written memories: every beat is that of
+the model, and no bit of a valid beat, of a valid or of a ready is undefined. Tables keep their words, and so
+does the memory of depths inside a renderer, which is cleared by whoever begins a picture. `test_bus` has the
+cores on buses.
+"""
+
+import numpy as np
+import pytest
+
+from blysk.hdl.emit.verilog import emit
+from blysk.sim.units.record import length_of
+from blysk.sim.units.registry import RECORDS
+
+from .verilog_bench import VerilogBench, assert_beats, missing_tool, pauses, without_initial_values
+
+CASES = {
+    ("pipeline", "linear, cosquad"): 40,
+    ("pipeline", "chord, blinn"): 200,
+    ("geometry", ""): 60,
+    ("geometry", "two lanes"): 60,
+    ("render", "chord"): 60,
+    ("render", "chord, compact"): 60,
+    ("pixel_pipelines", "2 pipelines, without lights"): 200,
+    ("pipeline", "compact"): 40,
+}
+"""Beats or pixels of each unit."""
+
+QUICK = ("pipeline", "linear, cosquad")
+
+PICTURE = (32 * 24,)
+"""Words of the memory of depths in the record of `render`."""
+
+
+@pytest.mark.skipif(missing_tool("icarus") is not None, reason=str(missing_tool("icarus")))
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [case if case == QUICK else pytest.param(*case, marks=pytest.mark.long) for case in CASES],
+)
+def test_one_cycle_of_reset_is_enough(name, variant, tmp_path):
+    record, rng = RECORDS[name], np.random.default_rng(2026)
+    unit = record.variants[variant].unit()
+    whole = emit(unit, "core")
+    text = without_initial_values(whole, PICTURE)
+    assert whole.count("initial") > 100 > text.count("initial")
+    make = next(iter(record.stimuli_of(variant).values())).make
+    case = make(unit, rng, CASES[name, variant])
+    expected = record.expect(unit, case)
+    assert length_of(expected) >= 40
+    sent = {"constants": case.constants, "write": case.write, **pauses(rng)}
+    found = VerilogBench(unit, tmp_path, text).run(
+        "icarus", case.beats, length_of(expected), idle_timeout=50_000, **sent
+    )
+    assert_beats(found.beats, expected)
+
+
+def test_what_keeps_its_words():
+    """A register and a memory that is written lose them, a table and the size that is named do not."""
+    memory = "  reg [3:0] {0} [{1}:0];\n  initial begin\n    {0}[0] = 4'h0;\n    {0}[1] = 4'h1;\n  end\n"
+    writes = "  always @(posedge clk) begin\n    if (en)\n      {0}[a] <= d;\n  end\n"
+    parts = [
+        "module core (clk);\n",
+        "  reg [1:0] state;\n",
+        "  initial state = 2'h1;\n",
+        memory.format("table_", 1),
+        memory.format("stack", 3),
+        memory.format("picture", 7),
+        writes.format("stack"),
+        writes.format("picture"),
+        "endmodule\n",
+    ]
+    kept = [*parts[:2], parts[3], "  reg [3:0] stack [3:0];\n", *parts[5:]]
+    assert without_initial_values("".join(parts), (8,)) == "".join(kept)
