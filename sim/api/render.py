@@ -33,7 +33,7 @@ from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 from blysk.sim.frames.picture import write_comparison, write_image
 from blysk.sim.frames.specialise import Specialisation, specialise
 from blysk.sim.frames.summary import frame_lines, specialisation_lines
-from blysk.sim.frames.triangles import SimulatedTriangleFrame, TriangleSimulator
+from blysk.sim.frames.triangles import LARGEST_PICTURE, SimulatedTriangleFrame, TriangleSimulator
 from blysk.sim.meshes.mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
 from blysk.sim.run_files import RunFiles
@@ -371,6 +371,10 @@ def _simulator(
     if settings["geometry"] == "software":
         return FrameSimulator(design, engine, pipes)
     size = scene.width, scene.height
+    if scene.width * scene.height > LARGEST_PICTURE:
+        reason = f"its simulated memory of depths has at most {LARGEST_PICTURE:,} pixels"
+        value = f"hardware at {scene.width}x{scene.height}"
+        raise settings.refuse("geometry", reason, "give a smaller size, or use software", value)
     renderer = Renderer(design, coarse=CoarseDepth(*size) if settings["coarse"] else None)
     return TriangleSimulator(renderer, size, engine, setups=settings["setups"])
 

@@ -26,9 +26,12 @@ from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import sample_constants
 
-__all__ = ["SimulatedTriangleFrame", "TriangleSimulator"]
+__all__ = ["LARGEST_PICTURE", "SimulatedTriangleFrame", "TriangleSimulator", "sample_triangles"]
 
-_IN_UNITS = 24
+LARGEST_PICTURE = 1 << 21
+"""Pixels of the largest simulated memory of depths: 3 kB each while its model is built."""
+
+_IN_UNITS = 26
 """Triangles inside the hardware, without those that wait in FIFOs of a throughput style, at most."""
 
 _PAUSE = 10_000
@@ -110,6 +113,34 @@ class SimulatedTriangleFrame:
         return self.counts["pixels"]
 
 
+def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
+    """Some triangles about the top left corner of a picture, inside the grid, to check a new model with.
+
+    Parameters
+    ----------
+    renderer : Renderer
+        Geometry and shading.
+    size : (int, int)
+        Width and height of the picture, 1 to 4095.
+    """
+    rng, grid, count = np.random.default_rng(2025), renderer.geometry.grid, 12
+    frame, steps = Frame.centred(*size), grid.steps
+    near = np.minimum(size, 16) * steps
+    middle = np.array([frame.left, frame.top]) * steps + rng.integers(0, near, (count, 1, 2))
+    corner = middle + rng.integers(-8 * steps, 8 * steps, (count, 3, 2))
+    # The largest pictures reach to the ends of the grid.
+    corner = np.clip(corner, grid.coordinate.min_code, grid.coordinate.max_code)
+    most = ATTRIBUTE.max_code
+    return Triangles(
+        x=corner[..., 0],
+        y=corner[..., 1],
+        depth=rng.integers(0, DEPTH.max_code, (count, 3)),
+        normal=most // 2 + rng.integers(-most // 4, most // 4, (count, 3, 3)),
+        material=np.arange(count) * renderer.design.materials // count,
+        two_sided=np.arange(count) % 2,
+    )
+
+
 class TriangleSimulator:
     """Simulator of the hardware from triangles to pixels, built once for a size of pictures.
 
@@ -151,20 +182,7 @@ class TriangleSimulator:
 
     def _check(self) -> None:
         """Compare the pixels of some triangles by the new simulation model with the bit-accurate model."""
-        rng = np.random.default_rng(2025)
-        steps, count = self.renderer.geometry.grid.steps, 12
-        frame = Frame.centred(*self.size)
-        middle = np.array([frame.left, frame.top]) * steps + rng.integers(0, 16 * steps, (count, 1, 2))
-        corner = middle + rng.integers(-8 * steps, 8 * steps, (count, 3, 2))
-        most = ATTRIBUTE.max_code
-        triangles = Triangles(
-            x=corner[..., 0],
-            y=corner[..., 1],
-            depth=rng.integers(0, DEPTH.max_code, (count, 3)),
-            normal=most // 2 + rng.integers(-most // 4, most // 4, (count, 3, 3)),
-            material=np.arange(count) * self.renderer.design.materials // count,
-            two_sided=np.arange(count) % 2,
-        )
+        triangles, frame = sample_triangles(self.renderer, self.size), Frame.centred(*self.size)
         constants = sample_constants(self.renderer.design)
         expected = self.renderer.compute(triangles, frame, constants)
         run = simulate(

@@ -141,6 +141,7 @@ UNKNOWN = "use one of software, hardware"
         ((*RENDER, *HARDWARE, *LOCAL), "", VALUES),
         ((*RENDER, *HARDWARE, *POINT_LIGHT), "", "the values of a span; use software"),
         ((*RENDER, *HARDWARE, *POINT_LIGHT, *LOCAL), "", "the values of a span; use software"),
+        ((*RENDER, *HARDWARE, "--size", "4095x4095"), "--geometry hardware at 4095x4095", "2,097,152 pixels"),
         # The remedy is not one that is refused, too.
         ((*RENDER, *HARDWARE, "--short-words"), "--short-words", "leave it out"),
         ((*RENDER, "--coarse"), "--coarse", "give geometry hardware, too"),

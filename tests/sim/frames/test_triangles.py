@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from blysk.golden.frames.triangle_frame import triangle_frame
+from blysk.golden.geometry.triangles import Frame
 from blysk.golden.geometry.vertex_sort import VertexSort
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import design
 from blysk.sim.api.scene import scene
 from blysk.sim.engines.engine import SimulationError
-from blysk.sim.frames.triangles import TriangleSimulator
+from blysk.sim.frames.frame import sample_constants
+from blysk.sim.frames.triangles import TriangleSimulator, sample_triangles
 
 SIZE = 64, 48
 
@@ -51,6 +54,33 @@ def test_small_triangles_with_two_lanes():
     )
     assert len(frame.sent.triangles) == 10_712
     assert frame.pixels <= frame.cycles <= 1.1 * frame.pixels
+
+
+ENDS = [(1, 1), (1, 2), (2, 1), (1, 4095), (4095, 1), (4085, 3), (4086, 3), (3, 4086), (4095, 4095)]
+
+
+@pytest.mark.parametrize("size", ENDS)
+def test_sizes_at_their_ends(size):
+    """The triangles that check a new model lie in the grid and show pixels; scenes cover what they should."""
+    renderer = Renderer(design())
+    checks = renderer.compute(
+        sample_triangles(renderer, size), Frame.centred(*size), sample_constants(renderer.design)
+    )
+    assert len(checks.x) > 0
+    if min(size) <= 3:
+        drawn = scene("teapot", size=size, triangles=64)
+        owner = triangle_frame(drawn, renderer).owner
+        np.testing.assert_array_equal(np.flatnonzero(owner >= 0), np.unique(rasterise(drawn).pixel))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("size", [(4095, 2), (2, 4095)])
+def test_simulated_sizes_at_their_ends(size):
+    drawn = scene("teapot", size=size, triangles=64)
+    simulator = TriangleSimulator(Renderer(design()), size)
+    frame, model = simulator.render(drawn), triangle_frame(drawn, simulator.renderer)
+    np.testing.assert_array_equal(frame.image, model.image)
+    assert frame.visible > 0
 
 
 @pytest.mark.long
