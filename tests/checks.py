@@ -15,7 +15,10 @@ from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.record import Case
 
-__all__ = ["assert_beats_equal", "assert_equals_model", "known", "resets"]
+__all__ = ["assert_beats_equal", "assert_equals_model", "assert_keeps_rate", "known", "resets"]
+
+FEWEST = 16
+"""Beats of which a rate is asserted, at least."""
 
 
 def assert_beats_equal(actual, expected, path="beat"):
@@ -77,6 +80,44 @@ def assert_equals_model(unit, run, engine="auto"):
         np.testing.assert_array_equal(found.input_cycles, start + number * interval + before)
         np.testing.assert_array_equal(found.cycles, start + number * interval + latency + stops)
     return found
+
+
+def assert_keeps_rate(unit, run, free, pace=None, engine="auto"):
+    """Stalls for half of the beats, then none: the last half of the beats left comes as from reset.
+
+    Of a pipelined unit every beat comes after its interval. Where the data decide, the same beats take as
+    many cycles as without stalls, and one gap between two beats more at most, as a place in shared slots is
+    another. With a ``pace`` they take that many cycles a beat, too. Where too few beats leave, inputs count.
+
+    Parameters
+    ----------
+    unit : Component
+        Unit of the run.
+    run : UnitRun
+        Run of a stimulus, whose stalls are to end.
+    free : Run
+        The run of the same beats without stalls.
+    pace : float, optional
+        Cycles from an output beat to the next, see `Stimulus`.
+    """
+    run, end = run.settled(free.cycles, free.input_cycles)
+    found = assert_equals_model(unit, run, engine)
+    for name in ("cycles", "input_cycles"):
+        after, before = getattr(found, name), getattr(free, name)
+        left = np.count_nonzero(after >= end)
+        if left >= FEWEST:
+            break
+    if max(len(found.cycles), len(found.input_cycles)) < 4 * FEWEST:
+        # No rate: a few operands, at which beats alone matter.
+        return
+    assert left >= FEWEST, f"{left} beats are left after the stalls"
+    steps, usual = (np.diff(cycles[-(left // 2) :]) for cycles in (after, before))
+    if isinstance(unit, PipelinedUnit):
+        np.testing.assert_array_equal(steps, unit.initiation_interval + (not unit.skid))
+        return
+    assert steps.sum() <= usual.sum() + usual.max(), f"{name}: {steps.sum()} cycles, from reset {usual.sum()}"
+    if pace is not None:
+        assert steps.sum() <= pace * len(steps) + usual.max()
 
 
 def resets(unit, case: Case, befores, cycles, count=6):

@@ -17,7 +17,7 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.record import STALLS, UnitRun, first
 from blysk.sim.units.registry import RECORDS
 
-from .checks import assert_equals_model, known, resets
+from .checks import assert_equals_model, assert_keeps_rate, known, resets
 
 FEW = 24
 """Beats in Amaranth's simulator; spans are as short as for 200 pixels."""
@@ -54,10 +54,16 @@ def _runs():
 
 @pytest.mark.parametrize(("name", "variant", "stimulus"), list(_runs()))
 def test_equals_model(name, variant, stimulus):
-    """Beat by beat, and where the unit states them cycle by cycle, under every pattern of stalls."""
-    unit = unit_of(name, variant)
+    """Beat by beat, where the unit states them cycle by cycle, under stalls; at its rate after them."""
+    unit, free = unit_of(name, variant), None
+    pace = RECORDS[name].stimuli[stimulus].pace
     for run in RECORDS[name].runs(unit, stimulus):
-        assert_equals_model(unit, run)
+        if run.settles:
+            assert_keeps_rate(unit, run, free, None if pace is None else pace(unit))
+            continue
+        found = assert_equals_model(unit, run)
+        if not run.stalls:
+            free = found
 
 
 @pytest.mark.long

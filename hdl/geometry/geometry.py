@@ -148,9 +148,10 @@ class GeometryUnit(wiring.Component):
 
     The units of this package in a row. The corners of a sorted triangle go to the edge setup and, one
     attribute after the other, to a FIFO, where the attributes wait for the scales of their triangle. The
-    edges wait in a FIFO for the planes of their triangle. In the *compact* style one divider serves all edges
-    and one multiplier the gradients of all attributes; attributes take turns along the spans, too, and so do
-    the normals of a span. There only the attributes have a FIFO in the setup; other words wait in registers.
+    edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits before each, so
+    that neither keeps the other from its turn. In the *compact* style one divider serves all edges and one
+    multiplier the gradients of all attributes; attributes take turns along the spans, too, and so do the
+    normals of a span. There only the attributes have a FIFO in the setup; other words wait in registers.
 
     The units work on several triangles at the same time, and the slowest one sets the pace. A triangle takes:
 
@@ -259,9 +260,13 @@ class GeometryUnit(wiring.Component):
             connect(m, drawn, lanes[0].i)
             return lanes[0].walks, lanes[0].planes
         turn = _turns(m, "lane", drawn, len(lanes))
-        for k, lane in enumerate(lanes):
-            m.d.comb += [lane.i.payload.eq(drawn.payload), lane.i.valid.eq(drawn.valid & (turn == k))]
-        m.d.comb += drawn.ready.eq(Array(lane.i.ready for lane in lanes)[turn])
+        # A triangle waits before each lane. Dealt straight into them, two lanes that accept on the same
+        # cycles would take turns there, at the rate of one.
+        dealt = [_between(f"dealt_{k}", drawn) for k in range(len(lanes))]
+        for k, (to, lane) in enumerate(zip(dealt, lanes, strict=True)):
+            m.d.comb += [to.payload.eq(drawn.payload), to.valid.eq(drawn.valid & (turn == k))]
+            connect_register(m, f"waiting_{k}", to, lane.i)
+        m.d.comb += drawn.ready.eq(Array(to.ready for to in dealt)[turn])
         merged = []
         for name in ("walks", "planes"):
             sources = [getattr(lane, name) for lane in lanes]

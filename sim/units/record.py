@@ -16,8 +16,10 @@ import numpy as np
 from amaranth.lib.wiring import Component
 
 __all__ = [
+    "OFFERED",
     "PAUSED",
     "STALLS",
+    "TAKEN",
     "Beats",
     "Case",
     "Decisions",
@@ -40,6 +42,13 @@ PAUSE, PAUSED = 61, 40
 
 STALLS = ((0.0, 0.0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9))
 """Shares of the cycles on which the input and the output are stalled, a pair for each run."""
+
+OFFERED, TAKEN = 2.0, 0.6
+"""Rates at which beats are offered and taken in the run whose stalls end, over those without stalls.
+
+The sink holds up a unit at its full rate, and not at half of that: a unit that falls into half its rate stays
+there.
+"""
 
 
 @dataclass(frozen=True)
@@ -215,6 +224,10 @@ class Stimulus:
         Beats or pixels of a test.
     stalled : bool
         Whether it is also sent under the patterns of `STALLS`; else without stalls alone.
+    pace : callable, optional
+        Takes the component, gives the cycles from an output beat to the next without stalls, as the unit's
+        documentation has them for this input. ``None`` where the data decide: then no documented rate is
+        asserted but that of a `PipelinedUnit`, and after stalls the rate of the same beats from reset.
     long : bool
         Whether it belongs to the long run.
     repeats : int
@@ -226,6 +239,7 @@ class Stimulus:
     make: Callable[[Component, np.random.Generator, int], Case]
     count: int = 1000
     stalled: bool = True
+    pace: Callable[[Component], float] | None = None
     long: bool = False
     repeats: int = 1
     variants: tuple[str, ...] = ()
@@ -251,17 +265,48 @@ class UnitRun:
         Expected members of the status after the run, see `Record.status`.
     stalls : dict
         Arguments ``input_stalls`` and ``output_stalls`` of `simulate`; empty for none.
+    settles : bool
+        Whether a test that knows the times without stalls ends the stalls half-way, by `settled`.
     """
 
     case: Case
     expected: Beats
     status: Mapping[str, int] | None
     stalls: dict[str, np.ndarray]
+    settles: bool = False
 
     @property
     def count(self) -> int:
         """Number of output beats."""
         return length_of(self.expected)
+
+    def settled(self, cycles: np.ndarray, input_cycles: np.ndarray) -> tuple["UnitRun", int]:
+        """The run with stalls of the unit's own rate on both sides for half of the beats, then without any.
+
+        Parameters
+        ----------
+        cycles, input_cycles : arrays
+            Clocks of the output and of the input beats in the run without stalls.
+
+        Returns
+        -------
+        run : UnitRun
+            The run, see `OFFERED` and `TAKEN`.
+        end : int
+            Clock from which on nothing is stalled.
+        """
+        rng, start = np.random.default_rng([2026, len(cycles)]), int(input_cycles[0])
+        span = int(max(cycles.max(initial=0), input_cycles[-1])) + 1 - start
+        end = start + round(span / 2 / TAKEN)
+        # Until no run that keeps its rate is still under way.
+        free = np.zeros(end + 2 * span + 1000, dtype=bool)
+        offered = min(OFFERED * len(input_cycles) / span, 0.9)
+        taken = TAKEN * min(len(cycles) / span, 1)
+        stalls = {
+            name: np.concatenate([rng.random(end) >= share, free])
+            for name, share in (("input_stalls", offered), ("output_stalls", taken))
+        }
+        return replace(self, stalls=stalls), end
 
 
 @dataclass(frozen=True)
@@ -358,6 +403,8 @@ class Record:
     def runs(self, unit: Component, stimulus: str, seed: int = 2026) -> Iterator[UnitRun]:
         """The runs of a stimulus, always the same ones: without stalls, with them, and with pauses.
 
+        The second one is to settle, see `UnitRun`.
+
         Parameters
         ----------
         unit : Component
@@ -380,7 +427,7 @@ class Record:
                     for name, period, share in zip(names, periods, shares, strict=True)
                     if share
                 }
-                yield UnitRun(case, expected, status, stalls)
+                yield UnitRun(case, expected, status, stalls, shares == STALLS[1])
             if given.stalled:
                 few = case.first(PAUSED)
                 pauses = np.arange(PAUSE * PAUSED) % PAUSE != 0

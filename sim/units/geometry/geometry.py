@@ -58,6 +58,17 @@ def _drawn(unit, rng, count):
     return Case(ended(random_triangles(rng, count, unit.grid, 3.0, 0.1), unit.grid).beats, frame.codes)
 
 
+def _dense(unit, rng, count):
+    """Triangles of a pixel, all drawn: the setup alone sets the pace."""
+    frame = Frame(-60, -60, 60, 60, "flip", 200)
+    triangles = random_triangles(rng, count, unit.grid, 1.0, 0.1)
+    # Of a square of 5/4 pixels the half with the one centre.
+    step = unit.grid.steps
+    for place, far in ((triangles.x, [0, 1, 0]), (triangles.y, [0, 0, 1])):
+        place[:] = rng.integers(-40, 40, (count, 1)) * step + np.array(far) * 5 * step // 4
+    return Case(triangles.beats, frame.codes)
+
+
 def _large(unit, rng, count):
     """Triangles as large as the picture, with spans in several pieces."""
     frame = Frame(-100, -80, 100, 80, "flip", 60)
@@ -94,6 +105,7 @@ RECORD = Record(
         "tiny": Stimulus(_tiny, 300),
         "mesh": Stimulus(_mesh, 300),
         "drawn": Stimulus(_drawn, 2000, stalled=False),
+        "dense": Stimulus(_dense, 1600, pace=lambda unit: unit.interval),
         "large": Stimulus(_large, 40),
         "largest": Stimulus(_largest, 60),
     },

@@ -84,10 +84,20 @@ def test_frames_equal_model(simulator):
 
 
 @pytest.mark.long
-def test_stalls_change_no_pixel(simulator):
-    bands, rng = [*range(simulator.drawing.bands)], np.random.default_rng(5)
-    stalls = {"input_stalls": rng.random(997) < 0.7, "output_stalls": rng.random(1009) < 0.6}
-    assert_equal(simulator.run(bands, **stalls), expected(simulator.drawing, bands))
+def test_stalls_change_no_pixel_and_no_band_after_them(simulator):
+    """Stalls on both sides, then none: the last half of the bands left takes the cycles as from reset."""
+    bands, rng = [*range(simulator.drawing.bands)] * 3, np.random.default_rng(5)
+    free = simulator.run(bands)
+    end = int(free.cycles.sum())
+    stalls = {
+        name: np.r_[rng.random(end) < share, np.zeros(2 * end, dtype=bool)]
+        for name, share in (("input_stalls", 0.7), ("output_stalls", 0.6))
+    }
+    found = simulator.run(bands, **stalls)
+    assert_equal(found, expected(simulator.drawing, bands))
+    left = np.count_nonzero(np.cumsum(found.cycles) - found.cycles >= end)
+    assert left >= 8
+    np.testing.assert_array_equal(found.cycles[-(left // 2) :], free.cycles[-(left // 2) :])
 
 
 @pytest.mark.long
