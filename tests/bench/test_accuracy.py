@@ -1,8 +1,14 @@
 """Frames of the exponents asked for, and their errors."""
 
+import re
+from pathlib import Path
+
 import pytest
 
+import blysk
 from blysk.bench.accuracy import measure
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import preset
 from blysk.sim.meshes.teapot import teapot
 
@@ -17,3 +23,27 @@ def test_measures_every_exponent():
     for _, _, result in rows:
         assert 0 < result.arithmetic_error.max_lsb <= 1
         assert result.total_error.max_lsb > 5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("column", "options"),
+    [
+        (0, {"method": "chord"}),
+        (1, {"method": "renormalise"}),
+        (2, {"method": "quadratic", "operand": "one_minus_cosine"}),
+        (3, {"method": "quadratic", "model": "cosquad"}),
+    ],
+    ids=str,
+)
+def test_the_table_in_readme_is_what_its_command_prints(column, options):
+    """Its errors, by the bit-accurate model of the frame that the command simulates."""
+    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    assert "`blysk render teapot --exponent 100 --method ... --model ...`" in text
+    (row,) = re.findall(r"^\| largest error found, against exact Blinn, LSB \|(.+)\|$", text, re.MULTILINE)
+    scene = blysk.scene("teapot", exponent=100)
+    design = blysk.design(**options).for_materials(scene.materials)
+    found = compare(scene, design, model_frame(scene, design))
+    assert found.target == "blinn"
+    written = row.split("|")[column].strip()
+    assert f"{found.total_error.steady_lsb:.{len(written.partition('.')[2])}f}" == written

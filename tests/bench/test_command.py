@@ -48,8 +48,8 @@ def test_help_has_an_example(name, capsys):
         (["blocks", "--jobs", "0"], "--jobs 0: out of range; give a whole number from 1 to"),
         (["blocks", "--seed", "-1"], "--seed -1: out of range; give a whole number from 0 to"),
         (["blocks", "--json", "nowhere/x"], "nowhere/x: cannot be written, there is no folder nowhere; make"),
-        (["pages", "nowhere"], "nowhere/README.md: cannot be written, there is no folder nowhere; make"),
-        (["pages", "file"], "file/README.md: cannot be written, file is no folder; choose"),
+        (["pages", "file"], "file: cannot be made (File exists); give another folder"),
+        (["pages", "file/new"], "file/new: cannot be made (Not a directory); give another folder"),
         (["pages", ".", "--unit", "x"], "--unit x: unknown unit; use one of "),
     ],
 )
