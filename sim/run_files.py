@@ -77,10 +77,11 @@ def _keys(path: _Path) -> set[object]:
     return keys | ({(found.st_dev, found.st_ino)} if found.st_ino else set())
 
 
-def reads(path: _Path) -> None:
-    """Record a file that the run around reads, see `RunFiles.reads`; nothing happens outside of a run."""
+def reads(path: _Path) -> _Path:
+    """The path of a file that the run around reads, recorded by `RunFiles.reads` if there is a run."""
     if run := _CURRENT.get():
         run.reads(path)
+    return path
 
 
 def writes(path: _Path) -> None:

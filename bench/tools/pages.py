@@ -443,7 +443,7 @@ def write_pages(
     Raises
     ------
     InputError
-        If the folder or a file cannot be written.
+        If the folder or a file cannot be written, or a file would be replaced that is no page.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -451,6 +451,8 @@ def write_pages(
         raise InputError(str(folder), f"cannot be made ({error.strerror})", "give another folder") from None
     check_writable(folder / "README.md")
     _check_ours(folder, units)
+    # First: it tells that the folder is ours, whatever comes between.
+    write_text(folder / "README.md", index_page(folder))
     for unit in units:
         if progress:
             progress(unit)
@@ -464,7 +466,6 @@ def write_pages(
             of_this_page = re.fullmatch(rf"{unit}-(structure|timing|errors)(-\d+)?\.svg", path.name)
             if of_this_page and path.name not in files:
                 path.unlink()
-    write_text(folder / "README.md", index_page(folder))
 
 
 @click.command(short_help="Pages of the units, with drawings.")

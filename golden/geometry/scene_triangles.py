@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Frame, Grid, Triangles
+from blysk.golden.reference.faces import planes_of, seen_from_behind
 from blysk.golden.reference.scene import Scene
 
 __all__ = ["SceneTriangles", "scene_triangles"]
@@ -120,10 +121,33 @@ def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -
         material=mesh.material[source].astype(np.int64),
         two_sided=scene.two_sided[source],
     )
+    triangles = _turned(scene, triangles, source)
     far = 0
     if scene.camera.projection == "perspective" and len(w):
         far = int((w.max(axis=1) > _DEEPEST * w.min()).sum())
     return SceneTriangles(triangles, frame, source, int((cut & present).sum()), int((~present).sum()), far)
+
+
+def _turned(scene: Scene, triangles: Triangles, source: np.ndarray) -> Triangles:
+    """Triangles, those without area in the world turned to the side that their normals face.
+
+    Rounding alone gives them an orientation, by which the hardware negates normals. Where it culls, those
+    that rounding turns to the front stay: they may close a seam.
+    """
+    plane, flat = planes_of(scene.mesh)
+    chosen = np.flatnonzero(np.isin(source, flat))
+    if not len(chosen):
+        return triangles
+    (dx, ex), (dy, ey) = ((v[chosen, 1:] - v[chosen, :1]).T for v in (triangles.x, triangles.y))
+    # y grows downwards: an area over 0 is clockwise, a back.
+    area = dx * ey - ex * dy
+    behind = seen_from_behind(scene, plane)[source[chosen]]
+    wrong = np.where(behind, (area < 0) & ~scene.culls[source[chosen]], area > 0)
+    values = {}
+    for name in ("x", "y", "depth", "normal"):
+        values[name] = getattr(triangles, name).copy()
+        values[name][chosen[wrong]] = values[name][chosen[wrong]][:, [0, 2, 1]]
+    return replace(triangles, **values)
 
 
 def _clip(

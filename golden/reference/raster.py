@@ -7,10 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from blysk.golden.number.spans import runs_of
-from blysk.golden.reference.geometry import Mesh, any_component, normalise, sum_of_components
+from blysk.golden.reference.faces import face_normals, seen_from_behind
+from blysk.golden.reference.geometry import any_component, normalise, sum_of_components
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["SUBPIXELS", "Raster", "face_normals", "fragment_barycentrics", "fragment_normals", "rasterise"]
+__all__ = [
+    "SUBPIXELS",
+    "Raster",
+    "fragment_barycentrics",
+    "fragment_normals",
+    "rasterise",
+]
 
 SUBPIXELS = 256
 """Steps in a pixel; projected vertices are rounded to a step."""
@@ -18,8 +25,6 @@ SUBPIXELS = 256
 # Pixels beyond which a triangle is cut, so that edge functions stay within int64: coordinates within
 # 2^28 steps give products within 2^59.
 _GUARD = float(2**20)
-# A height below this part of the largest coordinate is rounding only.
-_FLAT = 2.0**-47
 # Scanlines or fragments handled at once; bounds the memory, changes no result.
 _CHUNK = 1 << 20
 
@@ -130,29 +135,6 @@ class _Pieces:
         half = SUBPIXELS // 2
         c = a * (half - start[..., 0]) + b * (half - start[..., 1])
         return a * SUBPIXELS, b * SUBPIXELS, c
-
-
-def face_normals(mesh: Mesh) -> np.ndarray:
-    """Unit normals of the triangles, by the right-hand rule.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The surface.
-
-    Returns
-    -------
-    float64 array, shape (F, 3)
-        Where a triangle has no area but by rounding: along the sum of its vertex normals, and 0 if that is 0.
-    """
-    first, second, third = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    left, right = second - first, third - first
-    cross = np.cross(left, right)
-    around = sum_of_components(np.abs(left) + np.abs(right))
-    height = _FLAT * np.abs(mesh.vertices).max(initial=0)
-    flat = np.flatnonzero(sum_of_components(np.abs(cross)) <= height * around)
-    cross[flat] = mesh.normals[mesh.faces[flat]].sum(axis=1)
-    return normalise(cross)
 
 
 def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -301,11 +283,7 @@ def rasterise(scene: Scene) -> Raster:
     faces = mesh.faces
     plane = face_normals(mesh)
     homogeneous = scene.camera.homogeneous(mesh.vertices, width, height)
-    if scene.camera.projection == "perspective":
-        towards = scene.camera.position - mesh.vertices[faces[:, 0]]
-        back = sum_of_components(plane * towards) < 0
-    else:
-        back = plane @ scene.camera.viewer < 0
+    back = seen_from_behind(scene, plane)
 
     x, y, w, depth = homogeneous.T
     outside = np.zeros(len(faces), dtype=bool)

@@ -7,15 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.faces import face_normals
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector, intensity, intensity_of_cosines, saturate
-from blysk.golden.reference.raster import (
-    Raster,
-    face_normals,
-    fragment_barycentrics,
-    fragment_normals,
-    rasterise,
-)
+from blysk.golden.reference.raster import Raster, fragment_barycentrics, fragment_normals, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.scene import Scene
 

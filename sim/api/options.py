@@ -123,8 +123,7 @@ class Model(Choice):
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
             return super().check(value)
         try:
-            reads(value)
-            return TabulatedModel.of_csv(value)
+            return TabulatedModel.of_csv(reads(value))
         except OSError as error:
             raise PartError("", f"{shown(value)} cannot be opened ({error.strerror})", self.points) from None
         except ValueError as error:

@@ -12,7 +12,7 @@ from blysk.bench.report.section import Drawing, Table
 from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pipeline import Design
-from blysk.golden.reference.raster import face_normals
+from blysk.golden.reference.faces import face_normals
 from blysk.hdl.emit.cost import Cost
 from blysk.sim.api.scene_file import read_scene_file
 from blysk.sim.frames.frame import SimulatedFrame

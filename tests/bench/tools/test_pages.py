@@ -216,3 +216,12 @@ def test_the_folder_is_made_and_a_bad_one_is_one_line(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"pages: cannot be made .*; give another folder"):
         write_pages(tmp_path / "file" / "pages", [])
+
+
+@pytest.mark.parametrize("name", ["README.md", "diffuse.md"])
+def test_pages_of_somebody_else_stay(tmp_path, name):
+    """A first page that is none of ours, or a page of a unit in a folder without one."""
+    (tmp_path / name).write_text("# Mine\n")
+    with pytest.raises(InputError, match=f"{name}: would be replaced, and `blysk pages` did not write it"):
+        write_pages(tmp_path, ["diffuse"], samples=1000)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {name: "# Mine\n"}
