@@ -1,6 +1,6 @@
 """Frame constants: the registers behind the write port."""
 
-from amaranth.hdl import Const, Module, Signal, Value, unsigned
+from amaranth.hdl import Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -19,12 +19,17 @@ from blysk.golden.number.fixed import Format
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.lighting.intensity import color_shape
 
-__all__ = ["FrameConstantsUnit", "frame_constants_shape", "write_shape"]
+__all__ = ["FrameConstantsUnit", "existing_material", "frame_constants_shape", "write_shape"]
 
 
 def write_shape() -> data.StructLayout:
     """Shape of a write: address and 18 bits of data."""
     return data.StructLayout({"address": unsigned(9), "data": unsigned(18)})
+
+
+def existing_material(index: Value, materials: int) -> Value:
+    """Index of a material: one past the last is that of the last."""
+    return index if materials == 1 << len(index) else Mux(index >= materials, materials - 1, index)
 
 
 def frame_constants_shape(lights: int, threshold: Format | None = None, banks: int = 1) -> data.StructLayout:

@@ -14,7 +14,7 @@ from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
-from blysk.hdl.frame_constants import FrameConstantsUnit, write_shape
+from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
@@ -55,9 +55,8 @@ PORT_DESCRIPTIONS = {
 def span_shape(parameters: Design) -> data.StructLayout:
     """Shape of a raster span: first pixel, pixels, and the normals that the method takes.
 
-    These are unit normals at the first and last pixel centre, and in the middle for the chord method; or the
-    ends of the true line; or values of each light in place of normals. Without lights there are none. With
-    several materials ``material`` is the index of the span's material.
+    Unit normals at the first and last pixel centre, for chord also in the middle; the ends of the true line;
+    or values of each light. Without lights there are none. ``material`` is there with several materials.
 
     Parameters
     ----------
@@ -342,11 +341,9 @@ class ShadingPipelineUnit(wiring.Component):
             inside.eq(inside + came - went),
             idle.eq(~admit & (idle | (finished & is_one))),
         ]
-        if self.parameters.materials > 1:
+        if (p := self.parameters).materials > 1:
             # Constants follow the index one cycle later, the slope of the exponent some more.
-            material, waited, last = self.i.payload.material, Signal(2), self.parameters.materials - 1
-            if last + 1 < 1 << len(material):
-                material = Mux(material > last, last, material)
+            material, waited = existing_material(self.i.payload.material, p.materials), Signal(2)
             with m.If(self.i.valid & (material != frame.material)):
                 m.d.sync += waited.eq(0)
                 with m.If(idle):

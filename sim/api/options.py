@@ -357,11 +357,7 @@ DESIGN: dict[str, Option] = {
 
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
-    "materials": Option(
-        Whole(1, MAX_MATERIALS),
-        1,
-        "Number of materials; of a model with a table up to 64 tables for all of them.",
-    ),
+    "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials, of up to 64 tables of lobes."),
     "factors": Option(
         Whole(0, MAX_LIGHTS),
         0,
