@@ -69,9 +69,7 @@ def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
             found.readers.append(None)
         return b"o %d\n" % numbers[rest]
 
-    data = plain_text(data, "replace").encode()
-    data = re.sub(rb"^([ \t]*(?:usemtl|mtllib)(?!\S)[^\n]*)|#[^\n]*", _without_comment, data, flags=re.M)
-    data = re.sub(rb"\\[ \t]*\n", b" ", data)
+    data = _joined(data)
     data = re.sub(rb"^[^\S\n]*+(?!(?:vn?|f)(?!\S))(\S++)([^\n]*)\n?", replaced, data, flags=re.MULTILINE)
     # Texture coordinates have gone.
     data = re.sub(rb"(?<!\S)(-?[0-9]++)/-?[0-9]*+/(-?[0-9]++)(?!\S)", rb"\1//\2", data)
@@ -81,29 +79,38 @@ def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
     return data, libraries
 
 
-def _without_comment(line: re.Match) -> bytes:
-    name = line[1] or b""
-    return name.rstrip(b"\\") if b"#" in name else name
+def _joined(data: bytes) -> bytes:
+    """A text without comments, each statement in a line of its own; names keep what looks like a comment."""
+
+    def without_comment(line):
+        name = line[1] or b""
+        return name.rstrip(b"\\") if b"#" in name else name
+
+    data = plain_text(data, "replace").encode()
+    names = rb"^([ \t]*(?:usemtl|mtllib|newmtl)(?!\S)[^\n]*)|#[^\n]*"
+    data = re.sub(names, without_comment, data, flags=re.MULTILINE)
+    return re.sub(rb"\\[ \t]*\n", b" ", data)
 
 
 def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None:
     """Find the materials' definitions in the material files; a definition is read if a face uses it."""
-    texts = {}
+    texts, commented = {}, {}
     for target in dict.fromkeys(file for name in libraries for file in _library_files(name, folder, found)):
         if target.stat().st_size > _MAX_LIBRARY:
             raise Refused(
                 f"its material file {shown(target.name)!r} is over {_MAX_LIBRARY:,} bytes", "shorten it"
             )
         reads(target)
-        library = plain_text(target.read_bytes(), "replace")
+        library = _joined(target.read_bytes()).decode()
         for rest in _IMAGE.findall(library):
             refers(folder, rest.strip(), rest.split()[-1])
         for block in re.split(r"^[ \t]*newmtl(?!\S)", library, flags=re.MULTILINE)[1:]:
             first, _, text = block.partition("\n")
             texts.setdefault(first.strip(), text)
+            commented.setdefault(first.partition(" #")[0].strip(), text)
     for number, name in enumerate(found.names[1:], 1):
         bare = name.partition(" #")[0].strip()
-        text = texts.get(name, texts.get(bare))
+        text = texts.get(name, texts.get(bare, commented.get(name)))
         found.readers[number] = None if text is None else partial(_mtl_material, text, shown(name), found)
     missing = found.readers[1:].count(None)
     found.tell("material name without a definition", "material names without a definition", missing)
@@ -141,7 +148,7 @@ def _mtl_material(text: str, name: str, found: Found) -> FileMaterial:
     """
     values = {}
     for line in text.split("\n"):
-        keyword, *words = line.partition("#")[0].split() or [""]
+        keyword, *words = line.split() or [""]
         if re.match("map_|norm$|bump$|disp$|decal$|refl$", keyword.lower()) and keyword != "map_aat":
             found.tell("texture", "textures")
         elif keyword:

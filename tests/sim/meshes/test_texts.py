@@ -80,6 +80,18 @@ def test_a_comment_swallows_no_line(tmp_path, text):
     assert corners == sorted(sorted(points[k] for k in face) for face in ([0, 1, 2], [1, 3, 2]))
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["# C:\\maps\\\nKd 1 0 0\n", "Kd 1 \\\n0 0\n", "Kd 1 0 0 # \\\nNs 5\n", "\t# \\\r\nKd 1 \\\r\n 0 0"],
+)
+def test_comments_and_continued_lines_of_material_files(tmp_path, text):
+    put(tmp_path / "a.mtl", f"newmtl a # C:\\\n{text}")
+    loaded = load(tmp_path / "a.obj", "mtllib a.mtl\nusemtl a\n" + OBJ)
+    assert loaded.materials[0].diffuse == (1, 0, 0)
+    assert loaded.materials[0].exponent == (5 if "Ns" in text else None)
+    assert loaded.ignored == ()
+
+
 def binary_ply(end, newline="\n", comment="", order="little", tail=b""):
     lines = (
         f"ply|format binary_{order}_endian 1.0|{comment}element vertex 3|property float x|property float y|"
