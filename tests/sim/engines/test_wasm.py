@@ -1,11 +1,11 @@
 # amaranth: UnusedElaboratable=no
 """WebAssembly modules: the same beats on the same cycles as the other engines."""
 
-from dataclasses import re
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
-import replace
 from amaranth.hdl import Module, unsigned
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
