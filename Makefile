@@ -7,6 +7,9 @@ TEST_WORKERS ?= auto
 
 COMMA := ,
 
+# Workers, and the commands that tests start, share their bytecode.
+unexport PYTHONDONTWRITEBYTECODE
+
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 

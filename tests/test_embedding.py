@@ -39,11 +39,13 @@ def expected(example):
     return picture
 
 
+@pytest.mark.ci
 @pytest.mark.long
 def test_amaranth(example, expected):
     np.testing.assert_array_equal(example["picture"](), expected)
 
 
+@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.skipif(bool(missing_tool("icarus")), reason="Icarus Verilog is not installed")
 def test_verilog(tmp_path, expected):

@@ -25,6 +25,7 @@ def test_script(tmp_path):
     assert "\nmodule teapot_core (" in (tmp_path / "core.v").read_text()
 
 
+@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.ipynb")), ids=lambda path: path.name)
 def test_notebook(path, capsys):

@@ -67,6 +67,7 @@ def test_version_is_that_of_the_changes_and_the_citation():
     assert f"\nversion: {version}\n" in (PROJECT / "CITATION.cff").read_text("utf-8")
 
 
+@pytest.mark.ci
 @pytest.mark.long
 def test_wheel_holds_the_packages_and_no_more(wheel):
     with zipfile.ZipFile(wheel) as archive:
@@ -114,6 +115,7 @@ print(emit(record.variants[record.default].unit(), "unit").partition("module")[2
 """
 
 
+@pytest.mark.ci
 @pytest.mark.long
 def test_wheel_in_a_project_with_packages_of_the_same_names(installed, tmp_path):
     """A render, a Verilog, the table of units and a unit, beside a project's own hdl, sim and bench."""
@@ -151,6 +153,7 @@ errors = (blysk.InputError, blysk.SimulationError, blysk.CompilerMissing)
 """
 
 
+@pytest.mark.ci
 @pytest.mark.long
 def test_types_of_the_wheel(wheel, tmp_path):
     """The public modules by mypy's defaults, and a program that uses every public name by ``--strict``.

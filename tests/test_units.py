@@ -1,9 +1,9 @@
 # amaranth: UnusedElaboratable=no
 """Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets.
 
-The quick run has all stimuli of the default variants, compiled: the engine itself compares the first beats
-with Amaranth's simulator. The long run has all variants, whose models are compared so, too, and of default
-variants both simulators under every pattern of stalls.
+The quick run has all stimuli of the default variants but `SELDOM`'s, compiled: the engine itself compares the
+first beats with Amaranth's simulator. CI has every default variant. The long run has all variants, whose
+models are compared so, too, and of default variants both simulators under every pattern of stalls.
 """
 
 import inspect
@@ -21,6 +21,22 @@ from .checks import assert_equals_model, assert_keeps_rate, known, resets
 
 FEW = 24
 """Beats in Amaranth's simulator; spans are as short as for 200 pixels."""
+
+
+SELDOM = (
+    *("adaptive_normaliser", "bisection", "bisection_chain", "bisection_interpolator"),
+    *("angular_interpolator", "angular_setup", "recurrence", "recurrence_interpolator", "recurrence_setup"),
+    *("middle_normal", "quadratic_evaluator", "quadratic_interpolator", "gpq", "half_chord"),
+    *("difference_setup", "linear_interpolator"),
+)
+"""Units of the documents' methods, which the default design does not have."""
+
+
+CI = [pytest.mark.long, pytest.mark.ci]
+
+
+def marks_of(name, quick=True):
+    return CI[:1] if not quick else CI if name in SELDOM else []
 
 
 @lru_cache(maxsize=1)
@@ -46,9 +62,12 @@ def _runs():
                 quick = variant == record.default and not (given.long or sent.long)
                 # The default variant gets every stimulus, the others the first and those that name them.
                 if variant == record.default or stimulus == next(iter(stimuli)) or variant in sent.variants:
-                    marks = [] if quick else [pytest.mark.long]
                     yield pytest.param(
-                        name, variant, stimulus, marks=marks, id=f"{name}-{variant}-{stimulus}"
+                        name,
+                        variant,
+                        stimulus,
+                        marks=marks_of(name, quick),
+                        id=f"{name}-{variant}-{stimulus}",
                     )
 
 
@@ -95,7 +114,14 @@ def few_of(record, variant, unit):
     return case.first(FEW)
 
 
-@pytest.mark.parametrize("name", [name for name, record in RECORDS.items() if not record.remembers])
+def _resets():
+    """Parts share what is reset with the pipeline, pipelined units with one of them: CI has the others."""
+    for name, record in RECORDS.items():
+        if not record.remembers:
+            yield pytest.param(name, marks=[] if name in ("chord", "pipeline") else CI)
+
+
+@pytest.mark.parametrize("name", list(_resets()))
 def test_reset_leaves_nothing_behind(name):
     """Reset with beats inside: the unit then answers as from power-up, on the same cycles."""
     record = RECORDS[name]

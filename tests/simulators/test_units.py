@@ -28,7 +28,12 @@ FEWER = 1000
 """Of the others, whose many beats the compiled engine has."""
 
 UNITS = [
-    (name, variant, simulator)
+    pytest.param(
+        name,
+        variant,
+        simulator,
+        marks=[pytest.mark.ci] * (simulator == "icarus" and variant == record.default),
+    )
     for name, record in RECORDS.items()
     if name != "pipeline"
     for variant, given in record.variants.items()

@@ -30,6 +30,7 @@ def local(lights=1, **options):
     return LocalChordInterpolatorUnit(LocalChordInterpolator(), lights, **options)
 
 
+CI = [pytest.mark.long, pytest.mark.ci]
 RECORDS = {chord: CHORD, local: LOCAL}
 
 
@@ -94,7 +95,7 @@ LENGTHS = {
 }
 
 
-@pytest.mark.parametrize("make", [chord, local])
+@pytest.mark.parametrize("make", [chord, pytest.param(local, marks=CI)])
 @pytest.mark.parametrize("length", runs_of(LENGTHS))
 @pytest.mark.parametrize("with_gate", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_a_pixel_in_every_cycle(make, length, with_gate):
@@ -109,7 +110,7 @@ def test_a_pixel_in_every_cycle(make, length, with_gate):
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
 
 
-@pytest.mark.parametrize("make", [chord, local])
+@pytest.mark.parametrize("make", [chord, pytest.param(local, marks=CI)])
 @pytest.mark.parametrize("length", [1, 2])
 def test_short_spans_come_sooner(make, length):
     """By the cycles of the setup: nothing of them goes through it."""

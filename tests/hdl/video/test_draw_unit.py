@@ -66,6 +66,7 @@ def assert_equal(found, made):
             np.testing.assert_array_equal(pixels[name], value, err_msg=f"band {band.band}: {name}")
 
 
+@pytest.mark.ci
 @pytest.mark.long
 def test_frames_equal_model(simulator):
     """Two frames; every counter is the sum of the bands'."""

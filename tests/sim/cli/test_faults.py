@@ -238,6 +238,7 @@ SWEEP += ["--degrees", "3", "--fraction-bits", "46", "--operands", "one_minus_co
 SWEEP += ["--largest-error", "255"]
 
 
+@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="there is no /proc")
 def test_killed_worker_of_a_command(cache):

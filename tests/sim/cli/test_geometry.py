@@ -18,6 +18,8 @@ pytestmark = pytest.mark.usefixtures("folder")
 HARDWARE = "--geometry", "hardware"
 
 
+@pytest.mark.long
+@pytest.mark.ci
 def test_picture_and_figures(capsys):
     """The model's picture; errors against exact normals of every pixel; counters and cycles."""
     assert main(["render", *SMALL, *HARDWARE, "-v", "-o", "a.png", "--json", "a.json"]) == 0

@@ -175,6 +175,7 @@ def test_refuses_a_folder(tmp_path, capsys, kind):
     assert {path: path.read_text() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.ci
 @pytest.mark.long
 def test_passes_in_icarus(run, folder):
     done = run(folder)
