@@ -185,7 +185,12 @@ READS = {
 """Tables, and how many of their words have a register inside."""
 
 
-@pytest.mark.parametrize("name", READS)
+def quick(names, some):
+    """Names, all but some of them for the long run."""
+    return [name if name in some else pytest.param(name, marks=pytest.mark.long) for name in names]
+
+
+@pytest.mark.parametrize("name", quick(READS, ("the same enable", "another enable")))
 def test_registers_behind_a_memory(name, mapped, tmp_path):
     component, words = READS[name]
     before = mapped(f"read, {name}", component)
@@ -203,7 +208,7 @@ MEMORY_FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", MEMORY_FAULTS)
+@pytest.mark.parametrize("fault", quick(MEMORY_FAULTS, ("register always enabled",)))
 def test_faults_injected_in_a_memory_are_found(fault, mapped, tmp_path):
     name = "the same enable"
     before = mapped(f"read, {name}", READS[name][0])
@@ -257,12 +262,7 @@ def multipliers(netlist):
     return [cell for cell in netlist["modules"]["top"]["cells"].values() if cell["type"] == "MULT18X18D"]
 
 
-QUICK = "three enables", "a reset", "another reader of an operand", "a shared operand", "narrow operands"
-
-
-@pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in CASES]
-)
+@pytest.mark.parametrize("name", quick(CASES, ("three enables", "another reader of an operand")))
 def test_what_moves_and_that_nothing_else_changes(name, mapped, tmp_path):
     describe, expected = CASES[name]
     before = mapped(name, Beside(describe))
@@ -333,9 +333,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize(
-    "fault", [*list(FAULTS)[:3], *(pytest.param(name, marks=pytest.mark.long) for name in list(FAULTS)[3:])]
-)
+@pytest.mark.parametrize("fault", quick(FAULTS, ("enable of another",)))
 def test_injected_faults_are_found(fault, mapped, tmp_path):
     before = mapped("three enables", Beside(CASES["three enables"][0]))
     after, _ = absorb_registers(before)

@@ -147,6 +147,7 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
 # Measurements.
 
 
+@pytest.mark.long
 def test_errors_are_those_of_the_simulated_frame():
     candidate = Candidate("chord", fraction_bits=38)
     (scene,) = explore.scenes_of(view(16, 12), [EXPONENT])

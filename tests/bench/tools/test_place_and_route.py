@@ -319,6 +319,7 @@ def test_parts_and_time_of_a_counter(family, kinds, cache, monkeypatch):
     assert Parts(*available) == family.capacity
 
 
+@pytest.mark.long
 @tools
 def test_parts_and_times_of_a_product(cache):
     """The slowest path is through the multiplier."""
@@ -377,6 +378,7 @@ def test_times_of_a_multiplier_with_registers_of_its_own(cache):
     assert place.end.startswith("o.D")
 
 
+@pytest.mark.long
 @tools
 def test_a_multiplier_with_an_adder_is_refused(cache):
     with pytest.raises(ToolError, match="has a cell MULTADDSUB18X18, which nextpnr does not time"):

@@ -150,7 +150,9 @@ def test_every_port_takes_part(unit):
             assert sources[number], node.name
 
 
-@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize(
+    "unit", [GPQUnit, *(pytest.param(unit, marks=pytest.mark.long) for unit in UNITS if unit is not GPQUnit)]
+)
 def test_columns_and_boxes(unit):
     graph = structure_of(unit)
     columns, back = layers(graph)
@@ -213,13 +215,16 @@ def test_large_structures_are_cut_down():
     assert all(node.kind != "register" or +node.operations for node in few.nodes.values())
 
 
-ADDERS = [
-    PowerUnit,
-    *(pytest.param(unit, marks=pytest.mark.long) for unit in (AngularSetupUnit, EdgeSetupUnit)),
-]
-
-
-@pytest.mark.parametrize("unit", ADDERS)
+@pytest.mark.parametrize(
+    "unit",
+    [
+        GPQUnit,
+        *(
+            pytest.param(unit, marks=pytest.mark.long)
+            for unit in (PowerUnit, AngularSetupUnit, EdgeSetupUnit)
+        ),
+    ],
+)
 def test_every_adder_is_drawn(unit):
     """Those that count the cycles of a unit are control."""
 

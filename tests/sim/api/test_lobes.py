@@ -40,6 +40,7 @@ def test_curve_of_a_file(tmp_path):
     assert design_of(settings, 1).model == "satin"
 
 
+@pytest.mark.long
 def test_each_lobe_has_a_bank():
     scene = many(3)
     settings = rendering_settings(scene, {"model": "ggx", "gate": True})

@@ -281,7 +281,7 @@ ODD = [
 ]
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_mutated_files_are_read_or_refused_in_one_line(write, data):
     """The documented file with pieces replaced, left out or put in, and bytes changed: never a traceback."""
