@@ -79,7 +79,7 @@ RECORD = Record(
     status=lambda unit, case: {"repaired": _spans(unit, case)[1]},
     stimuli={
         "short": Stimulus(_short, 1000),
-        "single": Stimulus(_single, 500),
+        "single": Stimulus(_single, 500, pace=lambda unit: unit.COMPACT_INTERVAL if unit.compact else 1),
         "long": Stimulus(_long, 500),
         "last bits": Stimulus(_short, 50_000, stalled=False),
         "ties": Stimulus(_deciding, 2_000_000, stalled=False),

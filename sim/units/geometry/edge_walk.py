@@ -62,7 +62,7 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "small": Stimulus(_small, 300),
-        "tall": Stimulus(_tall, 300),
+        "tall": Stimulus(_tall, 300, pace=lambda unit: 1),
         "below": Stimulus(_below, 300),
         "flat": Stimulus(_flat, 120),
     },

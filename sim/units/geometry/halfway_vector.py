@@ -42,6 +42,6 @@ RECORD = Record(
     source="[T] figure 4.10",
     variants={"": Variant(HalfwayVectorUnit, _measure, "angles to 179 degrees", note="components over ONE")},
     expect=_expect,
-    stimuli={"vectors": Stimulus(_vectors, 2000)},
+    stimuli={"vectors": Stimulus(_vectors, 2000, pace=lambda unit: 1)},
     axis="angle between light and viewer, degrees",
 )
