@@ -142,9 +142,9 @@ def test_normals_of_unused_vertices_do_not_count(tmp_path):
     assert (loaded.repaired_normals, len(loaded.mesh.vertices)) == (0, 3)
 
 
-@pytest.mark.parametrize("faces", ["f 1//1 2//1 3//1\nf 2 4 3\n", "f 1//1 2//1 3//1\nf 2//1 4//7 3//1\n"])
-def test_obj_whose_normals_cannot_be_used_is_counted(tmp_path, faces):
-    # trimesh drops all normals if one face has none, or if one index is out of range.
+def test_obj_whose_normals_cannot_be_used_is_counted(tmp_path):
+    # trimesh drops all normals if one face has none.
+    faces = "f 1//1 2//1 3//1\nf 2 4 3\n"
     loaded = load(tmp_path / "a.obj", f"{CORNERS}v 1 1 0\nvn 0 0.6 0.8\n{faces}")
     assert loaded.repaired_normals == 4
     assert (loaded.mesh.normals == [0, 0, 1]).all()
