@@ -17,7 +17,7 @@ from blysk.bench.tools import web, web_data
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
-from blysk.golden.presets import preset
+from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.probes import probes_of
 from blysk.sim.errors import InputError
@@ -389,8 +389,14 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
     ("arguments", "line"),
     [
         (["--design", "chord"], "--design chord: unknown model; use one of"),
-        (["--design", "chord-local/exp"], "--design chord-local/exp: unknown method; use one of linear"),
-        (["--design", "chord/phong"], "--design chord/phong: unknown model; use one of cosquad"),
+        (
+            ["--design", "chord-local/exp"],
+            f"--design chord-local/exp: unknown method; use one of {next(iter(METHODS))}",
+        ),
+        (
+            ["--design", "chord/phong"],
+            f"--design chord/phong: unknown model; use one of {next(iter(MODELS))}",
+        ),
         (["--report", "nothing"], "--report nothing: is no report; make one with `blysk bench FOLDER`"),
         (["-o", "no/site"], "no/site: cannot be written, there is no folder no; make the folder first"),
     ],

@@ -14,7 +14,7 @@ import blysk
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pipeline import Build
-from blysk.golden.presets import preset
+from blysk.golden.presets import METHODS, preset
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, DesignOptions, RenderOptions, SceneOptions
 from blysk.sim.cli.main import main
 from blysk.sim.errors import OptionError
@@ -194,7 +194,7 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
     ("source", "options", "line"),
     [
         ("teapot", {"exponent": 0}, "exponent 0: out of range; give a whole number from 1 to 1000"),
-        ("teapot", {"method": "x"}, "method 'x': unknown; use one of linear, "),
+        ("teapot", {"method": "x"}, f"method 'x': unknown; use one of {next(iter(METHODS))}, "),
         ("teapot", {"size": 5}, "size 5: not a size; "),
         ("teapot", {"background": "red"}, "background 'red': not a colour; "),
         ("teapot", {"gate": 1}, "gate 1: neither true nor false; "),

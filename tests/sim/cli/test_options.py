@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from blysk.golden.presets import METHODS, PUBLISHED
+from blysk.golden.presets import LOBES, METHODS, PUBLISHED
 from blysk.sim.cli.main import main
 
 from .commandline import CORNERS, TINY, files
@@ -23,6 +23,7 @@ def test_bad_mesh(refused):
 
 
 KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
+KNOWN_LOBES = f"use one of {', '.join(LOBES)}, "
 
 
 @pytest.mark.parametrize(
@@ -40,7 +41,7 @@ KNOWN_METHODS = f"unknown method; use one of {', '.join(METHODS | PUBLISHED)}"
         (["--size", "abc"], "--size abc", "not a size"),
         (["--size", "-1x5"], "--size -1x5", "not a size"),
         (["--method", "slurp"], "--method slurp", KNOWN_METHODS),
-        (["--model", "shiny"], "--model shiny", "use one of blinn, phong_coplanar, "),
+        (["--model", "shiny"], "--model shiny", KNOWN_LOBES),
         (["--engine", "steam"], "--engine steam", "use one of auto, cxxrtl, pysim"),
         (["--projection", "flat"], "--projection flat", "orthographic"),
         (["--back-faces", "hide"], "--back-faces hide", "flip, show, cull"),
