@@ -87,11 +87,11 @@ def test_frames_equal_model(simulator):
 @pytest.mark.long
 def test_stalls_change_no_pixel_and_no_band_after_them(simulator):
     """Stalls on both sides, then none: the last half of the bands left takes the cycles as from reset."""
-    bands, rng = [*range(simulator.drawing.bands)] * 3, np.random.default_rng(5)
+    bands, rng = [*range(simulator.drawing.bands)] * 6, np.random.default_rng(5)
     free = simulator.run(bands)
-    end = int(free.cycles.sum())
+    end = int(free.cycles.sum()) // 2
     stalls = {
-        name: np.r_[rng.random(end) < share, np.zeros(2 * end, dtype=bool)]
+        name: np.r_[rng.random(end) < share, np.zeros(4 * end, dtype=bool)]
         for name, share in (("input_stalls", 0.7), ("output_stalls", 0.6))
     }
     found = simulator.run(bands, **stalls)
