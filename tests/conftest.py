@@ -20,8 +20,14 @@ subprocess.Popen = Process
 BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/tools/test_pages.py")
 """Files whose tests of a unit are a group."""
 
-LONGEST = ("tests/bench/tools/test_absorb_registers.py", "tests/sim/engines/test_cache.py")
-"""Files whose groups take the longest: workers begin with them."""
+LONGEST = (
+    "tests/sim/cli/test_bad_input.py",
+    "tests/test_supply.py",
+    *(f"tests/test_units.py[{unit}" for unit in ("geometry", "pipeline", "pixel_pipelines", "render")),
+    *(f"tests/sim/engines/test_{name}.py" for name in ("cache", "compilers")),
+    *("tests/sim/frames/test_animation.py", "tests/sim/frames/test_frame.py", "tests/sim/api/test_api.py"),
+)
+"""Beginnings of the groups that take the longest: workers begin with them."""
 
 
 def group_of(nodeid):
