@@ -79,7 +79,7 @@ class Pieces:
         def too_far(off, inner):
             least = np.maximum(curves["highlight"].least - inner, 0)
             wrong = off["diffuse"] > ChordInterpolator().diffuse_tolerance
-            wrong |= off["highlight"] > limits.tolerance(material, least)
+            wrong = wrong | (off["highlight"] > limits.tolerance(material, least))
             return wrong & (curves["diffuse"].largest + off["diffuse"] >= 0)
 
         by_words = too_far(words, words["highlight"]) & (turn > limits.turn(material)[:, np.newaxis])
