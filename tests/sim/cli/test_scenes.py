@@ -177,7 +177,7 @@ def test_bad_options_of_a_scene(refused):
     Path("a.toml").write_text("mesh.file = 'a.obj'")
     Path("a.obj").touch()
     refused("render", "a.toml", "--triangles", "100", thing="--triangles 100", says="leave it out")
-    refused("render", "a.toml", "--json", "a.toml", thing="a.toml", says="another output")
+    refused("render", "a.toml", "--json", "a.toml", thing="a.toml", says="is a file that this run reads")
     Path("a.toml").write_text("size = ]")
     refused("render", "a.toml", thing="a.toml", says="is no TOML")
 
