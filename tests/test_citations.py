@@ -25,6 +25,7 @@ ANCHORS = {
     "interpolation.md": "spans dot-product middle-normal bisection adaptive-normaliser quadratic-normals "
     "forward-differences angular-method arccos half-chord recurrence renormaliser true-spans",
     "chord.md": "the-chord differences error-bound where-spans-are-cut local-lights",
+    "quotient.md": "frame identities span pixel bound counted",
     "bus.md": "streams registers",
     "video.md": "vertices bands display tmds",
     "units.md": "specular-unit exact-power highlight-gate intensity pipeline frame-constants lobe",

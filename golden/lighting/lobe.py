@@ -64,12 +64,8 @@ class Lobe(HighlightOperand):
     E  M  words ``blinn``, n =           ``beckmann``, alpha =    ``ggx``, alpha =
                 1, 2, 10, 100, 1000      0.03, 0.1, 0.3, 0.6, 1   0.0025, 0.01, 0.03, 0.05, 0.1, 0.3, 0.6
     == == ===== ======================== ======================== =======================================
-    8  16 144   0.00 0.05 0.03 0.03 0.84 3.60 0.04 0.04 0.06 0.55 172 100 12 2.55 0.20 0.02 0.02
-    12 16 208   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 100 5.28 0.10 0.02 0.02 0.02 0.02
-    12 32 416   0.00 0.01 0.01 0.01 0.01 0.01 0.01 0.01 0.02 0.14 69 1.68 0.03 0.01 0.01 0.01 0.01
     14 32 480   0.00 0.01 0.01 0.01 0.01 0.01 0.01 0.01 0.02 0.14 15 0.13 0.01 0.01 0.01 0.01 0.01
     15 16 256   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 15 0.13 0.02 0.02 0.02 0.02 0.02
-    15 32 512   0.00 0.01 0.01 0.01 0.01 0.01 0.01 0.01 0.02 0.14 5.27 0.03 0.01 0.01 0.01 0.01 0.01
     20 16 336   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 0.03 0.02 0.02 0.02 0.02 0.02 0.02
     == == ===== ======================== ======================== =======================================
 
@@ -116,8 +112,7 @@ class Lobe(HighlightOperand):
     cutoff : float
         Entries of a table under this value are 0; at least 0, under 1.
     scale : int
-        s: the operand is ``min(2^s u, 1)``, from chord methods with the same scale, for lobes that are 0 from
-        ``u = 2^-s`` on. The hardware does not depend on it.
+        s: the operand is ``min(2^s u, 1)``, of chord methods, for lobes that are 0 from ``u = 2^-s`` on.
     fixed : tuple of float or None
         Parameters of the tables that are fixed at build time, one for each bank (``None`` for a model without
         a parameter). ``None``: tables are loaded by writes.
@@ -127,8 +122,7 @@ class Lobe(HighlightOperand):
     ValueError
         If a parameter is out of range, there are not as many fixed tables as banks, or the model is of R·V.
 
-    Source: docs/theory/units.md#lobe. The graphics processor PICA200 has tables of 256 entries with
-    differences, addressed by a cosine in equal steps.
+    Source: docs/theory/units.md#lobe; [PICA200] has tables of a cosine in equal steps, with differences.
     """
 
     model: ReflectionModel = BLINN
@@ -141,6 +135,7 @@ class Lobe(HighlightOperand):
     scale: int = 0
     fixed: tuple[float | None, ...] | None = None
 
+    SERVES_MIRROR: ClassVar[bool] = False
     VALUE_FORMAT: ClassVar[Format] = UQ(0, 17)
     DIFFERENCE_FORMAT: ClassVar[Format] = SQ(1, 17)
     WORD_BITS: ClassVar[int] = VALUE_FORMAT.width + DIFFERENCE_FORMAT.width
@@ -152,7 +147,7 @@ class Lobe(HighlightOperand):
 
     def __post_init__(self):
         super().__post_init__()
-        if self.model.MIRROR:
+        if self.model.MIRROR and not self.SERVES_MIRROR:
             raise ValueError(
                 f"a table holds a lobe of N·H, and {self.model.name} is one of R·V; take phong_coplanar"
             )
@@ -231,6 +226,17 @@ class Lobe(HighlightOperand):
         start = np.where(row > 0, self.steps, 0)
         return np.ldexp((start + step) / self.steps, np.maximum(row, 1) - 1 - self.octaves)
 
+    @property
+    def cosines(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cosines at entries and the end, short of the right angle, where the curve is 0; and in middles."""
+        knots = np.ldexp(np.minimum(self.knots, 1 - 2.0**-40), -self.scale)
+        return 1 - knots, 1 - (knots[1:] + knots[:-1]) / 2
+
+    @staticmethod
+    def _beside(high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Errors of the lines on the left and the right of each entry."""
+        return np.r_[high[0], high], np.r_[high, high[-1]]
+
     def table(self, parameter: float | None = None) -> "LobeTable":
         """Table of the model for one parameter.
 
@@ -251,15 +257,9 @@ class Lobe(HighlightOperand):
         if parameter is None and self.model.PARAMETER is not None:
             raise ValueError(f"a table of {self.name} needs its {self.model.PARAMETER}")
         reflect: Callable[[np.ndarray], np.ndarray] = partial(self.model.reflect, parameter=parameter)
-
-        def curve(cosine):
-            return reflect(1 - np.ldexp(1 - cosine, -self.scale)) if self.scale else reflect(cosine)
-
-        # The entry at the end is the limit of the curve: at the right angle itself the curve is 0.
-        knots = np.minimum(self.knots, 1 - 2.0**-40)
-        value = curve(1 - knots)
-        high = (value[1:] + value[:-1]) / 2 - curve(1 - (knots[1:] + knots[:-1]) / 2)
-        left, right = np.r_[high[0], high], np.r_[high, high[-1]]
+        value, middle = map(reflect, self.cosines)
+        high = (value[1:] + value[:-1]) / 2 - middle
+        left, right = self._beside(high)
         larger, smaller = np.maximum(np.abs(left), np.abs(right)), np.minimum(np.abs(left), np.abs(right))
         move = np.where(left * right > 0, np.sign(left) * np.minimum(larger / 2, 2 * smaller), 0)
         format = self.VALUE_FORMAT
@@ -387,7 +387,7 @@ class Lobe(HighlightOperand):
         """
         self.check(table)
         u = self.argument(operand)
-        front = operand.codes > 0 if self.operand == "cosine" else u.codes < 1 << self.fraction_bits
+        front = operand.codes > 0 if self.operand == "cosine" else u.codes < 1 << u.format.width - 1
         lit = front & ~np.asarray(dark, dtype=bool)
         entry, fraction = self.address(Fixed(u.format, np.where(lit, u.codes, 0)))
         way = (table.differences[entry] * fraction).truncate(17)
@@ -405,7 +405,7 @@ class Lobe(HighlightOperand):
         if not isinstance(table, LobeTable):
             raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
         given, own = ((lobe.octaves, lobe.steps) for lobe in (table.lobe, self))
-        if given != own:
+        if given != own or table.lobe.entries != self.entries:
             raise ValueError("the table has {} octaves of {} steps, the unit {} of {}".format(*given, *own))
         if table.lobe.scale != self.scale:
             raise ValueError(f"the table is of 2^{table.lobe.scale} u, the unit of 2^{self.scale} u")

@@ -34,13 +34,15 @@ class HighlightOperand:
 
     operand: str
 
+    OPERANDS: ClassVar[tuple[str, ...]] = ("cosine", "one_minus_cosine")
     ARGUMENT_FORMAT = UQ(1, 25)
     RESULT_FORMAT = UQ(0, 17)
     EXPONENT_BITS = 10
 
     def __post_init__(self):
-        if self.operand not in ("cosine", "one_minus_cosine"):
-            raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
+        if self.operand not in self.OPERANDS:
+            known = " or ".join(map(repr, self.OPERANDS))
+            raise ValueError(f"operand must be {known}, not {self.operand!r}")
 
     @property
     def operand_format(self) -> Format:

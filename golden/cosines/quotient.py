@@ -1,0 +1,199 @@
+"""Quotients: N·L, and the place of the squared sine in a lobe's table, by one reciprocal root a pixel."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from blysk.golden.cosines.quotient_spans import PixelWords, QuotientSpans
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+
+__all__ = ["OCTAVES", "STEPS", "Quotient", "place_format"]
+
+OCTAVES, STEPS = 15, 16
+"""Octaves of a part of a lobe's table, beside a row for all smaller numbers; and steps of a row."""
+
+FRACTION_BITS = 12
+"""Bits of a place within a step."""
+
+
+def place_format(parts: int) -> Format:
+    """Format of a place in a table of one or two parts; a place past the end stands for no highlight."""
+    return UQ((parts * (OCTAVES + 1) * STEPS).bit_length(), FRACTION_BITS)
+
+
+@dataclass(frozen=True)
+class Quotient:
+    """``N·L = l/sqrt(q)`` and ``s = m/q`` of every pixel; s as its place in a table by octaves.
+
+    ``q = m + w`` is shifted by an even number of bits, 2k, into [1, 4). Then ``r = 1/sqrt(q)`` comes from a
+    table of 384 entries with one product. N·L is ``l 2^k r``. m is shifted into a word of 17 bits, by
+    multiples of four. ``s = m r^2`` then has a leading one within the upper seven bits, and its octave and
+    the 16 bits behind the leading one are its place in the table (`QuotientLobe`).
+
+    *Two parts.* Where ``m > w``, the place is that of ``1 - s = w/q`` in a second part of the table. So both
+    ends of the range have octaves. With ``mirror`` there is one part, as a highlight of R·V ends at
+    ``s = 1/2``: from there on the place is past the end, as it is where ``z < 0`` without ``mirror``.
+
+    *Row.* Octave ``[2^-(j+1), 2^-j)`` with j = 0 to 14 is row 15 - j; all less is row 0, with equal steps.
+
+    ============ =========== =====================================================================
+    word         format      why
+    ============ =========== =====================================================================
+    m, w         SQ(2, 40)   cut; 6 of the accumulators' bits under those of ``v·v``
+    q            UQ(2, 34)   sum of m and w, each cut to 34
+    q shifted    UQ(2, 19)   cut; 9 bits address the table, 12 interpolate
+    r            UQ(0, 17)   1/2 to 1; rounded; saturates
+    r^2          UQ(0, 17)   1/4 to 1; cut
+    line         SQ(2, 16)   l 2^k, cut
+    N·L          SQ(2, 33)   exact product
+    numerator    17 bits     14 to 17 of them count; cut
+    place        UQ(i, 12)   cut
+    ============ =========== =====================================================================
+
+    A pixel with ``q < 2^-14`` of the largest scale is flagged; its results are invalid. After the two cuts of
+    `spans_for` no pixel is: q is at least 0.05.
+
+    *Error of r*, in 2^-20: 3.0 by the chord, halved by its move; 1 by the rounding of base and slope; 1 by
+    the cut of the product; 1 by the cut of q; 4 by the rounding of r. Relative to r, which is 1/2 at least:
+    `ROOT_ERROR`. *Error of s*, relative: twice that, 2^-15 by the cut of r^2, 2^-13 by that of the numerator,
+    2^-16 by that of the place: `SINE_ERROR`. *Error of N·L*: `ROOT_ERROR`, and 2^-16 by the cut of the line.
+
+    Parameters
+    ----------
+    spans : QuotientSpans
+        Which words there are.
+
+    Source: docs/theory/quotient.md#pixel.
+    """
+
+    spans: QuotientSpans = field(default_factory=QuotientSpans)
+
+    ROOT_FORMAT = UQ(0, 17)
+    SQUARE_ROOT_FORMAT = UQ(0, 17)
+    LINE_FORMAT = SQ(2, 16)
+    COSINE_FORMAT = SQ(2, 33)
+    PIXEL_FRACTION = 40
+    SHIFTS = 7
+    GROUPS = 6
+    COMPARED = 20
+    TABLE_BITS = 9
+    BASE_FORMAT = UQ(0, 19)
+    SLOPE_FORMAT = UQ(-8, 19)
+    ROOT_ERROR = 10 * 2.0**-19
+    SINE_ERROR = 2 * ROOT_ERROR + 2.0**-15 + 2.0**-13 + 2.0**-16
+    COSINE_ERROR = ROOT_ERROR + 2.0**-16
+
+    @property
+    def parts(self) -> int:
+        """Parts of a lobe's table: 2, or 1 with ``mirror``."""
+        return 1 if self.spans.mirror else 2
+
+    @property
+    def place_format(self) -> Format:
+        """Format of a place."""
+        return place_format(self.parts)
+
+    @cached_property
+    def table(self) -> tuple[Fixed, Fixed]:
+        """Entries ``base`` and ``slope`` of the reciprocal root, shape (512,) each, by q's upper 9 bits.
+
+        ``r = base - slope f`` with f from 0 to 1 in a step; the first 128 entries are not used. A base is
+        moved by half of the chord's error in the middle, and has the half step of r's rounding.
+        """
+        step = 2.0 ** -(self.TABLE_BITS - 2)
+        q = np.maximum(np.arange(1 << self.TABLE_BITS) * step, 1.0)
+        left, middle, right = ((q + step * t) ** -0.5 for t in (0, 0.5, 1))
+        format = self.BASE_FORMAT
+        # The product of the slope is cut: r is half a step too large on average.
+        half = 2.0 ** -(self.ROOT_FORMAT.fraction_bits + 1) - format.step / 2
+        base = np.minimum(left + (middle - (left + right) / 2) / 2 + half, 1 - format.step)
+        return Fixed.round(format, base), Fixed.round(self.SLOPE_FORMAT, left - right)
+
+    def root(self, square: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Bit-accurate reciprocal root.
+
+        Parameters
+        ----------
+        square : int64 array
+            Codes of q, 36 bits.
+
+        Returns
+        -------
+        root, shift : int64 arrays
+            Codes of r, and k: q is shifted by 2 k bits.
+        too_small : bool array
+            Whether q is too small.
+        """
+        shift = np.full(square.shape, self.SHIFTS)
+        for k in reversed(range(self.SHIFTS)):
+            shift[square >> (34 - 2 * k) > 0] = k
+        normal = (square << (2 * shift)) >> 15
+        fraction_bits = 21 - self.TABLE_BITS
+        entry, fraction = normal >> fraction_bits, normal & ((1 << fraction_bits) - 1)
+        base, slope = (word.codes for word in self.table)
+        root = (base[entry] - ((slope[entry] * fraction) >> fraction_bits)) >> 2
+        return np.minimum(root, self.ROOT_FORMAT.max_code), shift, square >> 20 == 0
+
+    def compute(self, pixels: PixelWords) -> tuple[Fixed, Fixed, np.ndarray]:
+        """Bit-accurate N·L and places of s of every pixel.
+
+        Parameters
+        ----------
+        pixels : PixelWords
+            Words of the pixels.
+
+        Returns
+        -------
+        cosine : Fixed, shape (pixels, lights), SQ(2, 33)
+            N·L.
+        place : Fixed, shape (pixels, lights), `place_format`
+            Place of s, or of 1 - s, in a lobe's table; without highlights all past the end.
+        too_small : bool array, shape (pixels,)
+            Whether q is too small.
+        """
+        cut = self.PIXEL_FRACTION
+        numerator, rest = pixels.numerator.truncate(cut).codes, pixels.rest.truncate(cut).codes
+        whole = cut - 34
+        square = (rest >> whole) + (numerator[:, 0] >> whole if self.spans.highlights else 0)
+        square &= (1 << 36) - 1
+        root, shift, too_small = self.root(square)
+        root, shift = root[:, np.newaxis], shift[:, np.newaxis]
+        line = (pixels.line.codes << shift) >> (self.spans.LINE_FORMAT.width - self.LINE_FORMAT.width)
+        cosine = Fixed(self.LINE_FORMAT, self.LINE_FORMAT.wrap(line)) * Fixed(self.ROOT_FORMAT, root)
+        past = (self.parts * (OCTAVES + 1) * STEPS) << FRACTION_BITS
+        if not self.spans.highlights:
+            return cosine, Fixed(self.place_format, np.full(line.shape, past)), too_small
+        # At most z^2 of each light, but for the drift.
+        exact = SQ(2, cut).wrap((rest + numerator[:, 0])[:, np.newaxis] - numerator)
+        second = self._second(numerator, exact)
+        chosen = np.maximum(np.where(second, exact, numerator), 0)
+        place = self._place(chosen, (root * root) >> 17, shift)
+        dark = pixels.away | (place >= (OCTAVES << 16 if self.spans.mirror else 16 << 16))
+        place = np.where(dark, past, place + (second << 20))
+        return cosine, Fixed(self.place_format, place), too_small
+
+    def _second(self, numerator: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """Whether a place is in the second part: ``m > w``, compared in their upper bits."""
+        if self.spans.mirror:
+            return np.zeros(numerator.shape, dtype=bool)
+        dropped = self.PIXEL_FRACTION + 2 - self.COMPARED
+        return numerator >> dropped > rest >> dropped
+
+    def _place(self, chosen: np.ndarray, square_root: np.ndarray, shift: np.ndarray) -> np.ndarray:
+        """Place of ``chosen / q`` in a part of the table, 20 bits; 2^20 and more from 1 on."""
+        group = np.full(chosen.shape, self.GROUPS)
+        for k in reversed(range(self.GROUPS)):
+            group[chosen >> (38 - 4 * k) > 0] = k
+        product = ((chosen << (4 * group)) >> 25) * square_root
+        # The product has 34 bits; s is product 2^-34 2^(2 + 2 shift - 4 group).
+        zeros = np.full(chosen.shape, 7)
+        for k in reversed(range(7)):
+            zeros[product >> (33 - k) > 0] = k
+        octave = 4 * group - 2 * shift - 2 + zeros
+        mantissa = (product << zeros) >> 17
+        row = OCTAVES - octave
+        # Under the octaves the leading one counts, too.
+        low = np.minimum(np.maximum(octave - OCTAVES + 1, 0), 17)
+        place = np.where(octave < OCTAVES, (row << 16) + (mantissa & 0xFFFF), mantissa >> low)
+        return np.where(octave < 0, 1 << 20, place)

@@ -1,0 +1,312 @@
+"""Spans of the quotient method: squared lengths and lines of every pixel, by forward differences."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
+from blysk.golden.number.spans import checked_lengths, pixels_of
+
+__all__ = ["PixelWords", "QuotientSpans", "QuotientWords", "SpanVectors"]
+
+
+class SpanVectors(NamedTuple):
+    """Vectors ``v = N/W`` of spans: at the first pixel, and the step to the next.
+
+    Pixel i of a span has the vector ``start + i 2^-exponent step``, up to a scale that is forgotten. The
+    components are those of `QuotientSpans.components`.
+
+    Parameters
+    ----------
+    start, step : int64 arrays, shape (spans, components)
+        Codes of ``SQ(1, 17)``, from ``-(2^17 - 1)`` to ``2^17 - 1``.
+    exponent : int64 array, shape (spans,)
+        0 to 15.
+    """
+
+    start: np.ndarray
+    step: np.ndarray
+    exponent: np.ndarray
+
+    def __getitem__(self, which):  # type: ignore[override]
+        """Some of the spans, by a slice, indices or a mask; or a field, by its number."""
+        if isinstance(which, int):
+            return tuple.__getitem__(self, which)
+        return SpanVectors(*(field[which] for field in tuple(self)))
+
+    @classmethod
+    def quantise(cls, left: np.ndarray, right: np.ndarray, length: np.ndarray) -> "SpanVectors":
+        """Nearest codes of vectors at both ends, scaled by a power of two to fill the words.
+
+        The largest component of both ends is at least 1/2. The exponent is the largest with which the step
+        fits, but at most ``ceil(log2(m - 1)) + 3``.
+
+        Parameters
+        ----------
+        left, right : float64 arrays, shape (spans, components)
+            Vectors at the first and the last pixel; not both 0.
+        length : int array, shape (spans,)
+            Pixels m, 1 to 4095. Of a span of one pixel the right end has no effect. The step of a span of
+            two may not fit: give two spans of one.
+
+        Raises
+        ------
+        ValueError
+            If both vectors of a span are 0 or not finite, a length is out of range, or a step does not fit.
+        """
+        format = QuotientSpans.COMPONENT_FORMAT
+        length = checked_lengths(length)
+        steps = np.maximum(length - 1, 1)
+        right = np.where((length == 1)[:, np.newaxis], left, right)
+        bits = format.fraction_bits
+        largest = np.maximum(np.abs(left), np.abs(right)).max(axis=1)
+        if not (np.isfinite(largest) & (largest > 0)).all():
+            raise ValueError("a span needs a vector at one of its ends that is finite and not 0")
+        # After rounding a component is at most 2^17 - 1.
+        scale = np.exp2(-np.ceil(np.log2(largest * (1 + 2.0**-bits))))[:, np.newaxis]
+        step = (right - left) * scale / steps[:, np.newaxis]
+        largest = np.maximum(np.abs(step).max(axis=1), 2.0**-60)
+        fits = np.floor(-np.log2(largest * (1 + 2.0**-bits))).astype(np.int64)
+        if (fits < 0).any():
+            raise ValueError("the step of a span of two pixels does not fit: give two spans of one")
+        exponent = np.minimum(fits, np.ceil(np.log2(steps)).astype(np.int64) + 3)
+        return cls(
+            Fixed.round(format, left * scale).codes,
+            Fixed.round(format, np.ldexp(step, exponent[:, np.newaxis])).codes,
+            exponent,
+        )
+
+
+class PixelWords(NamedTuple):
+    """Words of every pixel.
+
+    Parameters
+    ----------
+    numerator : Fixed, shape (pixels, lights)
+        m of each light; no light without highlights.
+    rest : Fixed, shape (pixels,)
+        w, so that ``q = m + w`` with m of the first light.
+    line : Fixed, shape (pixels, lights)
+        l of each light.
+    away : bool array, shape (pixels, lights)
+        Whether ``z < 0``; ``False`` where z is not taken.
+    """
+
+    numerator: Fixed
+    rest: Fixed
+    line: Fixed
+    away: np.ndarray
+
+
+class QuotientWords(NamedTuple):
+    """Start, first and second difference of every accumulator, each an int64 array, shape (spans, ...).
+
+    Parameters
+    ----------
+    squares : tuple of three arrays, shape (spans, lights + 1)
+        ``m`` of each light, and ``w`` last. With lights without highlight ``w`` alone.
+    lines : tuple of two arrays, shape (spans, lights)
+        l of each light; no second difference.
+    heights : tuple of two arrays, shape (spans, lights)
+        z of each light; no second difference. Empty without ``QuotientSpans.takes_heights``.
+    """
+
+    squares: tuple[np.ndarray, np.ndarray, np.ndarray]
+    lines: tuple[np.ndarray, np.ndarray]
+    heights: tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class QuotientSpans:
+    """Words of every pixel from `SpanVectors`: squared lengths and lines, by forward differences.
+
+    In the frame of a light (`light_frame`) the components of v are x, y, z. With ``highlights``:
+
+    - ``m = x^2 + y^2``, the numerator of ``sin^2 gamma``; with ``mirror`` ``x^2 + (y cos a)^2``;
+    - ``w = q - m`` of the first light: ``z^2``; with ``mirror`` ``z^2 + (y sin a)^2``;
+    - ``l = x sin a + z cos a``, the numerator of N·L;
+    - z, whose sign tells whether there is a highlight; not with ``mirror``.
+
+    Without highlights ``w = x^2 + y^2 + z^2`` in the frame with z along the first light, and l is z itself:
+    a further light brings its l alone.
+
+    A square has the start ``v·v``, the first difference ``2 v·d 2^-e + b`` and the second
+    ``2 d·d 2^-2e``; b is half of the second difference, cut. Lines have the start ``v·L`` and the
+    difference ``d·L 2^-e``. d is the step, e its exponent; all products are of 18 bits. Pixel i has
+    ``f + i D1 + i (i - 1)/2 D2``, exact in the words.
+
+    ========= ============ =================================================================
+    word      format       why
+    ========= ============ =================================================================
+    v, d      SQ(1, 17)    multiplier operands; -1 does not occur
+    sin, cos  SQ(1, 17)    L scaled to `ONE`, so that no ``N·L`` reaches 1
+    m, w      SQ(2, 47)    ``v·v`` is exact with 34 fraction bits; differences are cut to F = 13 more;
+                           SQ(3, 47) without highlights
+    l         SQ(2, 36)    ``v·L`` is exact with 34 fraction bits; 2 more for the difference, cut
+    z         SQ(1, 29)    12 more, cut; only its sign is used
+    ========= ============ =================================================================
+
+    At pixel i the words are off by at most ``(i + i^2/2) 2^-47`` (m, w), ``i 2^-36`` (l), ``i 2^-29`` (z).
+    As ``|v| < 2``, and m and w are convex along a span, no word wraps, if both ends of the span are in the
+    range of the components. A source of spans has to ensure that; `SpanVectors.quantise` does.
+
+    Parameters
+    ----------
+    lights : int
+        Number of lights, at least 1.
+    highlights : bool
+        Whether there is specular light.
+    mirror : bool
+        Whether the highlight is one of R·V; only with ``highlights``.
+
+    Raises
+    ------
+    ValueError
+        If there is no light, or ``mirror`` is given without highlights.
+
+    Source: docs/theory/quotient.md#span.
+    """
+
+    lights: int = 1
+    highlights: bool = True
+    mirror: bool = False
+
+    COMPONENT_FORMAT = SQ(1, 17)
+    EXPONENT_FORMAT = UQ(4, 0)
+    LINE_FORMAT = SQ(2, 36)
+    HEIGHT_FORMAT = SQ(1, 29)
+    ONE = 2**17 - 2
+    """Code of length 1 of L: the code's length is under 1 after rounding, and the line never outgrows v."""
+
+    def __post_init__(self):
+        if self.lights < 1:
+            raise ValueError(f"lights must be at least 1, not {self.lights}")
+        if self.mirror and not self.highlights:
+            raise ValueError("without highlights there is no mirror direction")
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components of a vector, in order.
+
+        ``x0, y0, z0, x1, y1, z1, ...`` by light; with ``mirror`` y is ``y cos a``, and ``y sin a`` of the
+        first light comes last, as ``s0``. Without highlights ``x0, y0, z0, z1, z2, ...``: z along each light.
+        """
+        if not self.highlights:
+            return ("x0", "y0", *(f"z{light}" for light in range(self.lights)))
+        names = tuple(f"{axis}{light}" for light in range(self.lights) for axis in "xyz")
+        return (*names, "s0") if self.mirror else names
+
+    @property
+    def takes_heights(self) -> bool:
+        """Whether the sign of z counts: with highlights of N·H."""
+        return self.highlights and not self.mirror
+
+    @property
+    def squares(self) -> tuple[tuple[str, ...], ...]:
+        """Components whose squares make m of each light, and w last."""
+        if not self.highlights:
+            return (("x0", "y0", "z0"),)
+        lights = tuple((f"x{light}", f"y{light}") for light in range(self.lights))
+        return (*lights, ("z0", "s0") if self.mirror else ("z0",))
+
+    @property
+    def square_format(self) -> Format:
+        """Format of m and w."""
+        return SQ(2 if self.highlights else 3, 47)
+
+    def codes_of(self, sine: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+        """Codes of L in the frames of lights: int64 array, shape (lights, 2), for sin a and cos a."""
+        return np.rint(np.stack([sine, cosine], axis=-1) * self.ONE).astype(np.int64)
+
+    def differences(self, vectors: SpanVectors, direction: np.ndarray | None = None) -> QuotientWords:
+        """Bit-accurate starts and differences.
+
+        Parameters
+        ----------
+        vectors : SpanVectors
+            The spans.
+        direction : int64 array, shape (lights, 2)
+            Codes of sin a and cos a, see `codes_of`; not used without highlights.
+
+        Raises
+        ------
+        ValueError
+            If a code is out of range, or the number of components is wrong.
+        """
+        start, step, exponent = self._checked(vectors)
+        place = {name: index for index, name in enumerate(self.components)}
+        shift = exponent[:, np.newaxis]
+
+        def products(a, b):
+            pairs = a * b
+            return np.stack([pairs[:, [place[c] for c in names]].sum(axis=1) for names in self.squares], -1)
+
+        fraction = self.square_format.fraction_bits - 34
+        second = (products(step, step) << (fraction + 1)) >> (2 * shift)
+        first = ((products(start, step) << (fraction + 1)) >> shift) + (second >> 1)
+        squares = products(start, start) << fraction, first, second
+
+        if self.highlights:
+            direction = Fixed(self.COMPONENT_FORMAT, direction).codes
+
+            def line(vector):
+                ends = (vector[:, [place[f"{axis}{k}"] for k in range(self.lights)]] for axis in "xz")
+                return sum(end * direction[:, k] for k, end in enumerate(ends))
+        else:
+
+            def line(vector):
+                return vector[:, [place[f"z{k}"] for k in range(self.lights)]] * self.ONE
+
+        fraction = self.LINE_FORMAT.fraction_bits - 34
+        lines = line(start) << fraction, (line(step) << fraction) >> shift
+        heights = (np.empty((len(exponent), 0), dtype=np.int64),) * 2
+        if self.takes_heights:
+            chosen = [place[f"z{k}"] for k in range(self.lights)]
+            fraction = self.HEIGHT_FORMAT.fraction_bits - 17
+            heights = start[:, chosen] << fraction, (step[:, chosen] << fraction) >> shift
+        return QuotientWords(squares, lines, heights)
+
+    def compute(
+        self, vectors: SpanVectors, length: np.ndarray, direction: np.ndarray | None = None
+    ) -> PixelWords:
+        """Bit-accurate words of every pixel, in closed form, in the order of the spans.
+
+        Parameters
+        ----------
+        vectors : SpanVectors
+            The spans.
+        length : int array, shape (spans,)
+            Pixels, 1 to 4095.
+        direction
+            As for `differences`.
+
+        Raises
+        ------
+        ValueError
+            As `differences` does.
+        """
+        words = self.differences(vectors, direction)
+        span, index = pixels_of(checked_lengths(length))
+        index = index[:, np.newaxis]
+        first, second = words.squares[1][span], words.squares[2][span]
+        # An int64 wraps modulo 2^64, the hardware modulo 2^width: the low bits agree.
+        squares = words.squares[0][span] + index * first + index * (index - 1) // 2 * second
+        squares = Fixed(self.square_format, self.square_format.wrap(squares))
+        line, height = (start[span] + index * step[span] for start, step in (words.lines, words.heights))
+        away = self.HEIGHT_FORMAT.wrap(height) < 0
+        if not self.takes_heights:
+            away = np.zeros(line.shape, dtype=bool)
+        line = Fixed(self.LINE_FORMAT, self.LINE_FORMAT.wrap(line))
+        return PixelWords(squares[:, :-1], squares[:, -1], line, away)
+
+    def _checked(self, vectors: SpanVectors) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Codes of vectors, or `ValueError`."""
+        for name in ("start", "step"):
+            codes = Fixed(self.COMPONENT_FORMAT, getattr(vectors, name)).codes
+            if codes.shape != (len(vectors.exponent), len(self.components)):
+                raise ValueError(f"{name} must have the components {', '.join(self.components)}")
+            if codes.size and codes.min() == self.COMPONENT_FORMAT.min_code:
+                raise ValueError(f"{name} must be greater than -1")
+        exponent = Fixed(self.EXPONENT_FORMAT, vectors.exponent).codes
+        return np.asarray(vectors.start, np.int64), np.asarray(vectors.step, np.int64), exponent

@@ -1,0 +1,39 @@
+"""Functions of the bits of a word: its leading zeros, a choice of its shifts."""
+
+from collections.abc import Sequence
+
+from amaranth.hdl import Mux, Value
+
+__all__ = ["leading_zeros", "select"]
+
+
+def leading_zeros(code: Value) -> Value:
+    """Number of leading zeros, by halves.
+
+    Parameters
+    ----------
+    code : Value
+        Word of one bit or more.
+    """
+    if len(code) == 1:
+        return ~code
+    half = 1 << (len(code) - 1).bit_length() - 1
+    high, low = code[len(code) - half :], code[: len(code) - half]
+    return Mux(high.any(), leading_zeros(high), half + leading_zeros(low))[: len(code).bit_length()]
+
+
+def select(words: Sequence[Value], index: Value) -> Value:
+    """Word of an index, by halves; beyond the end the last one. It maps to wide multiplexers.
+
+    Parameters
+    ----------
+    words : sequence of Value
+        Words of equal widths, one or more.
+    index : Value
+        Index, unsigned.
+    """
+    if len(words) == 1:
+        return words[0]
+    half = 1 << (len(words) - 1).bit_length() - 1
+    bit = half.bit_length() - 1
+    return Mux(index[bit], select(words[half:], index[:bit]), select(words[:half], index[:bit]))

@@ -1,0 +1,270 @@
+"""Quotient unit: N·L and the place of the squared sine, by one reciprocal root a pixel."""
+
+from amaranth.hdl import Cat, Const, Mux, Signal, Value
+from amaranth.lib import data
+
+from blysk.golden.cosines.quotient import OCTAVES, Quotient
+from blysk.golden.cosines.quotient_spans import QuotientSpans
+from blysk.golden.number.fixed import UQ
+from blysk.hdl.core.bits import leading_zeros, select
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.word import Word
+
+_FRACTION, _NUMERATOR = UQ(0, 12), UQ(0, 17)
+"""Formats of the place within a step of the table, and of the numerator."""
+
+__all__ = ["QuotientUnit", "pixel_words_shape", "quotients_shape"]
+
+
+def pixel_words_shape(spans: QuotientSpans) -> data.StructLayout:
+    """Shape of the words of a pixel: m, w, l and ``z < 0``, and a bit that alternates from span to span.
+
+    Parameters
+    ----------
+    spans : QuotientSpans
+        Which words there are.
+    """
+    square, line = (FixedShape(format) for format in (spans.square_format, spans.LINE_FORMAT))
+    members = {"rest": square, "line": data.ArrayLayout(line, spans.lights), "span": 1}
+    if spans.highlights:
+        members["numerator"] = data.ArrayLayout(square, spans.lights)
+    if spans.takes_heights:
+        members["away"] = spans.lights
+    return data.StructLayout(members)
+
+
+def quotients_shape(parameters: Quotient) -> data.StructLayout:
+    """Shape of N·L and a place for each light, of ``out_of_range``, and of the bit that passes.
+
+    Parameters
+    ----------
+    parameters : Quotient
+        Formats.
+    """
+    light = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
+    if parameters.spans.highlights:
+        light["highlight"] = FixedShape(parameters.place_format)
+    lights = data.ArrayLayout(data.StructLayout(light), parameters.spans.lights)
+    return data.StructLayout({"lights": lights, "out_of_range": 1, "span": 1})
+
+
+class QuotientUnit(PipelinedUnit):
+    """``N·L = l/sqrt(q)`` and the place of ``s = m/q`` in a lobe's table, for every light.
+
+    `Quotient`, the bit-accurate model, has formats, table and error bounds.
+
+    One product makes r from the table, one r^2; each light has one for N·L and one for s. With an initiation
+    interval of 1 these are 2 + 2 multipliers a light (without highlights 1 + 1); with a longer interval they
+    share ``ceil((2 + 2 lights) / initiation_interval)``. The latency follows from the graph: 17 cycles at an
+    interval of 1 with highlights.
+
+    Parameters
+    ----------
+    parameters : Quotient
+        Bit-accurate model.
+    initiation_interval : int
+        Cycles from an input to the next, at least 1.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(pixel_words_shape(parameters.spans)))`
+        Words of a pixel.
+    o : :py:`Out(stream.Signature(quotients_shape(parameters)))`
+        Operands of each light. ``out_of_range``: q is too small, and they are invalid.
+
+    Source: docs/theory/quotient.md#pixel.
+    """
+
+    def __init__(self, parameters: Quotient | None = None, initiation_interval: int = 1):
+        self.parameters = p = parameters or Quotient()
+        self._graph = Dataflow(initiation_interval)
+        self._results = self._describe()
+        super().__init__(
+            pixel_words_shape(p.spans),
+            quotients_shape(p),
+            latency=max(word.stage for word in self._results.values()),
+            initiation_interval=initiation_interval,
+        )
+
+    def datapath(self, m, operands):
+        """The graph, read at the stage of its last word."""
+        at = self._graph.build(m, self, operands)
+        result = Signal(self.o.payload.shape())
+        m.d.comb += [result.span.eq(at(self._results["span"], self.latency))]
+        m.d.comb += result.out_of_range.eq(at(self._results["out_of_range"], self.latency))
+        for light, found in enumerate(result.lights):
+            for name in ("cosine", "highlight")[: 1 + self.parameters.spans.highlights]:
+                m.d.comb += found[name].eq(at(self._results[f"{name}_{light}"], self.latency))
+        return result
+
+    def _product(self, name: str, a: Word, b: Word, left=lambda x: x, right=lambda x: x) -> Word:
+        """Product, with registers that the multiplier block can take in."""
+        g = self._graph
+        if g.interval > 1:
+            return g.multiply(name, a, b, left, right)
+        a, b = g.register(f"{name}_a", left, a), g.register(f"{name}_b", right, b)
+        return g.register(name, lambda x, y: x * y, a, b)
+
+    def _describe(self) -> dict[str, Word]:
+        """Words from those of a pixel to the results."""
+        p, g, spans = self.parameters, self._graph, self.parameters.spans
+        rest = g.input("rest", lambda operands: operands.rest, "w")
+        span = g.input("span", lambda operands: operands.span)
+        numerators = [
+            g.input(f"numerator_{k}", lambda operands, k=k: operands.numerator[k], "m")
+            for k in range(spans.lights * spans.highlights)
+        ]
+
+        def whole(code):
+            return Value.cast(code.truncate(34))
+
+        def squared(rest, *numerator):
+            return sum((whole(code) for code in numerator), whole(rest))[:36]
+
+        square = g.register("square", squared, rest, *numerators[:1], formula="q = m + w")
+        shift = g.register(
+            "shift", lambda q: leading_zeros(Cat(q[2 * k : 2 * k + 2].any() for k in range(11, 18))), square
+        )
+        too_small = g.register("too_small", lambda q: ~q[20:].any(), square)
+
+        def shifted(square, shift):
+            padded = Cat(Const(0, 2 * p.SHIFTS), square)
+            return select([padded[29 - 2 * k : 50 - 2 * k] for k in range(p.SHIFTS + 1)], shift)
+
+        normal = g.register("normal", shifted, square, shift, formula="2^2k·q")
+        root = self._root(normal)
+        results = {"span": span, "out_of_range": too_small}
+        for k in range(spans.lights):
+            line = g.input(f"line_{k}", lambda operands, k=k: operands.line[k], "l")
+
+            def shifted_line(line, shift):
+                padded = Cat(Const(0, p.SHIFTS), Value.cast(line))
+                first = p.SHIFTS + spans.LINE_FORMAT.width - p.LINE_FORMAT.width
+                words = [padded[first - n :][: p.LINE_FORMAT.width] for n in range(p.SHIFTS + 1)]
+                return FixedValue(p.LINE_FORMAT, select(words, shift))
+
+            normal_line = g.register(f"normal_line_{k}", shifted_line, line, shift, formula="2^k·l")
+            results[f"cosine_{k}"] = self._product(f"cosine_{k}", normal_line, root)
+        if spans.highlights:
+            square_root = self._product("square_root", root, root)
+            for k in range(spans.lights):
+                results[f"highlight_{k}"] = self._place(k, numerators, rest, shift, square_root)
+        return results
+
+    def _root(self, normal: Word) -> Word:
+        """Word of r, from that of q shifted."""
+        p, g = self.parameters, self._graph
+        bits = p.BASE_FORMAT.width + p.SLOPE_FORMAT.width
+        fraction_bits = 21 - p.TABLE_BITS
+        base, slope = (word.codes for word in p.table)
+        words = [int(b) | int(s) << p.BASE_FORMAT.width for b, s in zip(base, slope, strict=True)]
+        address = g.wire("address", lambda normal: normal[fraction_bits:], normal)
+        entry = g.look_up("roots", words, bits, address, registered=True)
+        fraction = g.wire("fraction", lambda normal: normal[:fraction_bits], normal, "f")
+
+        def as_slope(word):
+            return FixedValue(p.SLOPE_FORMAT, word[p.BASE_FORMAT.width :])
+
+        def as_fraction(fraction):
+            return FixedValue(_FRACTION, fraction)
+
+        bend = self._product("bend", entry, fraction, as_slope, as_fraction)
+
+        def rounded(word, bend):
+            base = FixedValue(p.BASE_FORMAT, word[: p.BASE_FORMAT.width])
+            root = (base - bend.truncate(p.BASE_FORMAT.fraction_bits)).truncate(p.ROOT_FORMAT.fraction_bits)
+            return root.wrap(p.ROOT_FORMAT)
+
+        return g.register("root", rounded, entry, bend, formula="r")
+
+    def _place(self, light: int, numerators: list[Word], rest: Word, shift: Word, square_root: Word) -> Word:
+        """Word of the place of a light."""
+        p, g, mirror = self.parameters, self._graph, self.parameters.spans.mirror
+        numerator, name = numerators[light], f"{light}"
+        cut, width = p.PIXEL_FRACTION, p.PIXEL_FRACTION + 2
+        if light:
+
+            def sum_of(numerator, rest):
+                return numerator.truncate(cut) + rest.truncate(cut)
+
+            def rest_of(total, numerator):
+                return total - numerator.truncate(cut)
+
+            total = g.register(f"total_{name}", sum_of, numerators[0], rest, formula="q")
+            rest = g.register(f"rest_{name}", rest_of, total, numerator, formula="q − m")
+
+        def code(word):
+            # Two integer bits: the sign and one more.
+            return Value.cast(word.truncate(cut))[:width].as_signed()
+
+        if mirror:
+            second = g.register(f"second_{name}", lambda m: Const(0, 1), numerator)
+        else:
+            first = width - p.COMPARED
+            second = g.register(
+                f"second_{name}",
+                lambda m, w: code(m)[first:].as_signed() > code(w)[first:].as_signed(),
+                numerator,
+                rest,
+                formula="m > w",
+            )
+
+        def chosen(numerator, rest, second):
+            word = code(numerator) if mirror else Mux(second, code(rest), code(numerator))
+            return Mux(word[width - 1], 0, word[: width - 1])[: width - 1]
+
+        chosen = g.register(f"chosen_{name}", chosen, numerator, rest, second, formula="min(m, w)")
+
+        def group_of(chosen):
+            word = Cat(chosen, Const(0, 1))[width - 4 * p.GROUPS :]
+            return leading_zeros(Cat(word[4 * k : 4 * k + 4].any() for k in range(p.GROUPS)))
+
+        group = g.register(f"group_{name}", group_of, chosen)
+
+        def grouped(chosen, group):
+            padded = Cat(Const(0, 4 * p.GROUPS), chosen, Const(0, 1))
+            first = 4 * p.GROUPS + width - 17
+            words = [padded[first - 4 * n :][:17] for n in range(p.GROUPS + 1)]
+            return FixedValue(_NUMERATOR, select(words, group))
+
+        operand = g.register(f"grouped_{name}", grouped, chosen, group)
+        octave = g.register(
+            f"octave_{name}",
+            lambda group, shift: (Cat(Const(0, 2), group) - Cat(Const(0, 1), shift) - 2)[:6].as_signed(),
+            group,
+            shift,
+        )
+
+        def squared(word):
+            return word.truncate(p.SQUARE_ROOT_FORMAT.fraction_bits).wrap(p.SQUARE_ROOT_FORMAT)
+
+        product = self._product(f"sine_{name}", operand, square_root, right=squared)
+        zeros = g.register(f"zeros_{name}", lambda s: leading_zeros(Value.cast(s)[27:34]), product)
+
+        def mantissa(product, zeros):
+            padded = Cat(Const(0, 7), Value.cast(product))
+            return select([padded[7 + 17 - n :][:17] for n in range(8)], zeros)
+
+        mantissa = g.register(f"mantissa_{name}", mantissa, product, zeros)
+        octaves = g.register(
+            f"octaves_{name}", lambda octave, zeros: (octave + zeros)[:6].as_signed(), octave, zeros
+        )
+        away = None
+        if p.spans.takes_heights:
+            away = g.input(f"away_{name}", lambda operands, light=light: operands.away[light], "z < 0")
+
+        def place(mantissa, octaves, second, *away):
+            # Under the octaves the leading one counts, too.
+            under = octaves >= OCTAVES
+            low = (octaves - (OCTAVES - 1))[:5]
+            row = Mux(under, 0, (OCTAVES - octaves)[:4])[:4]
+            rest = Mux(under, mantissa >> low, mantissa)[:16]
+            past = octaves[5] | (~octaves.any() if mirror else away[0])
+            format = p.place_format
+            inside = Cat(rest, row) if mirror else Cat(rest, row, second)
+            return FixedValue(format, Cat(Mux(past, 0, inside), past))
+
+        operands = (mantissa, octaves, second) + ((away,) if away is not None else ())
+        return g.register(f"place_{name}", place, *operands)

@@ -1,0 +1,372 @@
+"""Spans of the quotient method: vectors in, m, w, l and z of a pixel out on every cycle."""
+
+from collections.abc import Callable
+from typing import Any
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.lib import data, enum, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.cosines.quotient_spans import QuotientSpans
+from blysk.golden.number.spans import LENGTH_BITS
+from blysk.hdl.core.bits import select
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.memory import connect_wide_fifo
+from blysk.hdl.core.stream import SLICE_LATENCY
+from blysk.hdl.cosines.quotient import pixel_words_shape
+
+__all__ = ["QuotientSpansUnit", "line_directions_shape", "vectors_shape"]
+
+
+class _Kind(enum.Enum, shape=unsigned(2)):
+    """What the multipliers make, in turns: starts, first differences, second differences."""
+
+    START = 0
+    FIRST = 1
+    SECOND = 2
+
+
+def vectors_shape(parameters: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
+    """Shape of a span: components at the first pixel, their step, its exponent, and the length.
+
+    Parameters
+    ----------
+    parameters : QuotientSpans
+        Which components there are.
+    length_bits : int
+        Bits of the length.
+    """
+    vector = data.ArrayLayout(FixedShape(parameters.COMPONENT_FORMAT), len(parameters.components))
+    exponent = unsigned(parameters.EXPONENT_FORMAT.width)
+    return data.StructLayout(
+        {"start": vector, "step": vector, "exponent": exponent, "length": unsigned(length_bits)}
+    )
+
+
+def line_directions_shape(parameters: QuotientSpans) -> data.ArrayLayout:
+    """Shape of ``sin a`` and ``cos a`` of each light."""
+    return data.ArrayLayout(data.ArrayLayout(FixedShape(parameters.COMPONENT_FORMAT), 2), parameters.lights)
+
+
+class QuotientSpansUnit(wiring.Component):
+    """Words of every pixel of spans, first pixel first; `QuotientSpans` is the bit-accurate model.
+
+    *Setup.* The multipliers make ``v·v``, ``v·d`` and ``d·d`` of a span in turns, three cycles in all; a span
+    of one pixel needs ``v·v`` alone, one cycle. Every component that is squared has a multiplier, and every l
+    two: 5 for a light with highlights of N·H, 6 of R·V, 4 more a further light. Without highlights there are
+    3. Differences wait in registers behind the shifts, starts in a memory of `DEPTH` words. So the
+    differences of a span pass the starts of those before it.
+
+    *Accumulators.* Second differences are taken while the last three pixels of a span leave, first ones with
+    the last two, the start with the last. So a span follows the other without a gap: a run
+    of n spans with p pixels takes p cycles, if no more than a third of them have two pixels. A second
+    difference comes as its half into the first addition, and whole into the others: ``D1 = 2 v·d + d·d``
+    takes no adder.
+
+    The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span, or
+    `short_latency` if it is the only one. Payloads are registers.
+
+    Parameters
+    ----------
+    parameters : QuotientSpans
+        Bit-accurate model.
+    length_bits : int
+        Bits of the length.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(vectors_shape(parameters, length_bits)))`
+        Spans of length 1 or more. A span of two pixels or more waits for two cycles before it is accepted.
+    o : :py:`Out(stream.Signature(pixel_words_shape(parameters)))`
+        Words of pixels, and a bit that alternates from span to span, 1 in the first.
+    constants : :py:`In(line_directions_shape(parameters))`
+        ``sin a`` and ``cos a`` of each light, constant while spans are inside; only with highlights.
+
+    Source: docs/theory/quotient.md#span.
+    """
+
+    DEPTH = 16
+    """Starts that wait at most."""
+
+    _SUMS, _SHIFTED = 3, 5
+    """Stages of the sums, and of the shifted differences."""
+
+    latency = _SHIFTED + 2
+    short_latency = _SUMS + SLICE_LATENCY + 1
+    initiation_interval = 3
+
+    def __init__(self, parameters: QuotientSpans | None = None, length_bits: int = LENGTH_BITS):
+        self.parameters = p = parameters or QuotientSpans()
+        self.length_bits = length_bits
+        members = {
+            "i": In(stream.Signature(vectors_shape(p, length_bits))),
+            "o": Out(stream.Signature(pixel_words_shape(p))),
+        }
+        if p.highlights:
+            members["constants"] = In(line_directions_shape(p))
+        super().__init__(members)
+
+    @property
+    def multipliers(self) -> int:
+        """Number of multipliers."""
+        squares = sum(len(names) for names in self.parameters.squares)
+        return squares + 2 * self.parameters.lights * self.parameters.highlights
+
+    @property
+    def spans_inside(self) -> int:
+        """Largest number of spans inside."""
+        return self.DEPTH + self._SUMS + 2
+
+    def elaborate(self, platform):
+        """Turns of the setup; the accumulators, and which words they take."""
+        m = Module()
+        p, pixel = self.parameters, self.o.payload
+        moves = Signal()
+        # Registers of differences that wait, and the FIFO of starts.
+        waiting = data.StructLayout(
+            {
+                "squares": data.ArrayLayout(unsigned(p.square_format.width), len(p.squares)),
+                "lines": data.ArrayLayout(signed(p.LINE_FORMAT.width), p.lights),
+            }
+        )
+        second, first = (Signal(waiting, name=name, reset_less=True) for name in ("second", "first"))
+        second_waits, first_waits = Signal(), Signal()
+        start = stream.Signature(self._start_shape()).create(path=("start",))
+        self._set_up(m, moves, (second, second_waits), (first, first_waits), start)
+
+        advance = Signal()
+        takes_second, takes_first, takes_start = takes = [
+            Signal(name=f"takes_{name}") for name in ("second", "first", "start")
+        ]
+        with m.If(advance & takes_second):
+            m.d.sync += second_waits.eq(0)
+        with m.If(advance & takes_first):
+            m.d.sync += first_waits.eq(0)
+        m.d.comb += start.ready.eq(advance & takes_start)
+        self._take(m, advance, takes, (second_waits, first_waits), start)
+        # Half of the second difference is added on the cycle after the first one was taken.
+        halves, ready = Signal(), self._ready
+        with m.If(advance):
+            m.d.sync += halves.eq(takes_first)
+        steps = advance & (takes_first | halves | ~ready)
+        for number in range(len(p.squares)):
+            names = (f"{name}_{number}" for name in ("square", "difference", "change"))
+            value, difference, change = (
+                Signal(p.square_format.width, name=n, reset_less=True) for n in names
+            )
+            low = Signal(name=f"low_{number}", reset_less=True)
+            free = p.square_format.fraction_bits - 34
+            with m.If(advance):
+                with m.If(takes_second):
+                    m.d.sync += [change.eq(second.squares[number][1:]), low.eq(second.squares[number][0])]
+                with m.Elif(halves):
+                    m.d.sync += change.eq(Cat(low, change))
+                begin = Cat(Const(0, free), start.payload.squares[number])
+                m.d.sync += value.eq(Mux(takes_start, begin, value + difference))
+            with m.If(steps):
+                m.d.sync += difference.eq(Mux(takes_first, first.squares[number], difference + change))
+            of_light = p.highlights and number < p.lights
+            result = pixel.numerator[number] if of_light else pixel.rest
+            m.d.comb += Value.cast(result).eq(value)
+        for light in range(p.lights):
+            line, step = (
+                Signal(signed(p.LINE_FORMAT.width), name=f"{name}_{light}", reset_less=True)
+                for name in ("line", "line_step")
+            )
+            begin = Cat(Const(0, p.LINE_FORMAT.fraction_bits - 34), start.payload.lines[light]).as_signed()
+            with m.If(advance):
+                m.d.sync += line.eq(Mux(takes_start, begin, line + step))
+                with m.If(takes_first):
+                    m.d.sync += step.eq(first.lines[light])
+            m.d.comb += Value.cast(pixel.line[light]).eq(line)
+            if p.takes_heights:
+                given = second.lines[light], start.payload.heights[light]
+                m.d.comb += pixel.away[light].eq(self._height(m, light, advance, takes, given))
+        span = Signal()
+        with m.If(advance & takes_start):
+            m.d.sync += span.eq(~span)
+        m.d.comb += pixel.span.eq(span)
+        return m
+
+    def _start_shape(self) -> data.StructLayout:
+        """Shape of a start: sums without the fraction bits of differences, z, and the length."""
+        p = self.parameters
+        free = p.square_format.fraction_bits - 34
+        members = {
+            "squares": data.ArrayLayout(unsigned(p.square_format.width - free), len(p.squares)),
+            "lines": data.ArrayLayout(
+                signed(p.LINE_FORMAT.width - p.LINE_FORMAT.fraction_bits + 34), p.lights
+            ),
+            "length": unsigned(self.length_bits),
+        }
+        if p.takes_heights:
+            members["heights"] = data.ArrayLayout(signed(p.COMPONENT_FORMAT.width), p.lights)
+        return data.StructLayout(members)
+
+    def _set_up(self, m: Module, moves: Signal, second, first, start: stream.Interface) -> None:
+        """Turns, products, sums and shifts, up to the registers of differences and the memory of starts."""
+        p, span = self.parameters, self.i.payload
+        place = {name: index for index, name in enumerate(p.components)}
+        # The turn is a register: it drives the multiplexers of all operands.
+        kind, ends = Signal(_Kind), Signal()
+        m.d.comb += [
+            ends.eq(Mux(kind == _Kind.START, ~span.length[1:].any(), kind == _Kind.SECOND)),
+            self.i.ready.eq(moves & ends),
+        ]
+        with m.If(self.i.valid & moves):
+            m.d.sync += Value.cast(kind).eq(Mux(ends, 0, Value.cast(kind) + 1))
+
+        def register(value, name):
+            result = Signal(Value.cast(value).shape(), name=name, reset_less=True)
+            with m.If(moves):
+                m.d.sync += result.eq(value)
+            return result
+
+        def delayed(value, name, last, first=1):
+            for stage in range(first, last + 1):
+                value = register(value, f"{name}_{stage}")
+            return value
+
+        def product(a, b, name):
+            return register(register(a, f"{name}_a") * register(b, f"{name}_b"), name)
+
+        # Which word each stage holds, one bit a kind.
+        kinds = _Kind.SECOND, _Kind.FIRST, _Kind.START
+        here = [[self.i.valid & (kind == each) for each in kinds]]
+        for stage in range(1, self._SHIFTED):
+            held = [Signal(name=f"{each.name.lower()}_at_{stage}") for each in kinds]
+            with m.If(moves):
+                m.d.sync += [signal.eq(before) for signal, before in zip(held, here[-1], strict=True)]
+            here.append(held)
+
+        begin, step = (
+            {name: vector[at].as_value() for name, at in place.items()} for vector in (span.start, span.step)
+        )
+        is_second, is_start = (kind == each for each in (_Kind.SECOND, _Kind.START))
+        a = {name: Mux(is_second, step[name], begin[name]) for name in place}
+        b = {name: Mux(is_start, begin[name], step[name]) for name in place}
+        squares = []
+        for number, names in enumerate(p.squares):
+            products = [product(a[name], b[name], f"square_{name}") for name in names]
+            squares.append(register(sum(products[1:], products[0]), f"sum_{number}"))
+        lines = [self._line(register, product, light, b, is_second) for light in range(p.lights)]
+
+        # Starts leave with the sums.
+        payload = start.payload
+        to_start = stream.Signature(payload.shape()).create(path=("to_start",))
+        m.d.comb += [
+            to_start.valid.eq(here[self._SUMS][2] & moves),
+            to_start.payload.length.eq(delayed(span.length, "length", self._SUMS)),
+        ]
+        for total, word in zip(
+            (*squares, *lines), (*to_start.payload.squares, *to_start.payload.lines), strict=True
+        ):
+            m.d.comb += word.eq(total[: len(word)])
+        if p.takes_heights:
+            for light, height in enumerate(to_start.payload.heights):
+                m.d.comb += height.eq(delayed(begin[f"z{light}"], f"height_{light}", self._SUMS))
+        connect_wide_fifo(m, "starts", to_start, start, self.DEPTH)
+
+        # Differences are shifted by their exponent.
+        exponent = delayed(span.exponent, "exponent", self._SUMS)
+        at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
+        amount = Mux(at_sums[0], Cat(Const(0, 1), exponent), exponent)[:5]
+        free = p.square_format.fraction_bits - 34
+        shifted = [
+            self._shift(register, total, free + 1, amount, f"square_{k}") for k, total in enumerate(squares)
+        ]
+        more = p.LINE_FORMAT.fraction_bits - 34
+        shifted += [
+            self._shift(register, total, more, exponent, f"line_{k}") for k, total in enumerate(lines)
+        ]
+        m.d.comb += moves.eq(
+            ~((at_coarse[0] & second[1]) | (at_coarse[1] & first[1]) | (at_sums[2] & ~to_start.ready))
+        )
+        for which, (word, waits) in enumerate((second, first)):
+            with m.If(moves & at_coarse[which]):
+                m.d.sync += waits.eq(1)
+                for target, value in zip((*word.squares, *word.lines), shifted, strict=True):
+                    m.d.sync += target.eq(value[: len(target)])
+
+    def _line(
+        self, register: Callable, product: Callable, light: int, b: dict[str, Value], is_second
+    ) -> Value:
+        """Sum of the products of l; with the second differences z, times 2^16, where it is taken."""
+        p = self.parameters
+        if not p.highlights:
+            height = b[f"z{light}"]
+            scaled = register(register((height << 17) - (height << 1), f"scaled_{light}"), f"late_{light}")
+            return register(scaled, f"line_sum_{light}")
+        sine, cosine = (part.as_value() for part in self.constants[light])
+        if p.takes_heights:
+            sine = Mux(is_second, 0, sine)[: len(sine)].as_signed()
+            cosine = Mux(is_second, 1 << 16, cosine)[: len(cosine)].as_signed()
+        x, z = (
+            product(b[f"{axis}{light}"], factor, f"line_{axis}{light}")
+            for axis, factor in zip("xz", (sine, cosine), strict=True)
+        )
+        return register(x + z, f"line_sum_{light}")
+
+    def _shift(self, register: Callable, total: Value, left: int, amount: Value, name: str) -> Value:
+        """``(total << left) >> amount``: a register after the coarse shift."""
+        word, high = total << left, amount[2:]
+        coarse = register(select([word >> (4 * k) for k in range(1 << len(high))], high), f"{name}_coarse")
+        low = register(amount[:2], f"{name}_low")
+        return select([coarse >> k for k in range(4)], low)
+
+    def _take(self, m: Module, advance: Value, takes: Any, waits: Any, start: stream.Interface) -> None:
+        """Take words where the span before needs its own no more; count pixels."""
+        # Whether at most one, two, three pixels of a span are left, the one on the output among them.
+        last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
+        left, valid = Signal(self.length_bits), Signal()
+        # Whether the second, the first differences of the next span were taken.
+        has_second, self._ready = Signal(), Signal(name="ready")
+        length = start.payload.length
+        is_long = length[1:].any()
+        m.d.comb += [
+            takes[0].eq(waits[0] & three & ~has_second),
+            takes[1].eq(waits[1] & two & (has_second | takes[0]) & ~self._ready),
+            takes[2].eq(start.valid & last & (self._ready | ~is_long)),
+            advance.eq(~valid | self.o.ready),
+            self.o.valid.eq(valid),
+        ]
+        with m.If(advance):
+            starts_long = takes[2] & is_long
+            m.d.sync += [
+                has_second.eq((takes[0] | has_second) & ~starts_long),
+                self._ready.eq((takes[1] | self._ready) & ~starts_long),
+            ]
+            with m.If(takes[2]):
+                m.d.sync += [
+                    valid.eq(1),
+                    left.eq(length),
+                    last.eq(~is_long),
+                    two.eq(~length[2:].any() & ~length[:2].all()),
+                    three.eq(~length[2:].any()),
+                ]
+            with m.Else():
+                m.d.sync += [
+                    valid.eq(~last),
+                    left.eq(left - 1),
+                    last.eq(two),
+                    two.eq(three),
+                    three.eq(three | (left == 4)),
+                ]
+
+    def _height(self, m: Module, light: int, advance: Value, takes: Any, given: Any) -> Value:
+        """Sign of z of a light."""
+        p, (step, start) = self.parameters, given
+        width = p.HEIGHT_FORMAT.width
+        names = ("height", "height_step", "next_height_step")
+        height, current, following = (
+            Signal(signed(width), name=f"{name}_{light}", reset_less=True) for name in names
+        )
+        begin = Cat(Const(0, width - len(start)), start).as_signed()
+        # z times 2^16 has the binary point of a line. Both may be taken on the same cycle.
+        given = Mux(takes[0], step[6 : 6 + width], following)
+        with m.If(advance):
+            m.d.sync += following.eq(given)
+            with m.If(takes[1]):
+                m.d.sync += current.eq(given)
+            m.d.sync += height.eq(Mux(takes[2], begin, height + current))
+        return height[-1]
