@@ -41,6 +41,7 @@ STYLES = {
     "recurrence": Style("#3b95c4", "#8fd0f5", "--", "X"),
     "chord": Style("#d55e00", "#ff8b3d", marker="D"),
     "chord-local": Style("#b0508a", "#e08fc0", "--", "d"),
+    "quotient": Style("#8b1a1a", "#ff6b6b", marker="*"),
 }
 """Style of each method."""
 

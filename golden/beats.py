@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.reference.geometry import normalise
 
@@ -34,6 +35,9 @@ class Spans:
         bisectors of the two ends.
     factors : int64 array, shape (spans, factors, 3), optional
         With values: codes of the factors, in the format of N·L, of the lights in `Design.factors`.
+    vectors : SpanVectors, optional
+        Vectors at the first pixel and their step, for methods with `Interpolator.TAKES_VECTORS`, which read
+        no normals.
     """
 
     x: np.ndarray
@@ -45,6 +49,7 @@ class Spans:
     values: SpanValues | None = None
     normal_middle: np.ndarray | None = None
     factors: np.ndarray | None = None
+    vectors: SpanVectors | None = None
 
     def __post_init__(self):
         if self.material is None:
@@ -68,7 +73,8 @@ class Spans:
         middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
         chosen = {name: getattr(self, name)[which] for name in fields}
         factors = self.factors if self.factors is None else self.factors[which]
-        return Spans(**chosen, values=values, normal_middle=middle, factors=factors)
+        vectors = self.vectors if self.vectors is None else self.vectors[which]
+        return Spans(**chosen, values=values, normal_middle=middle, factors=factors, vectors=vectors)
 
 
 @dataclass(frozen=True)

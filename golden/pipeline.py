@@ -9,6 +9,7 @@ import numpy as np
 
 from blysk.golden.beats import Pixels, Spans
 from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
@@ -17,10 +18,12 @@ from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
+from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.number.unit_vector import COMPONENT
@@ -122,6 +125,7 @@ class Design:
     build: Build = field(default_factory=Build)
 
     def __post_init__(self):
+        self._match_table()
         if self.specular is not None and self.specular.operand != self.interpolator.operand:
             matching = replace(self.specular, operand=self.interpolator.operand)
             object.__setattr__(self, "specular", matching)
@@ -138,10 +142,23 @@ class Design:
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
-
         object.__setattr__(self, "factors", tuple(self.factors))
         if self.factors:
             self._check_factors()
+
+    def _match_table(self) -> None:
+        """Give a method that takes vectors a lobe of its own, and the kind of its angle; others none."""
+        lobe = self.specular
+        if lobe and (lobe.operand == "place") != self.takes_vectors:
+            if not self.takes_vectors and lobe.model.MIRROR:
+                raise ValueError(f"{lobe.name} is a lobe of R·V: take the method quotient, or phong_coplanar")
+            names = ("banks", "cutoff", "fixed") * lobe.has_table
+            kept = {name: getattr(lobe, name) for name in names}
+            made = QuotientLobe if self.takes_vectors else partial(Lobe, operand=self.interpolator.operand)
+            object.__setattr__(self, "specular", made(lobe.model, **kept))
+        if isinstance(self.interpolator, QuotientInterpolator):
+            mirror = self.specular is not None and self.specular.model.MIRROR
+            object.__setattr__(self, "interpolator", replace(self.interpolator, mirror=mirror))
 
     def _match_scale(self) -> None:
         """Give the lobe the scale of the method's operand."""
@@ -220,6 +237,21 @@ class Design:
     def takes_values(self) -> bool:
         """Whether spans carry values of each light in place of normals, so that L and H may be local."""
         return self.interpolator.TAKES_VALUES
+
+    @property
+    def takes_vectors(self) -> bool:
+        """Whether spans carry vectors ``N/W`` in the frame of each light in place of normals."""
+        return self.interpolator.TAKES_VECTORS
+
+    @property
+    def span_members(self) -> str:
+        """What spans carry: ``"normals"``, ``"values"`` or ``"vectors"``."""
+        return "values" if self.takes_values else "vectors" if self.takes_vectors else "normals"
+
+    @property
+    def vector_spans(self) -> QuotientSpans:
+        """Model of the setup of a method that takes vectors."""
+        return cast(QuotientInterpolator, self.interpolator).spans(self.lights, self.specular is not None)
 
     @cached_property
     def span_limit(self) -> SpanLimit | None:
@@ -386,6 +418,8 @@ class Design:
             codes = np.asarray(getattr(spans, name))
             if codes.size and not 0 <= codes.min() <= codes.max() < 1 << bits:
                 raise ValueError(f"{name} must be 0 to {(1 << bits) - 1}")
+        if self.takes_vectors and self.lights and spans.vectors is None:
+            raise ValueError(f"method {self.method} takes spans with vectors")
         if not (self.takes_values and self.lights):
             return
         if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
@@ -395,15 +429,7 @@ class Design:
             raise ValueError(f"the design takes spans with factors for {len(self.factors)} lights")
 
     def operands(self, spans: Spans, constants: FrameConstants) -> Operands:
-        """Bit-accurate operands of every pixel of spans of one pixel or more, in the order of the spans.
-
-        Parameters
-        ----------
-        spans : Spans
-            Spans.
-        constants : FrameConstants
-            L and H of each light.
-        """
+        """Bit-accurate operands of every pixel of spans, each of one pixel or more, in their order."""
         every = np.arange(len(spans))
         return self._operands_of(spans, every, np.asarray(spans.length), constants)(slice(None))
 
@@ -419,6 +445,10 @@ class Design:
                 length[part],
                 None if factors is None else factors[part],
             )
+        if isinstance(self.interpolator, QuotientInterpolator):
+            method, vectors = self.interpolator, cast(SpanVectors, spans[kept].vectors)
+            model, direction = self.vector_spans, np.asarray(constants.direction)
+            return lambda part: method.compute_vectors(model, vectors[part], length[part], direction)
         format = self.interpolator.END_FORMAT
         left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]

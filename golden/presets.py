@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods import (
     angular_interpolator,
@@ -12,15 +13,16 @@ from blysk.golden.methods import (
     linear_interpolator,
     local_chord_interpolator,
     quadratic_interpolator,
+    quotient_interpolator,
     recurrence_interpolator,
     renormalise_interpolator,
 )
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
 from blysk.golden.pipeline import Build, Design
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
-from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS, ReflectionModel
+from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS, ReflectionModel
 
-__all__ = ["LOBES", "METHODS", "METHOD_LINES", "MODELS", "MODEL_LINES", "PUBLISHED", "preset"]
+__all__ = ["LOBES", "METHODS", "METHOD_LINES", "MIRROR_LOBES", "MODELS", "MODEL_LINES", "PUBLISHED", "preset"]
 
 _MODULES = (
     linear_interpolator,
@@ -31,6 +33,7 @@ _MODULES = (
     recurrence_interpolator,
     chord_interpolator,
     local_chord_interpolator,
+    quotient_interpolator,
 )
 """Modules with ``METHODS``, and some with ``PUBLISHED``, a line about each; in the order of tables."""
 
@@ -70,10 +73,14 @@ LOBES: dict[str, Lobe] = {
 size (704 words for ``phong_coplanar``, 336 for the others) the largest error of a table found at any
 exponent is 0.06 LSB against its model; for roughness see `Lobe`."""
 
+MIRROR_LOBES: dict[str, Lobe] = {PHONG.name: QuotientLobe(PHONG)}
+"""Specular units of models of R·V, by name; the method ``quotient`` serves each."""
+
 MODEL_LINES: dict[str, str] = {
     **{lobe.name: f"{lobe.model.summary}, from a table" for lobe in LOBES.values()},
     **{name: unit.model.summary for name, unit in MODELS.items()},
     "blinn_product": f"{BLINN.summary}, by repeated squaring",
+    PHONG.name: f"{PHONG.summary}, from a table; of the method quotient",
 }
 """A line about each reflection model, for the help of the command line."""
 
@@ -149,7 +156,7 @@ def _specular(model: str | ReflectionModel | None) -> Specular | Power | Lobe | 
         return None
     if isinstance(model, ReflectionModel):
         return Lobe(model)
-    known = MODELS | LOBES
+    known = MODELS | LOBES | MIRROR_LOBES
     if model not in known:
         raise ValueError(f"model must be one of {', '.join(known)}, not {model!r}")
     return known[model]

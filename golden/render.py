@@ -78,7 +78,7 @@ class Renderer:
     Raises
     ------
     ValueError
-        If the method takes values, or other normals than the geometry gives.
+        If the method takes values or vectors, or other normals than the geometry gives.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -91,7 +91,7 @@ class Renderer:
         lines = self.design.interpolator.takes_line
         if self.geometry is None:
             object.__setattr__(self, "geometry", Geometry(lines=lines))
-        if self.design.takes_values:
+        if self.design.takes_values or self.design.takes_vectors:
             raise ValueError(f"method {self.design.method} takes no normals, which is what triangles give")
         if self.geometry.lines != lines:
             taken, given = ("unit normals", "true lines")[lines], ("unit normals", "true lines")[not lines]

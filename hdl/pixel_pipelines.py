@@ -12,10 +12,11 @@ from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, connect_late_fifo
 from blysk.hdl.core.stream import connect
 from blysk.hdl.frame_constants import write_shape
-from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit, span_shape, status_shape
+from blysk.hdl.pipeline import ShadingPipelineUnit, span_shape, status_shape
 from blysk.hdl.pixel_assembler import pixel_shape
 from blysk.hdl.pixel_lanes import PixelLanesUnit, lanes_shape
 from blysk.hdl.pixel_merger import PixelMergerUnit
+from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
 
 __all__ = [
     "WAITING_SPANS",

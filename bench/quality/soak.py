@@ -27,7 +27,7 @@ from blysk.bench.store import Task, results_of
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
+from blysk.golden.number.unit_vector import ONE, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
@@ -42,7 +42,7 @@ from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.installation import install_extra
 from blysk.sim.output import check_writable, write_json
-from blysk.sim.units.pipeline_spans import tabled
+from blysk.sim.units.pipeline_spans import ends_for, tabled, vectors_for
 from blysk.sim.units.record import Beats, length_of
 from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
@@ -204,11 +204,9 @@ def measure(
     while totals["pixels"] < pixels:
         constants = tabled(design, random_constants(rng))
         spans = random_spans(rng, min(_BATCH, pixels - totals["pixels"]), constants.halfway[0] / ONE)
-        if design.interpolator.takes_line:
-            # Unit vectors, in the format of a line's ends.
-            shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
-            left, right = spans.normal_left << shift, spans.normal_right << shift
-            spans = replace(spans, normal_left=left, normal_right=right)
+        spans = ends_for(design, spans)
+        if design.takes_vectors:
+            spans = replace(spans, vectors=vectors_for(rng, design, spans.length))
         shaded = design.compute(spans, constants)
         expected, beats = pixel_beats(shaded), beats_of(unit, spans)
         shares = rng.choice([0.0, 0.5], 2) * rng.random(2)

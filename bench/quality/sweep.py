@@ -20,7 +20,7 @@ import numpy as np
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
-from blysk.golden.frames.prepare import spans_for
+from blysk.golden.frames.prepare import constants_of, spans_for
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design, Spans
@@ -174,10 +174,10 @@ class Frame:
         method : str
             Method of interpolation.
         """
-        constants = FrameConstants.of(self.scene_of(exponent), 1)
         cut, spans = self.spans_of(preset(method, "cosquad"), exponent)
         for model in models:
             design = preset(method, model)
+            (constants,) = constants_of(self.scene_of(exponent), design)
             color = design.compute(spans, constants).color[self._shown]
             error = np.abs(color - self.golden(model, exponent)).max(axis=1, initial=0)
             over = np.flatnonzero(error > LARGEST)

@@ -15,8 +15,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
-from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -80,7 +79,7 @@ def mismatches(
     """
     scene = scene_for(mesh, exponent, width, height)
     spans = prepare(scene, unit.parameters).spans
-    constants = FrameConstants.of(scene, 1)
+    (constants,) = constants_of(scene, unit.parameters)
     expected = unit.parameters.compute(spans, constants)
     run = simulate(
         unit,

@@ -19,8 +19,8 @@ from blysk.bench.report.stability_cases import (
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
-from blysk.golden.frames.local import local_values
-from blysk.golden.frames.prepare import spans_for
+from blysk.golden.frames.local import line_ends, local_values
+from blysk.golden.frames.prepare import constants_of, spans_for
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
@@ -97,6 +97,9 @@ def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
     if case.codes is None:
         return spans_for(case.scene, raster, design)
     left, right = case.codes
+    if design.takes_vectors:
+        given = replace(raster, normal_left=left.astype(np.float64), normal_right=right.astype(np.float64))
+        return spans_for(case.scene, given, design)
     if design.takes_values:
         values = local_values(case.scene, raster)
         return Spans(raster.x, raster.y, raster.length, left, right, values=values)
@@ -143,6 +146,10 @@ def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray
             values, _ = _three_values(design, spans, FrameConstants.of(scene))
         cosine, u = method.exact_operands(values, spans.length)
         return shade_operands(scene, raster, cosine, 1 - u, model)
+    if design.takes_vectors:
+        left, right = case.codes or line_ends(raster)
+        given = replace(raster, normal_left=left.astype(np.float64), normal_right=right.astype(np.float64))
+        return shade_spans(scene, given, method.exact_normals, model)
     ends = [codes.astype(np.float64) for codes in (spans.normal_left, spans.normal_right)]
     left, right = ends if method.takes_line else map(normalise, ends)
     given = replace(raster, normal_left=left, normal_right=right)
@@ -152,11 +159,12 @@ def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray
 def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
     """Errors of the bit-accurate model against exact normals: perspective-correct, normalised per pixel."""
     scene, material = case.scene, case.scene.materials[0]
-    spans, constants = spans_of(case, design, raster), FrameConstants.of(scene)
+    spans, (constants,) = spans_of(case, design, raster), constants_of(scene, design)
     color = design.compute(spans, constants).color
     out_of_range = _flagged(design, spans, constants)
 
-    degrees = _line_angles(spans) if design.interpolator.takes_line else _angles(raster)
+    by_codes = design.interpolator.takes_line and not design.takes_vectors
+    degrees = _line_angles(spans) if by_codes else _angles(raster)
     degrees = np.minimum(degrees, design.interpolator.MAX_ANGLE).max(initial=0)
     error = design.interpolator.operand_error(int(raster.length.max(initial=1)), float(degrees))
     if not (design.takes_values or design.interpolator.takes_line):
@@ -325,7 +333,8 @@ def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
     ends = arcs(rng, HALFWAY, degrees, rng.uniform(0, 1, len(degrees)), rng.uniform(0, 30, len(degrees)))
     case = single_spans(2, "", ends, 5, SWEEP_EXPONENT)
     design = _design(case, method)
-    return _flagged(design, spans_of(case, design, case.raster), FrameConstants.of(case.scene))
+    (constants,) = constants_of(case.scene, design)
+    return _flagged(design, spans_of(case, design, case.raster), constants)
 
 
 def widest_span(method: str, exponent: int) -> float:

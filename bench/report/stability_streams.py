@@ -10,7 +10,7 @@ from amaranth.lib import wiring
 
 from blysk.bench.report.stability_cases import HALFWAY, STREAM_GROUP, arcs, single_spans
 from blysk.bench.report.stability_errors import MODEL, spans_of
-from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.prepare import constants_of
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack
@@ -119,7 +119,7 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
     ends = arcs(rng, HALFWAY, rng.uniform(0, 8, 10), 0.5, rng.uniform(0, 20, 10))
     case = single_spans(STREAM_GROUP, "", ends, np.maximum(lengths, 1), 20)
     spans = replace(spans_of(case, design, case.raster), length=lengths)
-    constants = FrameConstants.of(case.scene)
+    (constants,) = constants_of(case.scene, design)
     expected = design.compute(spans, constants)
     beats, write = beats_of(unit, spans), constants.writes()
     engine = "pysim" if quick else "auto"

@@ -18,7 +18,7 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
@@ -177,8 +177,8 @@ def _frames(
     for count in triangles:
         mesh = teapot(count)
         scene = scene_for(mesh, _EXPONENT, width, height)
-        constants = FrameConstants.of(scene, 1)
         for method in methods:
+            (constants,) = constants_of(scene, preset(method, "cosquad"))
             spans = spans_of(scene, method)
             chosen = np.asarray(spans.length) >= LONG
             long = spans[chosen]

@@ -167,6 +167,8 @@ class Sweep(NamedTuple):
             words = self.fraction_bits if method == "chord" else (None,)
             usual = (METHODS | PUBLISHED)[method].operand
             operands = [None if operand == usual else operand for operand in self.operands]
+            if usual not in OPERANDS:
+                operands = [None]
             for values in product(self.models, self.lights, operands, degrees, words, self.styles):
                 try:
                     found[Candidate(method, *values)] = None

@@ -78,8 +78,8 @@ WIDTH, HEIGHT = 320, 240
 BANDS = (100, MAX_EXPONENT)
 """Exponents for which spans are cut; a frame uses the smallest that is at least its own exponent."""
 
-SERVED = tuple(name for name, method in METHODS.items() if not method.TAKES_VALUES)
-"""Methods of modules. Methods whose spans carry values of the light are left out: the light moves."""
+SERVED = tuple(name for name, of in METHODS.items() if not (of.TAKES_VALUES or of.TAKES_VECTORS))
+"""Methods of modules. Methods whose spans depend on the light are left out: the light moves."""
 
 DESIGNS = (*(pair for pair in accuracy.DESIGNS if pair[0] in SERVED), ("chord", "ggx"))
 """Method and model of each module."""

@@ -9,13 +9,14 @@ from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks, lines_along, weights_along
 from blysk.golden.frames.pieces import Pieces
 from blysk.golden.methods.interpolator import Interpolator
+from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["cut_by_angle", "cut_by_error", "cut_by_length", "cut_spans"]
+__all__ = ["cut_by_angle", "cut_by_ends", "cut_by_error", "cut_by_length", "cut_spans"]
 
 
 def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
@@ -42,6 +43,8 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
         How many of the given spans were cut.
     """
     interpolator, limits = design.interpolator, HighlightLimits.of(scene.materials, design)
+    if isinstance(interpolator, QuotientInterpolator):
+        return cut_by_ends(raster, interpolator.LARGEST_RATIO)
     if isinstance(interpolator, RenormaliseInterpolator):
         return cut_by_length(raster, interpolator.LARGEST_RATIO)
     if interpolator.CUT_BY_ERROR:
@@ -105,6 +108,37 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         return (np.minimum(*least) * largest_ratio < longest) & (last > first)
 
     return _halve(raster, is_wide)
+
+
+def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
+    """Halve spans whose normals, not of unit length, differ in length or by over 90 degrees at the two ends.
+
+    Spans of two pixels become two of one, whatever their ends.
+
+    Parameters
+    ----------
+    raster : Raster
+        Spans.
+    largest_ratio : float
+        Largest ratio of the lengths.
+
+    Returns
+    -------
+    raster, cut
+        As of `cut_spans`. Spans of two pixels count as cut only if their ends differ so.
+    """
+
+    def differs(origin, first, last):
+        steps = np.maximum(raster.length[origin] - 1, 1)
+        left, right = (lines_along(raster, origin, place / steps) for place in (first, last))
+        shorter, longer = np.sort([np.linalg.norm(end, axis=1) for end in (left, right)], axis=0)
+        wide = (longer > largest_ratio * shorter) | (np.einsum("ij,ij->i", left, right) < 0)
+        return wide & (last > first)
+
+    spans = np.arange(len(raster.length))
+    cut = int(np.count_nonzero(differs(spans, np.zeros_like(spans), raster.length.astype(np.int64) - 1)))
+    whole, _ = _halve(raster, lambda *piece: differs(*piece) | (piece[2] - piece[1] == 1))
+    return whole, cut
 
 
 def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:

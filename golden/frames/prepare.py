@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.highlight_limits import HighlightLimits
@@ -14,6 +15,7 @@ from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise, quantise_direction
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.geometry import any_component
+from blysk.golden.reference.light_frame import LightFrame, light_frame
 from blysk.golden.reference.lighting import Material, halfway_vector
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
@@ -21,9 +23,11 @@ from blysk.golden.reference.scene import Scene
 __all__ = [
     "PreparedFrame",
     "constants_of",
+    "light_frames",
     "prepare",
     "quantise_spans",
     "sort_by_material",
+    "span_vectors",
     "spans_for",
     "with_tables",
 ]
@@ -93,7 +97,9 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
     """
     spans = quantise_spans(cut, scene.mesh.material)
     scale = getattr(design.interpolator, "scale", 0)
-    if design.takes_values:
+    if design.takes_vectors and design.lights:
+        spans = replace(spans, vectors=span_vectors(scene, cut, design))
+    elif design.takes_values:
         values, factors = local_operands(scene, cut, design.lights, design.factors, scale)
         spans = replace(spans, values=values, factors=factors)
     elif design.interpolator.takes_line:
@@ -113,6 +119,47 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
     return spans
 
 
+def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
+    """Frames of a pipeline's lights; those that the scene lacks have the frame of the viewer."""
+    viewer = scene.camera.viewer
+    directions = [light.direction for light in scene.lights]
+    return [light_frame(direction, viewer) for direction in (directions + [viewer] * lights)[:lights]]
+
+
+def span_vectors(scene: Scene, cut: Raster, design: Design) -> SpanVectors:
+    """Vectors ``N/W`` of spans in the frames of the lights, quantised, for a method that takes them.
+
+    Without highlights z is along each light.
+
+    Parameters
+    ----------
+    scene : Scene
+        Lights and viewer.
+    cut : Raster
+        Spans from `cut_spans`.
+    design : Design
+        The pipeline.
+    """
+    model = design.vector_spans
+    frames = light_frames(scene, design.lights)
+    rows = {}
+    for k, frame in enumerate(frames):
+        x, y, z = frame.axes
+        if not model.highlights:
+            # x and y lie across L, z along it.
+            x, z = frame.cosine * x - frame.sine * z, frame.sine * x + frame.cosine * z
+        elif model.mirror:
+            rows.setdefault("s0", frame.sine * y)
+            y = frame.cosine * y
+        rows |= {f"x{k}": x, f"y{k}": y, f"z{k}": z}
+    axes = np.stack([rows[name] for name in model.components])
+    left, right = (end @ axes.T for end in line_ends(cut))
+    # Where no length is known the direction serves.
+    lost = ~(left.any(axis=1) | right.any(axis=1))
+    left[lost], right[lost] = (normal[lost] @ axes.T for normal in (cut.normal_left, cut.normal_right))
+    return SpanVectors.quantise(left, right, cut.length)
+
+
 def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
     """Frame constants of each material of a scene, for a pipeline.
 
@@ -125,6 +172,13 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
     constants = [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+    if design.takes_vectors:
+        frames = light_frames(scene, design.lights)
+        codes = np.zeros((design.lights, 3), dtype=np.int64)
+        for index, frame in enumerate(frames[: len(scene.lights)]):
+            if scene.lights[index].is_on:
+                codes[index] = np.rint(frame.direction * QuotientSpans.ONE)
+        constants = [replace(of, direction=codes, halfway=np.zeros_like(codes)) for of in constants]
     if getattr(design.interpolator, "scale", 0) and not scene.local:
         constants = [replace(of, halfway=_halfway_directions(scene, of.halfway)) for of in constants]
     return with_tables(constants, scene.materials, design) if design.loads_tables else constants

@@ -16,7 +16,7 @@ from blysk.golden.reference.curves import interpolate
 __all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "difference_rounding"]
 
 Operand = Literal["cosine", "one_minus_cosine"]
-"""Kind of the operand of a specular unit: N·H, or 1 - N·H."""
+"""Kind of the operand of a specular unit, for methods that find normals: N·H, or 1 - N·H."""
 
 
 def difference_rounding(pixel: int) -> float:
@@ -40,7 +40,7 @@ class Operands(NamedTuple):
     cosine : Fixed, shape (pixels, lights)
         N·L.
     highlight : Fixed, shape (pixels, lights)
-        N·H, or 1 - N·H.
+        N·H, 1 - N·H, or the place in a lobe's table.
     out_of_range : bool array, shape (spans,)
         Whether the angle of the span is larger than the method serves: its operands mean nothing.
     factor : Fixed, shape (pixels, fading lights), optional
@@ -62,7 +62,7 @@ class Interpolator:
     Attributes
     ----------
     operand : str
-        ``"cosine"`` or ``"one_minus_cosine"``: operand of the specular unit.
+        ``"cosine"``, ``"one_minus_cosine"`` or ``"place"``: operand of the specular unit.
     COSINE_FORMAT : Format
         Format of N·L.
     COSINE_OF_ZERO : float
@@ -79,6 +79,8 @@ class Interpolator:
     TAKES_VALUES : bool
         Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
         differ from pixel to pixel.
+    TAKES_VECTORS : bool
+        Whether spans carry vectors ``N/W`` at the first pixel and their step, in the frame of each light.
     CUT_BY_ERROR : bool
         Whether spans are cut until the curve keeps its tolerance, a quarter of an LSB, where checked; else
         they are cut by their angle alone.
@@ -98,6 +100,7 @@ class Interpolator:
     CURVE: ClassVar[str] = "normalised"
     ORIGIN: ClassVar[Literal["documents", "own", "baseline"]] = "own"
     TAKES_VALUES: ClassVar[bool] = False
+    TAKES_VECTORS: ClassVar[bool] = False
     END_FORMAT: ClassVar[Format] = COMPONENT
     TAKES_MIDDLE: ClassVar[bool] = False
     CUT_BY_ERROR: ClassVar[bool] = True
@@ -107,6 +110,11 @@ class Interpolator:
     def name(self) -> str:
         """Name on the command line and in tables."""
         raise NotImplementedError
+
+    @property
+    def highlight_format(self) -> Format:
+        """Format of the operand of the specular unit."""
+        return Specular(operand=self.operand).operand_format
 
     @property
     def serves_gate(self) -> bool:

@@ -11,6 +11,7 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import PipelinedUnit, connect, connect_fifo, pass_beside
@@ -64,6 +65,7 @@ def _lobe_unit(
 
 SPECULAR_KINDS: dict[type, SpecularKind] = {
     Lobe: SpecularKind(_lobe_unit, lambda parameters, exponent: 1),
+    QuotientLobe: SpecularKind(_lobe_unit, lambda parameters, exponent: 1),
     Specular: SpecularKind(_specular_unit, SpecularUnit.multiplications, SlopeUnit),
     Power: SpecularKind(_power_unit, lambda parameters, exponent: 42),
 }

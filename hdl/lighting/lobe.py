@@ -9,6 +9,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.lobe import Lobe, LobeTable
+from blysk.hdl.core.bits import leading_zeros
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.memory import registered_read
@@ -141,7 +142,8 @@ class LobeUnit(PipelinedUnit):
     Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
 
     With an initiation interval of 1 the latency is 10 cycles: one minus, saturation, leading one, two for the
-    shift, two for the word, operands, product, sum. A longer interval takes 2 more: the input has a register,
+    shift, two for the word, operands, product, sum. With the operand ``place`` it is 8: choice, three for the
+    word, and the same from there on. A longer interval takes 2 more: the input has a register,
     and so have the multiplexers before the multiplier. At every interval there is one multiplier of 18 by 18
     bits. A beat that is dark, or whose N·H is not positive, works as if its argument
     were 0: from one to the next nothing toggles but the input and the first registers.
@@ -160,7 +162,8 @@ class LobeUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
-        ``N·H`` in ``SQ(4, 34)`` or ``1 - N·H`` in ``UQ(1, B)``; whether the beat is dark.
+        ``N·H`` in ``SQ(4, 34)``, ``1 - N·H`` in ``UQ(1, B)`` or a place in `quotient.place_format`; whether
+        the beat is dark.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"bank": ...}))`
@@ -226,7 +229,7 @@ class LobeUnit(PipelinedUnit):
         """The graph, read at the stage of its last word."""
         p = self.parameters
         self._base = Const(0, 1)
-        if p.banks > 1:
+        if p.banks > 1 and p.operand != "place":
             self._base = Signal(range(p.banks * p.rows), name="base")
             with m.Switch(self.constants.bank):
                 for bank in range(p.banks):
@@ -238,13 +241,36 @@ class LobeUnit(PipelinedUnit):
     def _describe(self) -> Word:
         """Words from the operand to the result."""
         p, g = self.parameters, self._graph
-        bits, top = p.fraction_bits, p.fraction_bits - 1
         operand = g.input("operand", lambda operands: operands.operand)
         dark = g.input("dark", lambda operands: operands.dark)
 
         def is_lit(operand, dark):
             code = Value.cast(operand)
             return ~(dark | code[-1] | (~code.any() if p.operand == "cosine" else 0))
+
+        lit = g.register("lit", is_lit, operand, dark)
+        shapes = unsigned(len(self._read.address)), unsigned(p.fraction_format.width)
+        memory = g.share("memory", shapes, 2, self._look_up)
+        address = self._placed if p.operand == "place" else self._addressed
+        return self._interpolate(g.use(memory, "word", *address(operand, lit)), lit)
+
+    def _placed(self, operand: Word, lit: Word) -> tuple[tuple[Word], Callable]:
+        """Word of a place, and the function from it to the address and the fraction."""
+        p, fraction = self.parameters, self.parameters.fraction_format.width
+
+        def placed(place, lit):
+            return Mux(lit, Value.cast(place)[:-1], 0)
+
+        def place(code):
+            # A bank has a power of two of words.
+            return Cat(code[fraction:], self.constants.bank if p.banks > 1 else ()), code[:fraction]
+
+        return (self._graph.register("placed", placed, operand, lit, formula="place"),), place
+
+    def _addressed(self, operand: Word, lit: Word) -> tuple[tuple[Word], Callable]:
+        """Word of 1 - N·H shifted by its leading zeros, and the function from it to address and fraction."""
+        p, g = self.parameters, self._graph
+        bits, top = p.fraction_bits, p.fraction_bits - 1
 
         def limited(wide, lit):
             # Where lit it is under 1.
@@ -263,16 +289,13 @@ class LobeUnit(PipelinedUnit):
             step, rest = normal[top - p.step_bits :], normal[: top - p.step_bits]
             return Cat(step, row), rest[len(rest) - p.fraction_format.width :]
 
-        lit = g.register("lit", is_lit, operand, dark)
         argument = g.register(
             "one_minus_cosine", lambda x: one_minus(p, x).truncate(bits), operand, formula="u"
         )
         argument = g.register("argument", limited, argument, lit, formula="u")
-        zeros = g.register("zeros", lambda code: _leading_zeros(code[bits - p.octaves :]), argument)
+        zeros = g.register("zeros", lambda code: leading_zeros(code[bits - p.octaves :]), argument)
         shifted = g.register("shifted", coarse, argument, zeros, formula="2^zeros·u")
-        shapes = unsigned(len(self._read.address)), unsigned(p.fraction_format.width)
-        memory = g.share("memory", shapes, 2, self._look_up)
-        return self._interpolate(g.use(memory, "word", (shifted,), place), lit)
+        return (shifted,), place
 
     def _look_up(self, register: Callable[[Any, str], Any], address: Value, fraction: Value) -> Value:
         """Word of an address, and beside it the fraction."""
@@ -307,15 +330,6 @@ class LobeUnit(PipelinedUnit):
             return FixedValue(p.RESULT_FORMAT, Mux(lit, Value.cast(total), 0))
 
         return g.register("term", term, value, product, lit, formula="v + D·f")
-
-
-def _leading_zeros(code: Value) -> Value:
-    """Number of leading zeros, by halves."""
-    if len(code) == 1:
-        return ~code
-    half = 1 << (len(code) - 1).bit_length() - 1
-    high, low = code[len(code) - half :], code[: len(code) - half]
-    return Mux(high.any(), _leading_zeros(high), half + _leading_zeros(low))[: len(code).bit_length()]
 
 
 def _checked(parameters: Lobe, tables: Sequence[LobeTable] | None) -> list[LobeTable] | None:

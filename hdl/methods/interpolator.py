@@ -130,6 +130,11 @@ class InterpolatorUnit(wiring.Component):
         """
         return span_normals_shape(length_bits)
 
+    @classmethod
+    def span_options(cls, parameters: Interpolator) -> dict[str, bool]:
+        """Further arguments of `span_shape` that follow from the model; none by default."""
+        return {}
+
     def __init__(
         self,
         parameters: Interpolator,
@@ -161,6 +166,7 @@ class InterpolatorUnit(wiring.Component):
         self.takes_threshold = takes_threshold
         self.factors = tuple(factors)
         further = {"factors": len(factors)} if factors else {}
+        further |= self.span_options(parameters)
         span = self.span_shape(lights, highlights=highlights, length_bits=length_bits, **further)
         gated, factored = gate is not None, bool(factors)
         members = {

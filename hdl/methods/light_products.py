@@ -4,7 +4,6 @@ from amaranth.hdl import Signal
 from amaranth.lib import data
 
 from blysk.golden.lighting.factor import Factor
-from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.hdl.core.dataflow import Dataflow, dot
@@ -41,7 +40,7 @@ def operands_shape(
     """
     operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
     if highlights:
-        operands["highlight"] = FixedShape(Specular(operand=parameters.operand).operand_format)
+        operands["highlight"] = FixedShape(parameters.highlight_format)
     if gated:
         operands["gated"] = 1
     if factored:

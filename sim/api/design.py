@@ -15,7 +15,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
 from blysk.golden.pixel_pipelines import PixelPipelines
-from blysk.golden.presets import METHODS, PUBLISHED, preset
+from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED, preset
 from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import BusUnit
@@ -24,8 +24,9 @@ from blysk.hdl.emit.verilog import check_name, emit
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.methods.interpolator import spelled
 from blysk.hdl.methods.registry import unit_of
-from blysk.hdl.pipeline import PORT_DESCRIPTIONS, ShadingPipelineUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
+from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, geometry_descriptions, unit_of_top
@@ -108,6 +109,12 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         If there is no such pipeline.
     """
     method = settings["method"]
+    if settings["model"] in MIRROR_LOBES and not (METHODS | PUBLISHED)[method].TAKES_VECTORS:
+        remedy = (
+            "use method quotient; or phong_coplanar, equal where N, L and V lie in a plane, elsewhere with "
+            "rounder highlights, 11 LSB off on the default teapot"
+        )
+        raise settings.refuse("model", f"method {method} finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:
         raise settings.refuse("gate", f"{method} has no error bound for one", "leave it out", "")
     options: dict[str, Any] = {name: settings[name] for name in DESIGN if name not in ("method", "model")}
@@ -148,12 +155,12 @@ def renderer_of(design: Design, option: str = "geometry", value: str = "hardware
     Raises
     ------
     OptionError
-        If the method takes values of a span in place of normals.
+        If the method takes values or vectors of a span in place of normals.
     """
     try:
         return Renderer(design)
     except ValueError:
-        reason = f"triangles give normals, and {design.method} takes values"
+        reason = f"triangles give normals, and {design.method} takes {design.span_members}"
         raise OptionError(option, value, reason, "use another method, or spans from software") from None
 
 
@@ -214,6 +221,8 @@ def header_of(unit: ShadingUnit) -> list[str]:
                 f"fade{'s' * (len(made.factors) == 1)};",
                 "their N.L in i_values is times a",
             ]
+    elif made.takes_vectors and made.lights:
+        lines += _vector_lines(made)
     elif made.interpolator.takes_line:
         lines.append(
             "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
@@ -234,6 +243,32 @@ def header_of(unit: ShadingUnit) -> list[str]:
         "before the first span: rst high for a cycle, then write every frame constant in any order",
     ]
     return lines
+
+
+def _vector_lines(made: Design) -> list[str]:
+    """How the vectors of spans are made, for a method that takes them."""
+    model = made.vector_spans
+    across = ["y times cos a"] if model.mirror else []
+    further = ["; y sin a of light 0 comes last"] if model.mirror else []
+    axes = (
+        "Frame of a light: z = H = (L + V)/|L + V|, x = (L - V)/|L - V|, y = z x x; so L = (sin a, 0, cos a)."
+        if model.highlights
+        else "Frame of light 0: z = L, x and y across it; of a further light z alone counts."
+    )
+    return [
+        axes,
+        f"i_start: components {', '.join(model.components)} of v = N/W at the first pixel centre"
+        + "".join(f", {text}" for text in across)
+        + "".join(further)
+        + ";",
+        f"N/W is linear on the screen. Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends by",
+        "one power of two, so that the largest component is 1/2 to 1.",
+        "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), times",
+        "2^i_exponent; i_exponent as large as fits, at most ceil(log2(length - 1)) + 3.",
+        "Halve a span where |v| at its ends differs by a factor over 2, or where they are over 90 degrees",
+        "apart. Give a span of two pixels as two of one, whose step is 0.",
+        f"constants: of L write sin a and cos a, times {model.ONE}, to words 0 and 2; H is not read",
+    ]
 
 
 def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[str]:

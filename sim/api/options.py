@@ -14,12 +14,11 @@ from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.pipeline import STYLES
 from blysk.golden.pixel_pipelines import PIPES as PIPE_COUNTS
-from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
+from blysk.golden.presets import METHODS, MODEL_LINES, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Triple
 from blysk.golden.reference.lobes import TabulatedModel
-from blysk.golden.reference.reflection import PHONG
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
 from blysk.sim.meshes.mesh import DEFAULT_CREASE, DEFAULT_TRIANGLES
 from blysk.sim.meshes.teapot import MAX_TRIANGLES, MIN_TRIANGLES
@@ -96,17 +95,11 @@ class PartError(ValueError):
         self.key, self.remedy = key, remedy
 
 
-_INSTEAD_OF_PHONG = (
-    "use phong_coplanar, equal where N, L and V lie in a plane, elsewhere with rounder highlights, 11 LSB "
-    "off on the default teapot"
-)
-
-
 class Model(Choice):
     """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
 
     def __init__(self):
-        super().__init__("reflection model", LOBES | MODELS)
+        super().__init__("reflection model", MODEL_LINES)
         self.points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
         self.remedy = f"{self.points}, or {self.remedy}"
 
@@ -118,8 +111,6 @@ class Model(Choice):
         """The name; or the curve of a file."""
         if isinstance(value, TabulatedModel):
             return value
-        if value == PHONG.name:
-            raise PartError("", "the pipeline finds N.H, not R.V", _INSTEAD_OF_PHONG)
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
             return super().check(value)
         try:
@@ -327,7 +318,7 @@ DESIGN: dict[str, Option] = {
     "model": Option(
         Model(),
         "blinn",
-        "Reflection model; every method serves each. A file holds a curve of N.H, measured.",
+        "Reflection model; every method serves each but phong. A file holds a curve of N.H, measured.",
         "pipeline.model",
     ),
     "operand": Option(

@@ -389,8 +389,9 @@ def _check_geometry(settings: Settings, design: Design) -> None:
             raise settings.refuse("coarse", "software leaves hidden spans out", remedy, "")
         return
     reason = None
-    if design.takes_values:
-        reason, remedy = f"triangles give normals, and {design.method} takes values", "use another method"
+    if design.span_members != "normals":
+        taken = design.span_members
+        reason, remedy = f"triangles give normals, and {design.method} takes {taken}", "use another method"
     elif settings["specialise"]:
         reason, remedy = "a specialised pipeline takes spans", "leave out specialise"
     elif settings["pipes"] > 1:

@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.frame import Frame, frame_buffer
 from blysk.golden.frames.prepare import constants_of, prepare, with_tables
@@ -58,7 +59,10 @@ def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dic
         The spans to shade.
     """
     members = unit.i.payload.shape().members
-    beats = {name: getattr(spans, name) for name in members if name not in ("values", "normal_middle")}
+    vectors = {} if spans.vectors is None else spans.vectors._asdict()
+    given = {name: vectors[name] for name in members if name in vectors}
+    others = [name for name in members if name not in ("values", "normal_middle") and name not in given]
+    beats = {name: getattr(spans, name) for name in others} | given
     if "normal_middle" in members:
         beats["normal_middle"] = spans.middle
     if "values" in members:
@@ -211,6 +215,12 @@ def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
         normal_right=quantise(turned),
         material=np.arange(len(length)) // 5 % design.materials,
     )
+    if design.takes_vectors and design.lights:
+        count = len(design.vector_spans.components)
+        ends = rng.normal(size=(2, len(length), count))
+        # A span of two pixels has no step that fits, and one of none has none.
+        vectors = SpanVectors.quantise(*ends, np.where(length > 2, length, 1))
+        spans = replace(spans, vectors=vectors)
     if design.takes_values:
         start, step = rng.uniform(0, 0.3, (2, 2, len(length), design.lights, 1))
         spans = replace(spans, values=SpanValues.quantise(*(start + step * (0, 0.4, 1))))

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import BANK_ADDRESS, LOBE_ADDRESS, FrameConstants, writes_of
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
@@ -121,7 +122,10 @@ def spans_of(beats) -> Spans:
     values = values_of(beats) if "values" in beats else None
     of_span = (beats[name] for name in ("x", "y", "length"))
     further = beats.get("material"), values, beats.get("normal_middle"), beats.get("factors")
-    return Spans(*of_span, *normals, *further)
+    vectors = None
+    if "step" in beats:
+        vectors = SpanVectors(*(beats[name] for name in SpanVectors._fields))
+    return Spans(*of_span, *normals, *further, vectors)
 
 
 @once
@@ -394,10 +398,21 @@ LONG_DESIGNS: dict[str, Design] = {
 """Further pipelines by name, for the long run."""
 
 
+_OF_VECTORS = {
+    "quotient, blinn": preset("quotient", "blinn"),
+    "quotient, phong": preset("quotient", "phong"),
+    "quotient, 2 lights": preset("quotient", "ggx", lights=2, materials=3, banks=2),
+    "quotient, compact": preset("quotient", "blinn", style="compact"),
+    "quotient, no specular light, grey, few bits": preset("quotient", None, lights=2, grey=True, **_LESS),
+}
+
+
 def _variants():
     designs = [("chord", "blinn")]
     designs += [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
-    designs += [(method, "cosquad") for method in METHODS if method not in ("quadratic", "chord-local")]
+    designs += [
+        (method, "cosquad") for method in METHODS if method not in ("quadratic", "chord-local", "quotient")
+    ]
     designs += [("chord", "exp"), ("chord", "blinn_product")]
     for method, model in designs:
         design = preset(method, model)
@@ -415,6 +430,8 @@ def _variants():
                 long=model not in ("blinn", "cosquad"),
             ),
         )
+    for name, design in _OF_VECTORS.items():
+        yield name, Variant(partial(ShadingPipelineUnit, design), long=name != "quotient, blinn")
     yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local", "cosquad")))
     for name, design in DESIGNS.items():
         yield name, Variant(partial(ShadingPipelineUnit, design))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import (
     BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
@@ -23,6 +24,8 @@ from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.geometry import normalise
 from blysk.sim.units.cosines.chord_setup import any_factors, any_values
+from blysk.sim.units.cosines.quotient_spans import line_directions
+from blysk.sim.units.methods.quotient_interpolator import any_span_vectors
 from blysk.sim.units.operands import pairs_at, pairs_chosen, turned, unit_codes
 
 __all__ = [
@@ -39,6 +42,7 @@ __all__ = [
     "spans_in_highlight",
     "spans_near_terminator",
     "tabled",
+    "vectors_for",
 ]
 
 _LONG_AND_SHORT = ((200, 4095), (3000, 12))
@@ -54,7 +58,9 @@ def any_constants(
     """Constants of each material; L and H are normals of spans, so that highlights are among the pixels."""
     lights = design.lights
     direction, halfway = (unit_codes(rng, lights) for _ in range(2))
-    if lights and len(spans) and not design.takes_values:
+    if design.takes_vectors:
+        direction = np.insert(line_directions(rng, lights), 1, 0, axis=1)
+    elif lights and len(spans) and not design.takes_values:
         direction[:] = spans.normal_right[rng.integers(0, len(spans), lights)]
         halfway[:] = spans.normal_left[rng.integers(0, len(spans), lights)]
     found = []
@@ -159,7 +165,14 @@ def any_spans(rng: np.random.Generator, design: Design, length: np.ndarray) -> S
         material=np.sort(rng.integers(0, design.materials, count)),
         values=any_values(rng, count, design.lights) if design.takes_values else None,
         factors=any_factors(rng, count, len(design.factors)) if design.factors else None,
+        vectors=vectors_for(rng, design, length) if design.takes_vectors and design.lights else None,
     )
+
+
+def vectors_for(rng: np.random.Generator, design: Design, length: np.ndarray) -> SpanVectors:
+    """Any vectors of spans of given lengths, for a method that takes them."""
+    highlights = design.specular is not None
+    return any_span_vectors(rng, design.interpolator, design.lights, highlights, length)
 
 
 def ends_for(design: Design, spans: Spans) -> Spans:

@@ -164,7 +164,7 @@ def test_a_curve_of_ones_own():
         ({"model": "ggx", "roughness": 1.5}, r"^roughness must be greater than 0 and at most 1, not 1.5$"),
         (
             {"model": "phong"},
-            r"^model must be one of .*phong_coplanar.*, not 'phong'$",
+            r"^phong is a lobe of R·V: take the method quotient, or phong_coplanar$",
         ),
         ({"model": "cosquad", "banks": 2}, r"^method chord has no option banks$"),
         ({"model": "ggx", "banks": 65}, r"^banks must be 1 to 64, not 65$"),

@@ -198,7 +198,8 @@ def spans_near_a_highlight(rng, halfway, level, angle):
 
 
 # The gate of the chord methods has tests of its own.
-GATED = [(name, None) for name in METHODS if not name.startswith("chord") and name != "renormalise"] + [
+BY_NORMALS = [name for name, of in METHODS.items() if of.serves_gate and not name.startswith("chord")]
+GATED = [(name, None) for name in BY_NORMALS] + [
     (name, "one_minus_cosine") for name in ("linear", "bisection", "quadratic")
 ]
 

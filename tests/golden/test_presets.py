@@ -2,12 +2,21 @@
 
 import pytest
 
-from blysk.golden.presets import LOBES, METHOD_LINES, METHODS, MODEL_LINES, MODELS, PUBLISHED, preset
+from blysk.golden.presets import (
+    LOBES,
+    METHOD_LINES,
+    METHODS,
+    MIRROR_LOBES,
+    MODEL_LINES,
+    MODELS,
+    PUBLISHED,
+    preset,
+)
 
 
 def test_every_name_has_a_line():
     assert list(METHOD_LINES) == [*METHODS, *PUBLISHED]
-    assert set(MODEL_LINES) == {*MODELS, *LOBES}
+    assert set(MODEL_LINES) == {*MODELS, *LOBES, *MIRROR_LOBES}
     for name, line in (METHOD_LINES | MODEL_LINES).items():
         assert line, name
         assert len(line) <= 80, name

@@ -10,7 +10,7 @@ import pytest
 from blysk.bench.accuracy import scene_for
 from blysk.bench.report import pairs
 from blysk.bench.report.pairs import Pair, main, measure
-from blysk.golden.presets import METHODS, MODELS, PUBLISHED
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
@@ -73,7 +73,7 @@ def test_every_pair_of_every_mesh(outcome, capsys, tmp_path):
     file = tmp_path / "pairs.json"
     assert main(["teapot", STRESS, "--json", str(file)]) == 0
     assert set(outcome["asked"]) == {
-        (method, model, exponent, 96, 72)
+        (method, preset(method, model).model, exponent, 96, 72)
         for method in METHODS
         for model in (*MODELS, None)
         for exponent in (1, 30, 1000)

@@ -186,7 +186,10 @@ def test_designs():
         (["--method", "chord", "--every-method"], "--method: is one of every method; leave it out"),
         (["--family", "ice40"], "--family ice40: unknown family; use one of ecp5, nexus"),
         (["--method", "none"], "--method none: unknown method; use one of"),
-        (["--model", "phong"], "--model phong: the pipeline finds N.H, not R.V; use phong_coplanar, equal"),
+        (
+            ["--model", "phong"],
+            "--model phong: method chord finds N.H, not R.V; use method quotient; or phong_coplanar",
+        ),
         (["--json", "nowhere/x"], "nowhere/x: cannot be written, there is no folder nowhere; make"),
     ],
 )

@@ -22,7 +22,7 @@ from blysk.sim.units.operands import pairs_at
 
 STEP = 2.0**-17
 ONE_VALUE = float(ONE_SQUARED.values)
-FROM_NORMALS = [name for name in METHODS if name != "chord-local"]
+FROM_NORMALS = [name for name, of in METHODS.items() if not (of.TAKES_VALUES or of.TAKES_VECTORS)]
 NORMAL_METHODS = [name for name, method in METHODS.items() if isinstance(method, NormalInterpolator)]
 
 # `quantise` moves a vector by half a step along itself and by sqrt(3) steps across.

@@ -207,7 +207,11 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
             "view 1,2,3: the camera has a position, too; ",
         ),
         ("teapot", {"target": (1, 2, 3)}, "target 1,2,3: the camera has no position; "),
-        ("teapot", {"model": "phong"}, "model: the pipeline finds N.H, not R.V; use phong_coplanar, "),
+        (
+            "teapot",
+            {"model": "phong"},
+            "model phong: method chord finds N.H, not R.V; use method quotient; or phong_coplanar, ",
+        ),
         ("teapot", {"method": "chord", "operand": "cosine"}, "operand cosine: method chord finds no normals"),
         ("teapot", {"viewer": "near"}, "method chord: point lights and a near viewer need "),
         ("teapot", {"pipes": 3}, "pipes 3: no such number; give one of 1, 2, 4, 8"),

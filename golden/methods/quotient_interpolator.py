@@ -1,0 +1,216 @@
+"""The quotient method: exact highlights and N·L from quotients of quadratics, without a unit normal."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from blysk.golden.cosines.quotient import Quotient
+from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
+from blysk.golden.methods.interpolator import Interpolator, Operands
+from blysk.golden.number.spans import pixels_of
+from blysk.golden.reference.reflection import ReflectionModel
+
+__all__ = ["METHODS", "QuotientErrors", "QuotientInterpolator"]
+
+
+@dataclass(frozen=True)
+class QuotientInterpolator(Interpolator):
+    """N·L and the place of ``sin^2 gamma`` in a lobe's table, from ``v = N/W``.
+
+    v is linear on the screen. `QuotientSpans` computes the words of each pixel by forward differences,
+    `Quotient` the operands. The curve is the exact one: normals are those of a perspective-correct
+    interpolation, at every angle and width.
+
+    A source of spans has to halve a span of three pixels or more, and to split a span of two, where
+
+    - the lengths of v at its ends differ by a factor over `LARGEST_RATIO`;
+    - or the angle between them is over 90 degrees.
+
+    Then ``|v|`` is at least ``1/(2 sqrt(5))`` at every pixel, in the scale of the words.
+
+    Parameters
+    ----------
+    mirror : bool
+        Whether the highlight is one of R·V, as Phong's; else of N·H.
+
+    Source: docs/theory/quotient.md.
+    """
+
+    mirror: bool = False
+
+    operand: ClassVar = "place"
+    COSINE_FORMAT = Quotient.COSINE_FORMAT
+    MAX_ANGLE = 180.0
+    CURVE = "normalised"
+    CUT_BY_ERROR = False
+    TAKES_VECTORS = True
+    LARGEST_RATIO: ClassVar[float] = 2.0
+    SHORTEST: ClassVar[float] = 1 / (2 * 5**0.5)
+
+    @property
+    def name(self):
+        """Name on the command line and in tables."""
+        return "quotient"
+
+    @property
+    def highlight_format(self):
+        """Format of a place in a lobe's table."""
+        return Quotient(self.spans(1, True)).place_format
+
+    @property
+    def serves_gate(self):
+        """``False``: a gate takes unit normals, or values at three places."""
+        return False
+
+    @property
+    def takes_line(self):
+        """``True``: vectors have the lengths of the true line."""
+        return True
+
+    def spans(self, lights: int, highlights: bool) -> QuotientSpans:
+        """Model of the setup, for a number of lights, with or without specular light."""
+        return QuotientSpans(lights, highlights, self.mirror and highlights)
+
+    def compute_vectors(
+        self, spans: QuotientSpans, vectors: SpanVectors, length: np.ndarray, direction: np.ndarray
+    ) -> Operands:
+        """Bit-accurate operands of every pixel, in the order of the spans.
+
+        Parameters
+        ----------
+        spans : QuotientSpans
+            From `spans`.
+        vectors : SpanVectors
+            Vectors of the spans.
+        length : int array, shape (spans,)
+            Pixels, 1 to 4095.
+        direction : int64 array, shape (lights, 3)
+            Codes of L in the frame of each light; y has no effect.
+        """
+        pixels = spans.compute(vectors, length, direction[:, ::2])
+        cosine, place, too_small = Quotient(spans).compute(pixels)
+        return Operands(cosine, place, np.bincount(pixels_of(length)[0], too_small, len(length)) > 0)
+
+    def compute(self, normal_left, normal_right, length, direction, halfway):
+        """Raise `ValueError`: spans carry vectors, not normals."""
+        raise ValueError("the quotient method takes vectors of its spans, not normals; see compute_vectors")
+
+    def errors(self, vectors: SpanVectors, length: np.ndarray) -> "QuotientErrors":
+        """Bounds of the errors of spans, see `QuotientErrors`."""
+        return QuotientErrors.of(vectors, length, self.mirror)
+
+    def operand_error(self, length, degrees):
+        """Bound of the error of N·L for every span that is cut as the method asks."""
+        return QuotientErrors.worst(length, self.mirror).cosine
+
+
+@dataclass(frozen=True)
+class QuotientErrors:
+    """Bounds of the errors of the quotient method, for spans of exact vectors at their ends.
+
+    With K pixels, D the largest component of the difference of the ends, in steps of 2^-17, and i the pixel:
+
+    - a component of v is off by ``eps <= 1/2 + max(1/16, D 2^-17)`` steps: its first value is rounded by half
+      a step; the difference is rounded by half of ``2^-e``, which is under ``2 D/(K - 1) 2^-17`` where its
+      word is full, and else at most ``1/(8 (K - 1))``;
+    - so the direction of v is off by ``asin(sqrt(3) eps / |v|)``;
+    - the accumulators are off by ``(i + i^2/2) 2^-47``, so that s is off by twice as much over q.
+
+    Parameters
+    ----------
+    angle : float
+        Largest error of a normal's direction, in radians.
+    turn : float
+        Largest error of the highlight's angle: gamma, or psi, in radians.
+    drift : float
+        Largest error of s by the accumulators.
+
+    Source: docs/theory/quotient.md#bound.
+    """
+
+    angle: float
+    turn: float
+    drift: float
+
+    @classmethod
+    def of(cls, vectors: SpanVectors, length: np.ndarray, mirror: bool = False) -> "QuotientErrors":
+        """The largest bounds of some spans.
+
+        Parameters
+        ----------
+        vectors : SpanVectors
+            Vectors of the spans, one at least. The first three components have the length of v.
+        length : int array, shape (spans,)
+            Pixels.
+        mirror : bool
+            Whether the highlight is one of R·V.
+        """
+        start = vectors.start[:, :3].astype(np.float64)
+        last = np.asarray(length, dtype=np.float64) - 1
+        way = vectors.step * np.ldexp(last, -vectors.exponent)[:, np.newaxis]
+        difference = np.where(last > 0, np.maximum(np.abs(way).max(axis=1) * 2.0**-17, 1 / 16), 0)
+        way = way[:, :3]
+        # The shortest vector on the segment between the ends.
+        square = np.einsum("si,si->s", way, way)
+        t = np.clip(-np.einsum("si,si->s", start, way) / np.where(square, square, 1), 0, 1)
+        shortest = np.linalg.norm(start + t[:, np.newaxis] * way, axis=1)
+        return cls._of(0.5 + difference, np.maximum(shortest - 3, 1), last, mirror)
+
+    @classmethod
+    def worst(cls, length: int, mirror: bool = False) -> "QuotientErrors":
+        """The bounds of every span up to a length that is cut as the method asks.
+
+        Parameters
+        ----------
+        length : int
+            Pixels.
+        mirror : bool
+            Whether the highlight is one of R·V.
+        """
+        shortest = QuotientInterpolator.SHORTEST * 2.0**17 - 3
+        return cls._of(*(np.array([value]) for value in (2.5, shortest, length - 1.0)), mirror)
+
+    @classmethod
+    def _of(cls, component, shortest, last, mirror) -> "QuotientErrors":
+        """From the error of a component and the length of v, in steps; and the last pixel."""
+        angle = np.arcsin(np.minimum(np.sqrt(3) * component / shortest, 1))
+        # Of R and V the angle turns twice as fast, and y cos a is rounded once more.
+        turn = 2 * angle + 2 * np.sqrt(2) * (component + 0.5) / shortest if mirror else angle
+        drift = 2 * (last + last**2 / 2) * 2.0**-13 / shortest**2
+        return cls(*(float(bound.max(initial=0)) for bound in (angle, turn, drift)))
+
+    @property
+    def cosine(self) -> float:
+        """Largest error of N·L: by the normal, the codes of L, and the words of a pixel."""
+        return self.angle + self.drift + 2.0**-16 + 2.0**-17.5 + Quotient.COSINE_ERROR
+
+    def highlight(self, model: ReflectionModel, parameter: float | None) -> float:
+        """Largest error of the specular term, without that of the lobe's table.
+
+        The lobe's steepest slope a radian times the error of its angle; its slope over s times the drift, but
+        at most that of the angle ``asin(sqrt(drift))``; and the relative error of s.
+
+        Parameters
+        ----------
+        model : ReflectionModel
+            The lobe.
+        parameter : float or None
+            Its exponent or roughness.
+        """
+        # Dense near the peak; the lobe ends at a right angle.
+        angle = np.linspace(0, 1, 1 << 16)[:-1] ** 2 * np.pi / 2
+        value = model.reflect(np.cos(angle), parameter)
+        sine = np.sin(angle / 2 if model.MIRROR else angle) ** 2
+        rise = np.abs(np.diff(value))
+        slope, steepness = (rise / np.diff(angle)).max(), (rise / np.diff(sine)).max()
+        # Errors of 1 - s serve where s is over 1/2.
+        relative = (rise / np.diff(sine) * np.minimum(sine, 1 - sine)[1:]).max()
+        by_drift = min(steepness * self.drift, slope * (1 + model.MIRROR) * np.arcsin(np.sqrt(self.drift)))
+        return float(slope * self.turn + by_drift + relative * Quotient.SINE_ERROR)
+
+
+METHODS = {
+    QuotientInterpolator(): "no unit normals: highlights of N.H or R.V by quotients of quadratics; exact"
+}
+"""The method of this module, and a line about it."""

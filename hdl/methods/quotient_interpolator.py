@@ -1,0 +1,88 @@
+"""The quotient method: N·L and highlights as quotients of quadratics, without a unit normal."""
+
+from amaranth.hdl import Module, Signal
+
+from blysk.golden.cosines.quotient import Quotient
+from blysk.golden.cosines.quotient_spans import QuotientSpans
+from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
+from blysk.golden.number.spans import LENGTH_BITS
+from blysk.hdl.core.stream import connect
+from blysk.hdl.cosines.quotient import QuotientUnit
+from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit, vectors_shape
+from blysk.hdl.methods.interpolator import InterpolatorUnit
+
+__all__ = ["QuotientInterpolatorUnit"]
+
+
+class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator):
+    """Spans of vectors in, N·L and places in lobes' tables out; `QuotientInterpolator` is the model.
+
+    `QuotientSpansUnit` gives the words of the pixels, `QuotientUnit` their quotients. A span of two pixels or
+    more takes three cycles at least, a span of one pixel one. A span is flagged at its first pixel that is
+    out of range.
+
+    Parameters
+    ----------
+    parameters : QuotientInterpolator
+        Kind of the highlight.
+    lights : int
+        Number of lights, at least 1.
+    options
+        As for `InterpolatorUnit`. The method has one setup interval.
+
+    Source: docs/theory/quotient.md.
+    """
+
+    shortest_interval = 1
+
+    @classmethod
+    def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, mirror=False):
+        """Vectors in the frames of the lights at the first pixel, their step, and the length."""
+        return vectors_shape(QuotientSpans(lights, highlights, mirror and highlights), length_bits)
+
+    @classmethod
+    def span_options(cls, parameters):
+        """Whether y is multiplied by cos a."""
+        return {"mirror": parameters.mirror}
+
+    def __init__(self, parameters: QuotientInterpolator, lights: int, **options):
+        super().__init__(parameters, lights, **options)
+        spans = parameters.spans(lights, self.highlights)
+        self._spans = QuotientSpansUnit(spans, self.length_bits)
+        self._quotient = QuotientUnit(Quotient(spans), self.product_interval)
+        self.setup_interval = self._spans.initiation_interval
+        self.cycles_per_pixel = self.product_interval
+        self.latency = self._spans.latency + self._quotient.latency
+
+    def elaborate(self, platform):
+        """Words of pixels, quotients; and a flag for each span with a pixel that is out of range."""
+        m = Module()
+        m.submodules.quotient_spans = spans = self._spans
+        m.submodules.quotient = quotient = self._quotient
+        for name in self.i.payload.shape().members:
+            m.d.comb += spans.i.payload[name].eq(self.i.payload[name])
+        m.d.comb += [spans.i.valid.eq(self.i.valid), self.i.ready.eq(spans.i.ready)]
+        if self.highlights:
+            for given, light in zip(spans.constants, self.constants, strict=True):
+                m.d.comb += [given[0].eq(light.direction[0]), given[1].eq(light.direction[2])]
+        connect(m, spans.o, quotient.i)
+        result, accepted = quotient.o.payload, Signal()
+        for light, operands in zip(result.lights, self.o.payload, strict=True):
+            for name in light.shape().members:
+                m.d.comb += operands[name].eq(light[name])
+        m.d.comb += [
+            self.o.valid.eq(quotient.o.valid),
+            quotient.o.ready.eq(self.o.ready),
+            accepted.eq(self.o.valid & self.o.ready),
+        ]
+        # The bit alternates from span to span, 1 in the first: the state starts as after a span with 0.
+        last, flagged = Signal(), Signal()
+        before = flagged & (last == result.span)
+        m.d.sync += self.out_of_range.eq(0)
+        with m.If(accepted):
+            m.d.sync += [
+                self.out_of_range.eq(result.out_of_range & ~before),
+                flagged.eq(result.out_of_range | before),
+                last.eq(result.span),
+            ]
+        return m
