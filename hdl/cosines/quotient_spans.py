@@ -63,8 +63,8 @@ class QuotientSpansUnit(wiring.Component):
     difference comes as its half into the first addition, and whole into the others: ``D1 = 2 v·d + d·d``
     takes no adder.
 
-    The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span, or
-    `short_latency` if it is the only one. Payloads are registers.
+    The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span,
+    or `short_latency` cycles if the span has one pixel. Payloads are registers.
 
     Parameters
     ----------

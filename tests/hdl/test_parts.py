@@ -11,6 +11,8 @@ from typing import NamedTuple
 import pytest
 
 from blysk.golden.cosines.angular_setup import AngularSetup
+from blysk.golden.cosines.quotient import Quotient
+from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
@@ -18,6 +20,8 @@ from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
 from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.cosines.half_chord import HalfChordUnit
+from blysk.hdl.cosines.quotient import QuotientUnit
+from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.cosines.span_limit import SpanLimitUnit
 from blysk.hdl.emit.cost import cost_of
@@ -185,3 +189,40 @@ def test_times_and_parts_of_one_structure(unit, times, multipliers, rom_bits):
 
 def test_span_limit_without_highlights_has_no_constants():
     assert "constants" not in SpanLimitUnit(highlights=False).signature.members
+
+
+QUOTIENTS = {
+    (1, True): ([4, 2, 2, 1, 1], [15, 21, 20, 23, 24]),
+    (2, True): ([6, 3, 2, 2, 2], [15, 21, 21, 22, 20]),
+    (1, False): ([2], [10]),
+}
+"""Multipliers and latencies at intervals 1, 2, ... of numbers of lights, with highlights and without."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("lights", "highlights"), QUOTIENTS)
+def test_times_and_parts_of_quotients(lights, highlights):
+    """No multiplier has more than 18 bits; the table of the root has 512 words of 30 bits."""
+    parameters = Quotient(QuotientSpans(lights, highlights))
+    for interval, stated in enumerate(zip(*QUOTIENTS[lights, highlights], strict=True), 1):
+        cost = cost_of(unit := QuotientUnit(parameters, interval))
+        assert (cost.multiplier_count, unit.latency) == stated
+        assert (max(max(pair) for pair in cost.multipliers), cost.constant_multipliers) == (18, 0)
+        assert cost.rom_bits == 512 * 30
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("parameters", "multipliers"),
+    [
+        (QuotientSpans(), 5),
+        (QuotientSpans(mirror=True), 6),
+        (QuotientSpans(2), 9),
+        (QuotientSpans(2, mirror=True), 10),
+        (QuotientSpans(2, highlights=False), 3),
+    ],
+)
+def test_parts_of_spans_of_quotients(parameters, multipliers):
+    cost = cost_of(unit := QuotientSpansUnit(parameters))
+    assert (cost.multipliers, cost.constant_multipliers) == ({(18, 18): multipliers}, 0)
+    assert (unit.multipliers, unit.latency, unit.short_latency) == (multipliers, 7, 5)
