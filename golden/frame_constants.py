@@ -22,6 +22,7 @@ __all__ = [
     "MATERIAL_ADDRESS",
     "MAX_MATERIALS",
     "THRESHOLD_ADDRESS",
+    "VECTOR_MEANINGS",
     "FrameConstants",
     "address_table",
     "writes_of",
@@ -96,15 +97,20 @@ class FrameConstants:
 
     @classmethod
     def of(
-        cls, scene: Scene, lights: int | None = None, energy: ReflectionModel | None = None, index: int = 0
+        cls,
+        scene: Scene,
+        lights: int | None = None,
+        energy: ReflectionModel | None = None,
+        index: int = 0,
+        mirror: bool = False,
     ) -> "FrameConstants":
         """Constants of a scene and one of its materials, for a pipeline with ``lights`` lights.
 
         Lights that the scene does not have are black. A light straight behind the surface that faces the
-        viewer (``L = -V``) has no half-way vector, and no specular light. With point lights or a near viewer
-        L and H are not constants of a frame: both are 0. A light that is off has vectors and colours of 0:
-        its terms are 0, and the compact style spends no cycle on them. Fresnel's reflection of a distant
-        light and viewer is a constant, and part of the specular colour.
+        viewer (``L = -V``) has no half-way vector, and no specular light but that of R·V. With point lights
+        or a near viewer L and H are not constants of a frame: both are 0. A light that is off has vectors and
+        colours of 0: its terms are 0, and the compact style spends no cycle on them. Fresnel's reflection of
+        a distant light and viewer is a constant, and part of the specular colour.
 
         With ``energy`` the highlight is that of the energy-normalised form: the factor of
         `ReflectionModel.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
@@ -123,6 +129,8 @@ class FrameConstants:
             given.
         index : int
             Index of the material.
+        mirror : bool
+            Whether the highlight is one of R·V.
 
         Raises
         ------
@@ -152,7 +160,7 @@ class FrameConstants:
             has_halfway = np.any(between)
             if has_halfway:
                 halfway[index] = quantise(between)
-            if scene.local or has_halfway:
+            if scene.local or has_halfway or mirror:
                 reflection = material.reflection(distant_cosine(light, scene.distant_viewer))
                 highlight = factor * reflection * light.color
                 if energy is not None and highlight.max() > MAX_INTENSITY:
@@ -216,11 +224,16 @@ _MEANINGS = {
     "lobe": "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins",
     "threshold": "of the table: where its highlight ends; {threshold}",
     "bank": "bank of the material's table",
-    "direction": "unit vector to the light, SQ(1, 17)",
-    "halfway": "unit half-way vector, SQ(1, 17)",
     "diffuse": "diffuse colour, red green blue, UQ(11, 6)",
     "specular": "specular colour, red green blue, UQ(11, 6)",
 }
+
+VECTOR_MEANINGS = {
+    "normals": {"direction": "unit vector to the light", "halfway": "unit half-way vector"},
+    "vectors": {"direction": "sin a, 0, cos a of the light's frame", "halfway": "not read"},
+    "values": {"direction": "not read", "halfway": "not read"},
+}
+"""What the vectors of a light are, by what a span brings, see `Design.span_members`."""
 
 
 def address_table(
@@ -229,6 +242,7 @@ def address_table(
     banks: int = 0,
     threshold: Format | None = None,
     loads_tables: bool = False,
+    members: str = "normals",
 ) -> list[str]:
     """Lines of text with the address and format of every frame constant of a pipeline.
 
@@ -242,7 +256,11 @@ def address_table(
         Format of the threshold of each table; ``None``: tables have none.
     loads_tables : bool
         Whether tables are loaded.
+    members : str
+        What a span brings, see `Design.span_members`.
     """
+    vectors = {name: f"{text}, SQ(1, 17)" for name, text in VECTOR_MEANINGS[members].items()}
+    meanings = _MEANINGS | vectors
     rows = [(first, count, name) for name, (first, count) in FIELDS_OF_A_FRAME.items()]
     if materials > 1:
         rows.append((MATERIAL_ADDRESS, 1, "material"))
@@ -259,5 +277,5 @@ def address_table(
     for first, count, name in rows:
         last = f" to {first + count - 1}" if count > 1 else ""
         light = f" (light {first // LIGHT_STRIDE - 1})" if first >= LIGHT_STRIDE else ""
-        lines.append(f"  {first:>3}{last:<8} {_MEANINGS[name].format(threshold=threshold)}{light}")
+        lines.append(f"  {first:>3}{last:<8} {meanings[name].format(threshold=threshold)}{light}")
     return lines

@@ -23,7 +23,7 @@ PORT_DESCRIPTIONS = {
     "o_last": "last pixel of its span",
     "write_address": "frame constant to write, see above",
     "write_data": "its code; accepted when no span is inside",
-    "status_out_of_range_spans": "spans since reset of an angle that the method does not serve, up to 65535",
+    "status_out_of_range_spans": "spans since reset beyond what the method serves, up to 65535",
     "status_wide_spans": "spans since reset wider than the error bound of the exponent allows, up to 65535",
     "status_empty_spans": "spans of length 0 since reset, up to 65535",
     "status_overrun": "a span went past the largest column",

@@ -53,7 +53,7 @@ PORT_DESCRIPTIONS = {
     "status_pixels": "pixels shaded",
     "status_hidden": "of them those behind what was drawn before",
     "status_dropped": "pixels of spans that the coarse depth test dropped before shading",
-    "status_out_of_range_spans": "spans of an angle that the method does not serve",
+    "status_out_of_range_spans": "spans beyond what the method serves",
     "status_wide_spans": "spans wider than the error bound of the exponent allows",
     "memory_read_place": "pixel whose depth is read",
     "memory_read_enable": "reads; else the data stays",

@@ -12,6 +12,7 @@ from blysk.golden.frame_constants import (
     LOBE_ADDRESS,
     MATERIAL_ADDRESS,
     THRESHOLD_ADDRESS,
+    VECTOR_MEANINGS,
 )
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import LIMIT_BITS
@@ -151,8 +152,6 @@ _OF_A_FRAME = {
     "ambient": "ambient colour, 255 times its value",
 }
 _OF_A_LIGHT = {
-    "direction": "unit vector to the light, component times 2^17 - 1",
-    "halfway": "unit half-way vector, component times 2^17 - 1",
     "diffuse": "diffuse colour, 255 times coefficient times light",
     "specular": "specular colour, 255 times coefficient times light",
 }
@@ -193,8 +192,13 @@ def constant_registers(design: Design) -> list[Register]:
     if design.banks > 1:
         width = (design.banks - 1).bit_length()
         rows.append(("bank", BANK_ADDRESS, width, False, "", "bank of a material's table"))
+    one = "2^17 - 2" if design.takes_vectors else "2^17 - 1"
+    texts_of_a_light = _OF_A_LIGHT | {
+        name: text if text == "not read" else f"{text}, component times {one}"
+        for name, text in VECTOR_MEANINGS[design.span_members].items()
+    }
     for light in range(design.lights):
-        add(f"light{light}_", (light + 1) * LIGHT_STRIDE, FIELDS_OF_A_LIGHT, _OF_A_LIGHT)
+        add(f"light{light}_", (light + 1) * LIGHT_STRIDE, FIELDS_OF_A_LIGHT, texts_of_a_light)
     ranges = {"material": (0, design.materials - 1), "bank": (0, design.banks - 1)}
     return [
         Register(

@@ -248,26 +248,35 @@ def header_of(unit: ShadingUnit) -> list[str]:
 def _vector_lines(made: Design) -> list[str]:
     """How the vectors of spans are made, for a method that takes them."""
     model = made.vector_spans
-    across = ["y times cos a"] if model.mirror else []
-    further = ["; y sin a of light 0 comes last"] if model.mirror else []
+    mirrored = ["y_k is times cos a of light k; s0 is y of light 0 times its sin a."] if model.mirror else []
     axes = (
-        "Frame of a light: z = H = (L + V)/|L + V|, x = (L - V)/|L - V|, y = z x x; so L = (sin a, 0, cos a)."
+        [
+            "Frame of light k, L and V unit vectors to it and to the viewer: z = (L + V)/|L + V|,",
+            "x = (L - V)/|L - V|, y = cross product z x x. So L = (sin a, 0, cos a), V = (-sin a, 0, cos a).",
+            "L = V: any x across z, sin a = 0. L = -V: x = L, any z across x, cos a = 0"
+            + ("." if model.mirror else ", specular colour 0."),
+        ]
         if model.highlights
-        else "Frame of light 0: z = L, x and y across it; of a further light z alone counts."
+        else [
+            "Frame of light 0: z = L, x and y across it. Of a further light z = L alone. L, H are not read."
+        ]
     )
+    constants = [
+        f"constants: of L write sin a, 0, cos a, times {model.ONE}; H is not read",
+    ]
     return [
-        axes,
-        f"i_start: components {', '.join(model.components)} of v = N/W at the first pixel centre"
-        + "".join(f", {text}" for text in across)
-        + "".join(further)
-        + ";",
-        f"N/W is linear on the screen. Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends by",
-        "one power of two, so that the largest component is 1/2 to 1.",
+        *axes,
+        "v = N/W, linear on the screen over a triangle: corner normals over their W, interpolated.",
+        f"i_start: components {', '.join(model.components)} of v at the first pixel centre.",
+        *mirrored,
+        f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one power of two, so",
+        "that the largest component at an end is 1/2 to 1; the scale is forgotten.",
         "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), times",
-        "2^i_exponent; i_exponent as large as fits, at most ceil(log2(length - 1)) + 3.",
+        "2^i_exponent. i_exponent: the largest with which i_step fits, at most ceil(log2(length - 1)) + 3.",
         "Halve a span where |v| at its ends differs by a factor over 2, or where they are over 90 degrees",
-        "apart. Give a span of two pixels as two of one, whose step is 0.",
-        f"constants: of L write sin a and cos a, times {model.ONE}, to words 0 and 2; H is not read",
+        "apart. Give a span of two pixels as two of one, whose step is 0. A span with a pixel of |v| under",
+        "1/128, which these cuts exclude, is wrong, and counted in status_out_of_range_spans.",
+        *(constants if model.highlights else []),
     ]
 
 
@@ -450,7 +459,7 @@ def verilog_and_unit(
     p = design
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
-    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads)
+    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads, p.span_members)
     core = unit.framing.core if isinstance(unit, BusUnit) else unit
     if isinstance(core, GeometryUnit):
         lines = _geometry_header(core)

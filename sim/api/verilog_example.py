@@ -5,6 +5,7 @@ import numpy as np
 from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.camera import Camera
@@ -60,11 +61,23 @@ def example_of(design: Design) -> list[str]:
 
 def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
     steps, octaves = lobe.steps, lobe.octaves
+    operand, parts, first = "u", [], "u = 1 - N.H"
+    if isinstance(lobe, QuotientLobe):
+        operand = "s"
+        first = "s = (1 - R.V)/2" if lobe.model.MIRROR else "s = 1 - (N.H)^2"
+        if lobe.parts == 2:
+            half = lobe.entries // 2
+            parts = [
+                f"  these are {half} values; then as many of the same highlight by c = (N.H)^2 for s, "
+                "from c = 0 on; last c = 1"
+            ]
     return [
         f"Table, {len(table)} writes to address {LOBE_ADDRESS} in this order: 2^17 + bank, then "
-        f"{lobe.entries + 1} values of the highlight S(u), u = 1 - N.H, times 2^17 (1 is 2^17 - 1):",
-        f"  row r = 0 to {octaves}, step k = 0 to {steps - 1}: u = k / {steps} 2^-{octaves} in row 0, "
-        f"(1 + k / {steps}) 2^(r - {octaves + 1}) from row 1 on; last u = 1",
+        f"{lobe.entries + 1} values of the highlight S({operand}), {first}, times 2^17 (1 is 2^17 - 1):",
+        f"  row r = 0 to {octaves}, step k = 0 to {steps - 1}: {operand} = k / {steps} 2^-{octaves} in row "
+        f"0, (1 + k / {steps}) 2^(r - {octaves + 1}) from row 1 on"
+        + ("" if parts else f"; last {operand} = 1"),
+        *parts,
         "  each rounded to the nearest; between two of them the highlight is a straight line. The "
         "example's are moved against that line's error by half of it, which halves it; S itself will do",
         f"  of the example: {', '.join(map(str, table[:6]))}, ..., {', '.join(map(str, table[-4:]))}; entry "

@@ -2,10 +2,12 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import blysk
-from blysk.golden.frame_constants import LOBE_ADDRESS
+from blysk.golden.bus.registers import constant_registers
+from blysk.golden.frame_constants import LOBE_ADDRESS, address_table
 from blysk.golden.presets import preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -31,6 +33,43 @@ def test_values_follow_from_the_text(materials):
     exact = REFLECTION_MODELS["blinn"].reflect(1 - 1.5 * 2.0 ** (10 - 21), EXPONENT)
     assert abs(entry / 2**17 - float(exact)) < 0.1 / 255
     assert any(f"writes to address {LOBE_ADDRESS} " in line for line in lines)
+
+
+@pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_table_of_quotients_follows_from_the_text(model):
+    """By s = 1 - (N.H)^2, then by (N.H)^2; or by (1 - R.V)/2 alone. L is that of the light's frame."""
+    design = preset("quotient", model)
+    lines = example_of(design)
+    found = writes_in(line for line in lines if line.startswith("  ") and "entry" not in line)
+    assert [found[k] for k in (16, 17, 18)] == [0, 0, 2**17 - 2]
+    (text,) = (line for line in lines if "writes to address" in line)
+    assert ("s = (1 - R.V)/2" if model == "phong" else "s = 1 - (N.H)^2") in text
+    table = design.specular.table(EXPONENT).writes(0)["value"][1:]
+    cosine_of = {"phong": [lambda s: 1 - 2 * s], "blinn": [lambda s: np.sqrt(1 - s), np.sqrt]}[model]
+    assert len(cosine_of) == 1 + any("by c = (N.H)^2 for s" in line for line in lines)
+    for part, cosine in enumerate(cosine_of):
+        for row, step in ((15, 0), (12, 3), (3, 15), (0, 8)):
+            s = (1 + step / 16) * 2.0 ** (row - 16) if row else step / 16 * 2.0**-15
+            exact = REFLECTION_MODELS[model].reflect(cosine(s), EXPONENT)
+            assert abs(table[256 * part + 16 * row + step] / 2**17 - exact) < 0.1 / 255
+
+
+def test_vectors_are_said_to_be_what_is_read():
+    """The half-way vector is read by no method of vectors or values, and L is in its own frame."""
+    for method, direction, halfway in (
+        ("chord", "unit vector to the light", "unit half-way vector"),
+        ("quotient", "sin a, 0, cos a of the light's frame", "not read"),
+        ("chord-local", "not read", "not read"),
+    ):
+        design = preset(method, "blinn")
+        lines = address_table(1, members=design.span_members)
+        assert [line.split(maxsplit=3)[3] for line in lines[2:4]] == [
+            f"{text}, SQ(1, 17) (light 0)" for text in (direction, halfway)
+        ]
+        texts = {register.name: register.text for register in constant_registers(design)}
+        assert texts["light0_direction_x"].startswith(direction)
+        assert texts["light0_halfway_z"].startswith(halfway)
+    assert texts["light0_direction_x"] == "not read"
 
 
 def test_no_example_of_a_table_that_is_fixed_for_another_exponent():
