@@ -244,6 +244,11 @@ class Design:
         return self.interpolator.TAKES_VECTORS
 
     @property
+    def mirror(self) -> bool:
+        """Whether the highlight is one of R·V, not of N·H."""
+        return self.specular is not None and self.specular.model.MIRROR
+
+    @property
     def span_members(self) -> str:
         """What spans carry: ``"normals"``, ``"values"`` or ``"vectors"``."""
         return "values" if self.takes_values else "vectors" if self.takes_vectors else "normals"

@@ -81,7 +81,8 @@ def specialise(
     These are left out: lights that light nothing; the specular path, if no span has specular light; the
     highlight gate, if there is nothing to gate; the memory of materials, if all are equal; the PROM, if there
     is one exponent; two of three channels, if all colours are grey; and the upper bits of coordinates and
-    lengths. The words of the arithmetic keep their widths, so that every pixel stays the same. If not
+    lengths. The words of the arithmetic keep their widths, so that every pixel stays the same. Vectors of
+    spans depend on all lights and on the highlights: a method that takes them keeps both. If not
     ``exact`` and all spans are short, the differences of the chord method also get fewer bits: the error
     bound stays, pixels may change.
 
@@ -104,13 +105,14 @@ def specialise(
     if full is None:
         lights, materials = max(len(scenes[0].lights), 1), len(scenes[0].materials)
         full = preset("chord", "cosquad", lights=lights, materials=materials, gate=True)
-    scenes, unlit = _without_dark_lights(scenes, full)
+    scenes, unlit = _without_dark_lights(scenes, full, exact)
     scenes, merged = _without_equal_materials(scenes, full)
     reductions = [*unlit, *merged]
     design = Specialisation(full, tuple(reductions), scenes).design
     constants = constants_of(scenes[0], design)
     prepared = [prepare(scene, design) for scene in scenes]
-    reductions += _without_highlights(design, prepared, constants)
+    if not (exact and design.takes_vectors):
+        reductions += _without_highlights(design, prepared, constants)
     reductions += _with_fixed_values(design, constants, reductions)
     longest = max(int(frame.spans.length.max(initial=0)) for frame in prepared)
     reductions += _with_fewer_bits(full, scenes[0], longest)
@@ -119,19 +121,21 @@ def specialise(
     return Specialisation(full, tuple(reductions), scenes)
 
 
-def _constants(scene: Scene, lights: int | None) -> list[FrameConstants]:
-    return [FrameConstants.of(scene, lights, index=index) for index in range(len(scene.materials))]
+def _constants(scene: Scene, lights: int | None, mirror: bool = False) -> list[FrameConstants]:
+    return [
+        FrameConstants.of(scene, lights, index=index, mirror=mirror) for index in range(len(scene.materials))
+    ]
 
 
 def _without_dark_lights(
-    scenes: tuple[Scene, ...], full: Design
+    scenes: tuple[Scene, ...], full: Design, exact: bool
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
-    constants = _constants(scenes[0], full.lights)
+    constants = _constants(scenes[0], full.lights, full.mirror)
     bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
     if full.interpolator.CUT_BY_ERROR and bright.any():
         # Spans are cut by those of every light that is on, whether it shows or not.
         bright[: len(scenes[0].lights)] |= [light.is_on for light in scenes[0].lights]
-    if bright.all():
+    if bright.all() or (exact and full.takes_vectors and bright.any()):
         return scenes, []
     count = int(np.count_nonzero(bright))
     kept = tuple(light for light, lit in zip(scenes[0].lights, bright, strict=False) if lit)
@@ -150,7 +154,7 @@ def _without_equal_materials(
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     keys = [
         (*of.writes()["data"].tolist(), full.highlight_parameter(material), material.two_sided)
-        for of, material in zip(_constants(scenes[0], None), scenes[0].materials, strict=True)
+        for of, material in zip(_constants(scenes[0], None, full.mirror), scenes[0].materials, strict=True)
     ]
     first: dict[tuple, int] = {}
     index = np.array([first.setdefault(key, len(first)) for key in keys])

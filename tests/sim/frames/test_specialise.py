@@ -42,8 +42,7 @@ def full_of(scene, **options):
 
 
 def pixels_of(scene, design):
-    constants = [FrameConstants.of(scene, design.lights, index=k) for k in range(design.materials)]
-    return design.compute(prepare(scene, design).spans, constants)
+    return design.compute(prepare(scene, design).spans, constants_of(scene, design))
 
 
 def fitted(scene, full):
@@ -68,6 +67,19 @@ def reasons(special):
         for key, value in reduction.changes.items()
         for name in (value if isinstance(value, dict) else [key])
     }
+
+
+def test_vectors_keep_lights_and_highlights():
+    """Vectors depend on both: without one of them a pixel of this frame changes."""
+    matt = replace(CLAY, specular=(0, 0, 0))
+    scene = scene_of(matt, size=(160, 120), mesh=teapot(992))
+    full = full_of(scene, method="quotient", model="blinn", gate=False)
+    assert not {"specular", "lights"} & set(reasons(fitted(scene, full)))
+    assert "specular" in reasons(specialise(scene, full, exact=False))
+    scene = scene_of(lights=(Light((0, 0, -1), (0, 0, 0)), KEY), size=(160, 120), mesh=teapot(992))
+    full = full_of(scene, method="quotient", model="phong", gate=False)
+    assert not {"specular", "lights"} & set(reasons(fitted(scene, full)))
+    assert "lights" in reasons(specialise(scene, full, exact=False))
 
 
 def test_everything_is_needed():
