@@ -171,7 +171,10 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
     """
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
-    constants = [FrameConstants.of(scene, design.lights, index=index) for index in range(design.materials)]
+    constants = [
+        FrameConstants.of(scene, design.lights, index=index, mirror=design.mirror)
+        for index in range(design.materials)
+    ]
     if design.takes_vectors:
         frames = light_frames(scene, design.lights)
         codes = np.zeros((design.lights, 3), dtype=np.int64)

@@ -231,8 +231,8 @@ def intensity(
     ``I = k_a I_a + sum_i a_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6), where a_i is
     `Light.factor`. The cosine of a mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of
     the other models N·H. A light with ``N·L <= 0`` has neither diffuse nor specular term; a light with
-    ``L = -V`` has no half-way vector and no specular term. A point light has no terms at the point where it
-    is. k_s is `Material.reflection` at the V·H of a distant light and viewer.
+    ``L = -V`` has no half-way vector, and no specular term but that of a mirror model. A point light has no
+    terms at the point where it is. k_s is `Material.reflection` at the V·H of a distant light and viewer.
 
     Parameters
     ----------
@@ -271,7 +271,8 @@ def intensity(
         direction = light.towards(points)
         cosine = _dot(normals, direction)
         halfway = halfway_vector(direction, viewer)
-        if not (halfway.any() and any(material.specular)):
+        has_highlight = np.True_ if model.MIRROR else halfway.any(axis=-1)
+        if not (has_highlight.any() and any(material.specular)):
             highlight_cosine = None
         elif model.MIRROR:
             highlight_cosine = 2 * cosine * _dot(normals, viewer) - _dot(direction, viewer)
@@ -283,7 +284,7 @@ def intensity(
         specular = light.color * material.reflection(constant)
         factor = light.factor(points)
         given = cosine * factor, highlight_cosine, factor
-        _add_light(total, material, light, specular, *given, halfway.any(axis=-1), model)
+        _add_light(total, material, light, specular, *given, has_highlight, model)
     return total
 
 
@@ -329,7 +330,7 @@ def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _add_light(
-    total, material, light, specular, cosine, highlight_cosine, factor, has_halfway, model
+    total, material, light, specular, cosine, highlight_cosine, factor, has_highlight, model
 ) -> None:
     """Add both terms of a light in place; without a cosine of the highlight, the diffuse term alone.
 
@@ -339,7 +340,7 @@ def _add_light(
     total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
     if highlight_cosine is not None:
         highlight = model.reflect(highlight_cosine, material.parameter(model))
-        highlight = np.where((cosine > 0) & has_halfway, highlight, 0.0)
+        highlight = np.where((cosine > 0) & has_highlight, highlight, 0.0)
         total += (factor * highlight)[..., np.newaxis] * specular
 
 

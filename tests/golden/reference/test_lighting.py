@@ -92,14 +92,18 @@ def test_light_behind_gives_nothing(model):
 
 
 @pytest.mark.parametrize("model", REFLECTION_MODELS)
-def test_light_opposite_to_the_viewer_has_no_highlight(model):
+def test_light_opposite_to_the_viewer_has_no_highlight_of_a_halfway_vector(model):
+    """There is no H; R·V is 1 - 2 (N·L)^2, and needs none."""
     material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
     direction = normalise([1, 2, 3])
     light = Light(-direction)
     assert (halfway_vector(light.direction, direction) == 0).all()
     normals = random_units(50, 3)
     found = intensity(normals, material, [light], grey(1), direction, REFLECTION_MODELS[model])
-    expected = 0.1 + 0.7 * np.maximum(normals @ -direction, 0)
+    cosine = normals @ -direction
+    expected = 0.1 + 0.7 * np.maximum(cosine, 0)
+    if REFLECTION_MODELS[model].MIRROR:
+        expected += 0.5 * np.where(cosine > 0, np.maximum(1 - 2 * cosine**2, 0), 0)
     assert found == pytest.approx(np.repeat(expected[:, np.newaxis], 3, axis=1), abs=1e-14)
 
 
