@@ -280,7 +280,7 @@ class ShadingPipelineUnit(wiring.Component):
         """Accept spans and writes; whether a span of a pixel or more is accepted on this cycle.
 
         A span is accepted if every sink is ready, and then by all of them on the same cycle; writes, while no
-        span is inside.
+        span is inside. An interpolator that takes the words of a span in turns has `begun` it before.
 
         Parameters
         ----------
@@ -292,9 +292,13 @@ class ShadingPipelineUnit(wiring.Component):
             Valid and ready of each unit that takes spans.
         """
         admit, nonempty, settled, unlocked, written = (Signal() for _ in range(5))
+        idle, write_waits = Signal(name="idle", init=1), self.write.valid
+        hold = ~idle
+        if (begun := getattr(self._interpolator, "begun", None)) is not None:
+            hold, write_waits = hold | begun, write_waits & ~begun
         m.d.comb += [
             nonempty.eq(self.i.valid & (self.i.payload.length != 0)),
-            unlocked.eq(~self.write.valid & ~written & settled),
+            unlocked.eq(~write_waits & ~written & settled),
             self.i.ready.eq(reduce(and_, (ready for _, ready in sinks), unlocked)),
             admit.eq(nonempty & self.i.ready),
         ]
@@ -307,10 +311,10 @@ class ShadingPipelineUnit(wiring.Component):
         m.d.sync += written.eq(self.write.valid & self.write.ready)
         # Without the spans of the last cycle, so that no path leads from the ports into the sum.
         inside = Signal(range(self.spans_inside + 1))
-        came, went, idle = Signal(name="came"), Signal(name="went"), Signal(name="idle", init=1)
+        came, went = Signal(name="came"), Signal(name="went")
         finished = self.o.valid & self.o.ready & self.o.payload.last
         is_one = Mux(came ^ went, inside == Mux(went, 2, 0), inside == 1)
-        m.d.comb += frame.hold.eq(~idle)
+        m.d.comb += frame.hold.eq(hold)
         m.d.sync += [
             came.eq(admit),
             went.eq(finished),

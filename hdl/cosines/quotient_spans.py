@@ -77,10 +77,13 @@ class QuotientSpansUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(vectors_shape(parameters, length_bits)))`
         Spans of length 1 or more. A span of two pixels or more waits for two cycles before it is accepted.
+        Payload and constants have to stay from the first cycle on which it is valid; valid may fall.
     o : :py:`Out(stream.Signature(pixel_words_shape(parameters)))`
         Words of pixels, and a bit that alternates from span to span, 1 in the first.
     constants : :py:`In(line_directions_shape(parameters))`
         ``sin a`` and ``cos a`` of each light, constant while spans are inside; only with highlights.
+    begun : :py:`Out(1)`
+        Whether words of the span that is offered were taken already.
 
     Source: docs/theory/quotient.md#span.
     """
@@ -101,6 +104,7 @@ class QuotientSpansUnit(wiring.Component):
         members = {
             "i": In(stream.Signature(vectors_shape(p, length_bits))),
             "o": Out(stream.Signature(pixel_words_shape(p))),
+            "begun": Out(1),
         }
         if p.highlights:
             members["constants"] = In(line_directions_shape(p))
@@ -212,6 +216,7 @@ class QuotientSpansUnit(wiring.Component):
         m.d.comb += [
             ends.eq(Mux(kind == _Kind.START, ~span.length[1:].any(), kind == _Kind.SECOND)),
             self.i.ready.eq(moves & ends),
+            self.begun.eq(kind != _Kind.START),
         ]
         with m.If(self.i.valid & moves):
             m.d.sync += Value.cast(kind).eq(Mux(ends, 0, Value.cast(kind) + 1))

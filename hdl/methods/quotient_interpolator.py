@@ -1,6 +1,7 @@
 """The quotient method: N·L and highlights as quotients of quadratics, without a unit normal."""
 
 from amaranth.hdl import Module, Signal
+from amaranth.lib.wiring import Out
 
 from blysk.golden.cosines.quotient import Quotient
 from blysk.golden.cosines.quotient_spans import QuotientSpans
@@ -30,6 +31,11 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
     options
         As for `InterpolatorUnit`. The method has one setup interval.
 
+    Members
+    -------
+    begun : :py:`Out(1)`
+        Whether words of the span that is offered were taken already: payload and constants have to stay.
+
     Source: docs/theory/quotient.md.
     """
 
@@ -44,6 +50,10 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
     def span_options(cls, parameters):
         """Whether y is multiplied by cos a."""
         return {"mirror": parameters.mirror}
+
+    def further_members(self):
+        """``begun``, for the pipeline."""
+        return {"begun": Out(1)}
 
     def __init__(self, parameters: QuotientInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
@@ -61,7 +71,11 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
         m.submodules.quotient = quotient = self._quotient
         for name in self.i.payload.shape().members:
             m.d.comb += spans.i.payload[name].eq(self.i.payload[name])
-        m.d.comb += [spans.i.valid.eq(self.i.valid), self.i.ready.eq(spans.i.ready)]
+        m.d.comb += [
+            spans.i.valid.eq(self.i.valid),
+            self.i.ready.eq(spans.i.ready),
+            self.begun.eq(spans.begun),
+        ]
         if self.highlights:
             for given, light in zip(spans.constants, self.constants, strict=True):
                 m.d.comb += [given[0].eq(light.direction[0]), given[1].eq(light.direction[2])]
