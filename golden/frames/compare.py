@@ -10,6 +10,7 @@ import numpy as np
 
 from blysk.golden.frames.frame import Frame
 from blysk.golden.frames.local import line_ends, local_operands
+from blysk.golden.frames.quotient_bound import quotient_bound
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
@@ -165,7 +166,7 @@ def target_of(design: Design) -> ReflectionModel:
     return _model_of(design) if design.loads_tables else BLINN
 
 
-def error_bound(scene: Scene, design: Design) -> float | None:
+def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> float | None:
     """Bound of the error against exact normals of every pixel with the same model, in LSB.
 
     Let c be the largest channel of all terms together: over the materials the largest sum over the lights of
@@ -183,14 +184,18 @@ def error_bound(scene: Scene, design: Design) -> float | None:
     ----------
     scene, design
         As for `compare`.
+    cut : Raster, optional
+        The spans that were shaded. With them ``quotient`` has a bound, see `quotient_bound`.
 
     Returns
     -------
     float or None
         The bound of the method error; ``None`` where no bound is known: of another method than ``chord``,
-        ``chord-local`` and ``renormalise``, of a pipeline that was not made for the scene's materials, of a
-        measured curve, and of a roughness under `LEAST_ROUGHNESS`.
+        ``chord-local``, ``renormalise`` and ``quotient``, of a pipeline that was not made for the scene's
+        materials, of a measured curve, and of a roughness under `LEAST_ROUGHNESS`.
     """
+    if design.takes_vectors and design.specular is not None and design.lights and cut is not None:
+        return quotient_bound(scene, design, cut)
     if design.method not in _BOUNDED or design.specular is None:
         return None
     lobe, model = design.specular, _model_of(design)
@@ -303,7 +308,7 @@ def _compare(
     nothing = FrameErrors(*[math.nan] * len(fields(FrameErrors)))
     mask, model = visible_mask(scene, raster), _model_of(design)
     target = target_of(design)
-    bound = None if cut_raster is None else error_bound(scene, design)
+    bound = None if cut_raster is None else error_bound(scene, design, cut_raster)
     figures: dict[str, Any] = {"target": target.name, "bound_lsb": bound, "arithmetic_error": nothing}
     figures["step_lsb"] = highlight_step(scene, model)
     figures["border"] = "|N.L| or |N.H|" if figures["step_lsb"] else "|N.L|"

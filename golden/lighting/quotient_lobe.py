@@ -118,6 +118,21 @@ class QuotientLobe(Lobe):
                 )
         return super().table(parameter)
 
+    def line_error(self, parameter: float | None) -> float:
+        """Largest error of the lines between entries, at seven places of each step that is used."""
+        values, knots = self.table(parameter).values.values, self.knots
+        used = knots[:-1] <= 1 / 2
+        share = np.arange(1, 8)[:, np.newaxis] / 8
+        middles = knots[:-1][used] + np.diff(knots)[used] * share
+        parts = [1 - 2 * middles] if self.model.MIRROR else [np.sqrt(1 - middles), np.sqrt(middles)]
+        largest = 0.0
+        for part, cosine in enumerate(parts):
+            first = part * (len(knots) - 1)
+            entry = values[first : first + len(knots)]
+            line = (1 - share) * entry[:-1][used] + share * entry[1:][used]
+            largest = max(largest, float(np.abs(line - self.model.reflect(cosine, parameter)).max()))
+        return largest
+
     def argument(self, operand):
         """The place itself.
 

@@ -140,17 +140,19 @@ class QuotientErrors:
         Parameters
         ----------
         vectors : SpanVectors
-            Vectors of the spans, one at least. The first three components have the length of v.
+            Vectors of the spans, one at least.
         length : int array, shape (spans,)
             Pixels.
         mirror : bool
             Whether the highlight is one of R·V.
         """
-        start = vectors.start[:, :3].astype(np.float64)
+        # The components whose squares are q, in the frame of the first light.
+        own = [0, 1, 2, -1] if mirror else [0, 1, 2]
+        start = vectors.start[:, own].astype(np.float64)
         last = np.asarray(length, dtype=np.float64) - 1
         way = vectors.step * np.ldexp(last, -vectors.exponent)[:, np.newaxis]
         difference = np.where(last > 0, np.maximum(np.abs(way).max(axis=1) * 2.0**-17, 1 / 16), 0)
-        way = way[:, :3]
+        way = way[:, own]
         # The shortest vector on the segment between the ends.
         square = np.einsum("si,si->s", way, way)
         t = np.clip(-np.einsum("si,si->s", start, way) / np.where(square, square, 1), 0, 1)

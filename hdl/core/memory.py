@@ -6,7 +6,18 @@ from amaranth.lib.memory import Memory, WritePort
 
 from blysk.hdl.core.stream import require_same_shape
 
-__all__ = ["LATE_FIFO_LATENCY", "UNCOUNTED", "connect_late_fifo", "connect_wide_fifo", "registered_read"]
+__all__ = [
+    "HEADED_FIFO_LATENCY",
+    "LATE_FIFO_LATENCY",
+    "UNCOUNTED",
+    "connect_headed_fifo",
+    "connect_late_fifo",
+    "connect_wide_fifo",
+    "registered_read",
+]
+
+HEADED_FIFO_LATENCY = 2
+"""Cycles that a payload takes through the empty FIFO of `connect_headed_fifo`."""
 
 LATE_FIFO_LATENCY = 4
 """Cycles that a payload takes through the empty FIFO of `connect_late_fifo`."""
@@ -148,3 +159,66 @@ def connect_wide_fifo(
         room.eq(following != depth),
         some.eq(following != 0),
     ]
+
+
+def connect_headed_fifo(
+    m: Module, name: str, source: stream.Interface, sink: stream.Interface, head: Value, depth: int
+) -> Signal:
+    """Connect two streams as `connect_wide_fifo` does; some bits of the first payload are in a register.
+
+    For a sink whose handshake depends on these bits: a payload itself is read late in a cycle. A payload
+    takes `HEADED_FIFO_LATENCY` cycles through the empty FIFO.
+
+    Parameters
+    ----------
+    m, name, source, sink
+        As for `connect_fifo`.
+    head : Value
+        Bits of the source's payload, or made from it.
+    depth : int
+        Payloads that the FIFO holds, a power of two.
+
+    Returns
+    -------
+    Signal
+        ``head`` of the payload on the sink.
+
+    Raises
+    ------
+    TypeError
+        As `connect_fifo`.
+    """
+    require_same_shape(source.payload.shape(), sink.payload.shape())
+    width, bits = Shape.cast(source.payload.shape()).width, (depth - 1).bit_length()
+    m.submodules[name] = memory = Memory(shape=width, depth=depth, init=[])
+    m.submodules[f"{name}_heads"] = heads = Memory(shape=len(head), depth=depth, init=[])
+    free, first, ahead = (Signal(bits, name=f"{name}_{word}") for word in ("free", "first", "ahead"))
+    room, some = Signal(name=f"{name}_room", init=1), Signal(name=f"{name}_some")
+    level, following = (Signal(range(depth + 1), name=f"{name}_{word}") for word in ("level", "following"))
+    found = Signal(len(head), name=f"{name}_head", reset_less=True)
+    comes, goes, fetches = source.valid & room, some & sink.ready, Signal(name=f"{name}_fetches")
+    read, of_heads = memory.read_port(domain="comb"), heads.read_port(domain="comb")
+    for port, value in ((memory.write_port(), source.payload), (heads.write_port(), head)):
+        # A word written without a payload is overwritten later.
+        m.d.comb += [port.data.eq(value), port.addr.eq(free), port.en.eq(room)]
+    m.d.comb += [
+        source.ready.eq(room),
+        sink.valid.eq(some),
+        read.addr.eq(first),
+        of_heads.addr.eq(ahead),
+        Value.cast(sink.payload).eq(read.data),
+        fetches.eq((free != ahead) & (~some | sink.ready)),
+        following.eq(level + comes - goes),
+    ]
+    m.d.sync += [
+        free.eq(free + comes),
+        first.eq(first + goes),
+        ahead.eq(ahead + fetches),
+        some.eq(fetches | (some & ~sink.ready)),
+        level.eq(following),
+        # The pointers tell of no more payloads than this.
+        room.eq(following < depth - 1),
+    ]
+    with m.If(fetches):
+        m.d.sync += found.eq(of_heads.data)
+    return found

@@ -11,8 +11,7 @@ from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.bits import select
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.memory import connect_wide_fifo
-from blysk.hdl.core.stream import SLICE_LATENCY
+from blysk.hdl.core.memory import HEADED_FIFO_LATENCY, connect_headed_fifo
 from blysk.hdl.cosines.quotient import pixel_words_shape
 
 __all__ = ["QuotientSpansUnit", "line_directions_shape", "vectors_shape"]
@@ -95,7 +94,7 @@ class QuotientSpansUnit(wiring.Component):
     """Stages of the sums, and of the shifted differences."""
 
     latency = _SHIFTED + 2
-    short_latency = _SUMS + SLICE_LATENCY + 1
+    short_latency = _SUMS + HEADED_FIFO_LATENCY + 1
     initiation_interval = 3
 
     def __init__(self, parameters: QuotientSpans | None = None, length_bits: int = LENGTH_BITS):
@@ -270,7 +269,10 @@ class QuotientSpansUnit(wiring.Component):
         if p.takes_heights:
             for light, height in enumerate(to_start.payload.heights):
                 m.d.comb += height.eq(delayed(begin[f"z{light}"], f"height_{light}", self._SUMS))
-        connect_wide_fifo(m, "starts", to_start, start, self.DEPTH)
+        # What decides when a start is taken is in a register.
+        length = to_start.payload.length
+        few = Cat(length[1:].any(), ~length[2:].any() & ~length[:2].all(), ~length[2:].any())
+        self._few = connect_headed_fifo(m, "starts", to_start, start, few, self.DEPTH)
 
         # Differences are shifted by their exponent.
         exponent = delayed(span.exponent, "exponent", self._SUMS)
@@ -326,8 +328,8 @@ class QuotientSpansUnit(wiring.Component):
         left, valid = Signal(self.length_bits), Signal()
         # Whether the second, the first differences of the next span were taken.
         has_second, self._ready = Signal(), Signal(name="ready")
-        length = start.payload.length
-        is_long = length[1:].any()
+        # Of the start that waits: two pixels and more; at most two; at most three.
+        is_long, at_most_two, at_most_three = self._few
         m.d.comb += [
             takes[0].eq(waits[0] & three & ~has_second),
             takes[1].eq(waits[1] & two & (has_second | takes[0]) & ~self._ready),
@@ -344,10 +346,10 @@ class QuotientSpansUnit(wiring.Component):
             with m.If(takes[2]):
                 m.d.sync += [
                     valid.eq(1),
-                    left.eq(length),
+                    left.eq(start.payload.length),
                     last.eq(~is_long),
-                    two.eq(~length[2:].any() & ~length[:2].all()),
-                    three.eq(~length[2:].any()),
+                    two.eq(at_most_two),
+                    three.eq(at_most_three),
                 ]
             with m.Else():
                 m.d.sync += [
