@@ -96,9 +96,8 @@ def test_a_wrong_sign_is_no_excuse(monkeypatch):
     across = normalise(viewer - (viewer @ light) * light)
     frame = Frame(flat(normalise(across + 0.002 * light)), 16, 12)
     constants = FrameConstants.of(frame.scene, 1)
-    monkeypatch.setattr(
-        sweep.FrameConstants, "of", lambda *_: replace(constants, direction=-constants.direction)
-    )
+    behind = replace(constants, direction=-constants.direction)
+    monkeypatch.setattr(sweep, "constants_of", lambda *_: [behind])
     (point,) = frame.points(1, ["blinn_product"])
     assert point.over == point.pixels > 20
     assert point.switched == 0

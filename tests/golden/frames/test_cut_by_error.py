@@ -7,7 +7,7 @@ import pytest
 
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cut_by_angle, cut_by_error, cut_spans
+from blysk.golden.frames.cut import cut_by_angle, cut_by_ends, cut_by_error, cut_spans
 from blysk.golden.frames.local import middle_normals
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.number.fixed import Fixed
@@ -171,17 +171,18 @@ def test_cut_by_error_of_every_method(method):
 
 
 def test_cut_spans_chooses():
-    """By error for methods with a fit, by angle alone for those that hold at every angle."""
+    """By error for methods with a fit, by their ends for vectors, by angle for all others."""
     rng = np.random.default_rng(8)
     scene, raster = lit_spans(rng, 300, rng.uniform(0, 120, 300), 30, 0.2)
     for method, interpolator in METHODS.items():
         design = preset(method, "cosquad", lights=2, materials=len(EXPONENTS))
         found, count = cut_spans(scene, raster, design)
         widest = min(map(interpolator.widest_span, EXPONENTS))
-        expected = (
-            cut_by_error(scene, raster, interpolator)
-            if interpolator.CUT_BY_ERROR
-            else cut_by_angle(raster, widest)
-        )
+        if interpolator.CUT_BY_ERROR:
+            expected = cut_by_error(scene, raster, interpolator)
+        elif interpolator.TAKES_VECTORS:
+            expected = cut_by_ends(raster, interpolator.LARGEST_RATIO)
+        else:
+            expected = cut_by_angle(raster, widest)
         assert count == expected[1]
         assert np.array_equal(found.length, expected[0].length)

@@ -88,7 +88,7 @@ def test_bad_option(refused, options, thing, says):
 
 @pytest.mark.parametrize("command", [["render", "teapot"], ["verilog", "-o", "core.v"]])
 def test_design_that_cannot_be(refused, command):
-    says = "the pipeline finds N.H, not R.V; use phong_coplanar, "
+    says = "finds N.H, not R.V; use method quotient; or phong_coplanar, "
     refused(*command, "--model", "phong", thing="--model phong", says=says)
     says = "method chord finds no normals"
     refused(*command, "--method", "chord", "--operand", "cosine", thing="--operand cosine", says=says)
