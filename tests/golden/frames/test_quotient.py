@@ -7,14 +7,20 @@ import pytest
 
 from blysk.golden.frames.compare import BORDER, compare
 from blysk.golden.frames.frame import model_frame
+from blysk.golden.frames.prepare import constants_of
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import fragment_normals, rasterise
+from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 
 LIGHT = (0.3, 0.2, 1.0)
+TABLE = 0.1
+"""LSB: largest error of the lines of a lobe's table."""
+COLOURS = 2 / 128
+"""LSB: rounding of two colour operands in ``UQ(11, 6)``."""
 SOFT = ((0.3, 0.1, 1), (-0.4, 0.3, 1), (0.1, -0.5, 1))
 GRAZING = ((1, 0.1, 0.1), (0.9, -0.3, -0.1), (0.8, 0.4, 0.05))
 BEHIND = ((1, 0.1, -0.3), (0.9, -0.3, -0.2), (0.8, 0.4, -0.5))
@@ -135,3 +141,117 @@ def test_local_lights_are_refused():
     scene = one(SOFT, lights=[Light(position=(1, 2, 3))])
     with pytest.raises(ValueError, match=r"need the method chord-local$"):
         model_frame(scene, preset("quotient", "phong"))
+
+
+GOALS = {"blinn": 0.60, "phong": 0.80, "ggx": 0.65, "beckmann": 0.65}
+"""Largest error of a pixel in LSB: of powers to 1000, of microfacets from roughness 0.2 on."""
+
+
+def shading_error(scene, model):
+    """Largest error of each triangle in LSB: of pixels, and of their intensity before it is rounded; a bound.
+
+    Without pixels whose N·L or N·H is within 0.002 of 0.
+    """
+    design = preset("quotient", model)
+    frame = model_frame(scene, design)
+    raster, cut, spans = frame.raster, frame.cut_raster, frame.prepared.spans
+    assert frame.out_of_range_spans == 0
+    (constants,) = constants_of(scene, design)
+    operands = design.interpolator.compute_vectors(
+        design.vector_spans, spans.vectors, spans.length, constants.direction
+    )
+    dark = np.zeros(operands.highlight.shape, dtype=bool)
+    term = design.specular.compute(operands.highlight, dark, constants.lobe).values[:, 0]
+    cosine = operands.cosine.values[:, 0]
+    (material,) = scene.materials
+    found = np.zeros(scene.width * scene.height)
+    lit = np.where(cosine > 0, material.diffuse[0] * cosine + material.specular[0] * term, 0)
+    found[cut.pixel[cut.visible]] = 255 * lit[cut.visible]
+
+    shown = np.flatnonzero(raster.visible)
+    pixel, triangle = raster.pixel[shown], raster.triangle[raster.span[shown]]
+    normals = fragment_normals(scene, raster, shown)
+    light = np.asarray(scene.lights[0].direction)
+    steady = np.abs(normals @ light) > BORDER
+    if model == "ggx":
+        steady &= np.abs(normals @ normalise(light + scene.camera.viewer)) > BORDER
+    exact = 255 * render(scene, "phong", design.specular.model, raster).image.reshape(-1, 3)[pixel, 0]
+    result = np.zeros((2, len(scene.mesh.faces)))
+    for row, values in zip(result, (frame.image.reshape(-1, 3)[:, 0], found), strict=True):
+        np.maximum.at(row, triangle, np.abs(values[pixel] - exact) * steady)
+    errors = design.interpolator.errors(spans.vectors, spans.length)
+    parameter = design.highlight_parameter(material)
+    terms = errors.cosine * material.diffuse[0], errors.highlight(design.specular.model, parameter)
+    return *result, 255 * (terms[0] + material.specular[0] * (terms[1] + TABLE / 255))
+
+
+def climb(model, parameter, seed, count, rounds, size=(100, 24)):
+    """Triangles, a light, and their errors: of many that are moved a little those that are more wrong stay.
+
+    W to 1:10,000, normals to 150 degrees apart, any light.
+    """
+    rng = np.random.default_rng(seed)
+    light = normalise(rng.normal(size=3) + np.array([0, 0, 0.5]))
+
+    def errors(places, depths, normals):
+        scene = scene_of(places, 10**depths, normals, [light], size)
+        name = "roughness" if model in ("ggx", "beckmann") else "exponent"
+        scene = replace(scene, material=replace(scene.material, **{name: parameter}))
+        pixel, term, bound = shading_error(scene, model)
+        assert term.max() <= bound
+        assert pixel.max() <= 0.5 + bound + COLOURS
+        return pixel, term
+
+    spread = 10 ** rng.uniform(-2, 0.5, (count, 1, 1))
+    state = [
+        rng.uniform(0, 1, (count, 3, 2)),
+        rng.uniform(0, 1, (count, 3)) * rng.uniform(0, 4, (count, 1)),
+        normalise(normalise(rng.normal(size=(count, 1, 3))) + spread * rng.normal(size=(count, 3, 3))),
+    ]
+    apart = _are_apart(state[2])
+    state[2][apart] = state[2][apart, :1]
+    pixel, best = errors(*state)
+    largest = pixel.max()
+    for turn in range(rounds):
+        if turn % 8 == 7:
+            kept = best.argsort()[::-1][np.arange(count) % (count // 4)]
+            state, best = [values[kept] for values in state], best[kept]
+        by = 10 ** rng.uniform(-4, -0.3, (count, 1, 1))
+        moves = [by * rng.normal(size=(count, 3, 3)) for values in state]
+        moved = [
+            np.clip(state[0] + moves[0][..., :2], 0, 1),
+            state[1] + 4 * moves[1][..., 0],
+            normalise(state[2] + moves[2]),
+        ]
+        moved[1] = np.minimum(moved[1] - moved[1].min(axis=1, keepdims=True), 4)
+        apart = _are_apart(moved[2])
+        for values, before in zip(moved, state, strict=True):
+            values[apart] = before[apart]
+        pixel, term = errors(*moved)
+        largest = max(largest, pixel.max())
+        better = term > best
+        for values, before in zip(moved, state, strict=True):
+            before[better] = values[better]
+        best = np.maximum(term, best)
+    return largest, best.max()
+
+
+def _are_apart(normals):
+    pairs = np.einsum("tik,tjk->tij", normals, normals)
+    return (pairs < np.cos(np.radians(150))).any(axis=(1, 2))
+
+
+@pytest.mark.parametrize(("model", "exponent"), [("blinn", 1000), ("phong", 1000)])
+def test_search_that_climbs(model, exponent):
+    """Each frame of the search is within the bound of its spans, and within the goal."""
+    largest, _ = climb(model, exponent, 5000, 12, 8)
+    assert largest < GOALS[model]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", GOALS)
+def test_long_search_that_climbs(model):
+    parameters = (0.2, 0.3, 0.5, 1.0) if model in ("ggx", "beckmann") else (1, 2, 10, 100, 1000)
+    for seed, parameter in enumerate(parameters):
+        largest, _ = climb(model, parameter, seed, 32, 60)
+        assert largest < (0.65 if model == "phong" and parameter <= 100 else GOALS[model])
