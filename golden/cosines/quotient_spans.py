@@ -8,7 +8,11 @@ import numpy as np
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 from blysk.golden.number.spans import checked_lengths, pixels_of
 
-__all__ = ["PixelWords", "QuotientSpans", "QuotientWords", "SpanVectors"]
+__all__ = ["MARGIN", "PixelWords", "QuotientSpans", "QuotientWords", "SpanVectors"]
+
+
+MARGIN = 4
+"""Steps from a component to 1: at the last pixel it is off by 2.5 at most, and at 1 it would wrap."""
 
 
 class SpanVectors(NamedTuple):
@@ -37,10 +41,10 @@ class SpanVectors(NamedTuple):
 
     @classmethod
     def quantise(cls, left: np.ndarray, right: np.ndarray, length: np.ndarray) -> "SpanVectors":
-        """Nearest codes of vectors at both ends, scaled by a power of two to fill the words.
+        """Nearest codes of vectors at both ends, scaled to fill the words.
 
-        The largest component of both ends is at least 1/2. The exponent is the largest with which the step
-        fits, but at most ``ceil(log2(m - 1)) + 3``.
+        The largest component of both ends is 1 less `MARGIN` steps of 2^-17. The exponent is the largest with
+        which the step fits, but at most ``ceil(log2(m - 1)) + 3``.
 
         Parameters
         ----------
@@ -63,8 +67,7 @@ class SpanVectors(NamedTuple):
         largest = np.maximum(np.abs(left), np.abs(right)).max(axis=1)
         if not (np.isfinite(largest) & (largest > 0)).all():
             raise ValueError("a span needs a vector at one of its ends that is finite and not 0")
-        # After rounding a component is at most 2^17 - 1.
-        scale = np.exp2(-np.ceil(np.log2(largest * (1 + 2.0**-bits))))[:, np.newaxis]
+        scale = ((1 - MARGIN * 2.0**-bits) / largest)[:, np.newaxis]
         step = (right - left) * scale / steps[:, np.newaxis]
         largest = np.maximum(np.abs(step).max(axis=1), 2.0**-60)
         fits = np.floor(-np.log2(largest * (1 + 2.0**-bits))).astype(np.int64)
@@ -149,7 +152,8 @@ class QuotientSpans:
 
     At pixel i the words are off by at most ``(i + i^2/2) 2^-47`` (m, w), ``i 2^-36`` (l), ``i 2^-29`` (z).
     As ``|v| < 2``, and m and w are convex along a span, no word wraps, if both ends of the span are in the
-    range of the components. A source of spans has to ensure that; `SpanVectors.quantise` does.
+    range of the components: also the last pixel, ``start + (K - 1) 2^-exponent step``, with a step that was
+    rounded. A source of spans has to ensure that; `SpanVectors.quantise` does by its margin.
 
     Parameters
     ----------

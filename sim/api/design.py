@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any, Literal, Unpack, cast
 
 from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.quotient_spans import MARGIN
 from blysk.golden.frame_constants import address_table
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.triangles import ATTRIBUTE
@@ -269,8 +270,8 @@ def _vector_lines(made: Design) -> list[str]:
         "v = N/W, linear on the screen over a triangle: corner normals over their W, interpolated.",
         f"i_start: components {', '.join(model.components)} of v at the first pixel centre.",
         *mirrored,
-        f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one power of two, so",
-        "that the largest component at an end is 1/2 to 1; the scale is forgotten.",
+        f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one factor, so",
+        f"that the largest component at an end is 1/2 to 1 - {MARGIN} 2^-17. At 1 it would wrap.",
         "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), times",
         "2^i_exponent. i_exponent: the largest with which i_step fits, at most ceil(log2(length - 1)) + 3.",
         "Halve a span where |v| at its ends differs by a factor over 2, or where they are over 90 degrees",

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
+from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
 from blysk.golden.number.spans import pixels_of
 
 LENGTHS = np.array([1, 3, 4, 5, 17, 100, 1000, 4095])
@@ -61,10 +61,11 @@ def test_vectors_against_float64():
         np.abs(vectors.start),
         np.abs(vectors.start + vectors.step * np.ldexp(length - 1.0, -vectors.exponent)[:, np.newaxis]),
     )
-    assert (ends.max(axis=1) >= 2**16 - 2).all()
+    assert (ends.max(axis=1) >= 2**17 - 2 * MARGIN).all()
     assert np.abs(vectors.start).max() < 2**17
     assert np.abs(vectors.step).max() < 2**17
-    scale = 2.0 ** np.round(np.log2(np.abs(vectors.start).max(axis=1) / np.abs(left).max(axis=1)))
+    longer = np.where((length > 1)[:, np.newaxis], np.maximum(np.abs(left), np.abs(right)), np.abs(left))
+    scale = (2**17 - MARGIN) / longer.max(axis=1)
     difference = np.abs(right - left).max(axis=1) * scale * (length > 1)
     for i in (0, 1, 2):
         place = np.minimum(i * (length - 1) // 2, length - 1)
@@ -72,6 +73,29 @@ def test_vectors_against_float64():
         found = vectors.start + vectors.step * np.ldexp(place.astype(float), -vectors.exponent)[:, np.newaxis]
         bound = 0.5 + np.maximum(1 / 16, difference * 2.0**-17)
         assert (np.abs(found - exact * scale[:, np.newaxis]).max(axis=1) <= bound).all()
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_no_word_wraps_at_the_last_pixel(mirror):
+    """Ends whose components are near 1, with a step that is rounded up: z is over 0 and no square wraps."""
+    rng = np.random.default_rng(6)
+    length = rng.integers(3, 40, 20_000)
+    model = QuotientSpans(mirror=mirror)
+    near, wide = (len(model.components), 1 - 10.0 ** rng.uniform(-6, -4, (len(length), 1)))
+    right = np.where(rng.random((len(length), near)) < 0.5, wide, wide**2)
+    left = right - rng.uniform(0, 2, right.shape)
+    # One of them as it was found: unit normals, the last 0.3 degrees from H.
+    left[0, :3], right[0, :3] = (-0.3084362, 0.869724, 0.38528857), (-0.00258714, -0.00318275, 0.99999159)
+    left[0, 3:] = right[0, 3:] = 0
+    length[0] = 4
+    vectors = SpanVectors.quantise(left, right, length)
+    pixels = model.compute(vectors, length, np.array([[0, QuotientSpans.ONE]]))
+    last = np.cumsum(length) - 1
+    assert not pixels.away[last].any()
+    for word in (pixels.numerator.codes[:, 0], pixels.rest.codes):
+        assert (word[last] > 0).all()
+    end = vectors.start + vectors.step * np.ldexp(length - 1.0, -vectors.exponent)[:, np.newaxis]
+    assert end.max() < 2**17
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blysk.golden.frames.compare import BORDER, compare
+from blysk.golden.frames.compare import BORDER, compare, error_bound
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.presets import preset
@@ -17,10 +17,6 @@ from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 
 LIGHT = (0.3, 0.2, 1.0)
-TABLE = 0.1
-"""LSB: largest error of the lines of a lobe's table."""
-COLOURS = 2 / 128
-"""LSB: rounding of two colour operands in ``UQ(11, 6)``."""
 SOFT = ((0.3, 0.1, 1), (-0.4, 0.3, 1), (0.1, -0.5, 1))
 GRAZING = ((1, 0.1, 0.1), (0.9, -0.3, -0.1), (0.8, 0.4, 0.05))
 BEHIND = ((1, 0.1, -0.3), (0.9, -0.3, -0.2), (0.8, 0.4, -0.5))
@@ -148,7 +144,8 @@ GOALS = {"blinn": 0.60, "phong": 0.80, "ggx": 0.65, "beckmann": 0.65}
 
 
 def shading_error(scene, model):
-    """Largest error of each triangle in LSB: of pixels, and of their intensity before it is rounded; a bound.
+    """Largest error of each triangle in LSB: of pixels, and of their intensity before it is rounded; and the
+    bound of their spans.
 
     Without pixels whose N·L or N·H is within 0.002 of 0.
     """
@@ -179,10 +176,7 @@ def shading_error(scene, model):
     result = np.zeros((2, len(scene.mesh.faces)))
     for row, values in zip(result, (frame.image.reshape(-1, 3)[:, 0], found), strict=True):
         np.maximum.at(row, triangle, np.abs(values[pixel] - exact) * steady)
-    errors = design.interpolator.errors(spans.vectors, spans.length)
-    parameter = design.highlight_parameter(material)
-    terms = errors.cosine * material.diffuse[0], errors.highlight(design.specular.model, parameter)
-    return *result, 255 * (terms[0] + material.specular[0] * (terms[1] + TABLE / 255))
+    return *result, error_bound(scene, design, cut)
 
 
 def climb(model, parameter, seed, count, rounds, size=(100, 24)):
@@ -198,8 +192,8 @@ def climb(model, parameter, seed, count, rounds, size=(100, 24)):
         name = "roughness" if model in ("ggx", "beckmann") else "exponent"
         scene = replace(scene, material=replace(scene.material, **{name: parameter}))
         pixel, term, bound = shading_error(scene, model)
-        assert term.max() <= bound
-        assert pixel.max() <= 0.5 + bound + COLOURS
+        assert term.max() <= bound - 0.5
+        assert pixel.max() <= bound
         return pixel, term
 
     spread = 10 ** rng.uniform(-2, 0.5, (count, 1, 1))
