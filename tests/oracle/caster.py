@@ -11,11 +11,12 @@ import numpy as np
 
 MODELS = {
     "blinn": lambda c, n: np.maximum(c, 0) ** n,
+    "phong": lambda c, n: np.maximum(c, 0) ** n,
     "cosquad": lambda c, n: np.maximum(1 - n / 2 * (1 - c), 0) ** 2,
     "cosquad7": lambda c, n: np.maximum(1 - 7 * n / 16 * (1 - c), 0) ** 2,
     "cosquad_lin": lambda c, n: np.maximum(1 - (0.448 * n + 0.099) * (1 - c), 0) ** 2,
 }
-"""Reflection models by their formulas in docs/theory/models.md; c is N·H."""
+"""Reflection models by their formulas in docs/theory/models.md; c is N·H, of ``phong`` R·V."""
 
 
 def unit(v):
@@ -140,6 +141,8 @@ def cast(
     cosine = normal @ to_light
     halfway = unit(to_light + to_viewer)
     highlight = normal @ halfway
+    if model == "phong":
+        highlight = (2 * cosine[..., None] * normal - to_light) @ to_viewer
     k_a, k_d, k_s = (np.asarray(k, dtype=np.float64) for k in coefficients)
     if f0 is not None:
         k_s = k_s * (f0 + (1 - np.asarray(f0)) * (1 - to_viewer @ halfway) ** 5)

@@ -150,6 +150,31 @@ def test_models(model):
     assert errors.max() <= 1.0
 
 
+QUOTIENTS = [
+    (model, name, projection, exponent)
+    for model in ("blinn", "phong")
+    for name in MESHES
+    for projection in ("perspective", "orthographic")
+    for exponent in (1, 50, 1000)
+]
+SHORT_QUOTIENTS = {("blinn", "triangle", "perspective", 1), ("phong", "coarse torus", "orthographic", 50)}
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "projection", "exponent"),
+    [
+        frame if frame in SHORT_QUOTIENTS else pytest.param(*frame, marks=pytest.mark.long)
+        for frame in QUOTIENTS
+    ],
+)
+def test_quotient(model, name, projection, exponent):
+    """Blinn's highlight by N·H, and Phong's by the vector R itself."""
+    scene = scene_of(MESHES[name], camera_of(name, projection), exponent)
+    errors, own = held(scene, preset("quotient", model))
+    assert errors.max() <= 0.6
+    assert errors.max() <= own + 0.05
+
+
 @pytest.mark.parametrize("exponent", [20, 500])
 def test_camera_inside(exponent):
     """In the tube of a torus, at a wall that crosses the near plane."""
