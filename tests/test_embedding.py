@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 import blysk
+from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.light_frame import light_frame
 from blysk.golden.render import Renderer
 
 from .simulators.verilog_bench import missing_tool
@@ -37,6 +40,28 @@ def expected(example):
     assert len(drawn.x) > 150
     assert len(np.unique(drawn.color[:, 0])) > 50
     return picture
+
+
+def test_beat_of_the_guide():
+    """The guide's ten lines give the codes of the model, for spans of 1 to 4095 pixels."""
+    guide = (FOLDER.parents[1] / "docs" / "guide" / "embedding.md").read_text(encoding="utf-8")
+    (text,) = (part for part in guide.split("```") if "def beat(" in part)
+    made: dict = {}
+    exec(text.removeprefix("python"), made)
+    rng = np.random.default_rng(1)
+    for length in (1, 3, 17, 400, 4095):
+        light, viewer = normalise(rng.normal(size=(2, 3)))
+        axes = light_frame(light, viewer).axes
+        left = rng.normal(size=3)
+        right = left + rng.normal(size=3)
+        expected = SpanVectors.quantise(
+            *(np.array([end @ axes.T]) for end in (left, right)), np.array([length])
+        )
+        for found, codes in zip(
+            made["beat"](left, right, length, light, viewer), tuple(expected), strict=True
+        ):
+            np.testing.assert_allclose(found, codes[0], rtol=0, atol=1)
+        assert made["beat"](left, right, length, light, viewer)[2] == expected.exponent[0]
 
 
 @pytest.mark.ci
