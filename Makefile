@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-all test-long test-ci prove mutants soak coverage bench pages site lint clean
+.PHONY: demo test test-all test-long test-ci prove prove-ci mutants soak coverage bench pages site lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -33,6 +33,10 @@ test-long: $(VENV)/.installed-test
 # Of those the part that CI runs.
 test-ci: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m ci
+
+# Of the proofs the part that CI runs.
+prove-ci: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m "prove and not seldom" tests/formal
 
 prove: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m prove tests/formal

@@ -9,7 +9,7 @@ import numpy as np
 
 from blysk.golden.beats import Pixels, Spans
 from blysk.golden.cosines.chord_setup import SpanValues
-from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
+from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
@@ -148,13 +148,13 @@ class Design:
 
     def _match_table(self) -> None:
         """Give a method that takes vectors a lobe of its own, and the kind of its angle; others none."""
-        lobe = self.specular
+        lobe, method = self.specular, cast(Any, self.interpolator)
         if lobe and (lobe.operand == "place") != self.takes_vectors:
             if not self.takes_vectors and lobe.model.MIRROR:
                 raise ValueError(f"{lobe.name} is a lobe of R·V: take the method quotient, or phong_coplanar")
             names = ("banks", "cutoff", "fixed") * lobe.has_table
             kept = {name: getattr(lobe, name) for name in names}
-            made = QuotientLobe if self.takes_vectors else partial(Lobe, operand=self.interpolator.operand)
+            made = QuotientLobe if self.takes_vectors else partial(Lobe, operand=method.operand)
             object.__setattr__(self, "specular", made(lobe.model, **kept))
         if isinstance(self.interpolator, QuotientInterpolator):
             mirror = self.specular is not None and self.specular.model.MIRROR
@@ -451,9 +451,9 @@ class Design:
                 None if factors is None else factors[part],
             )
         if isinstance(self.interpolator, QuotientInterpolator):
-            method, vectors = self.interpolator, cast(SpanVectors, spans[kept].vectors)
+            method, carried = self.interpolator, cast(Any, spans[kept].vectors)
             model, direction = self.vector_spans, np.asarray(constants.direction)
-            return lambda part: method.compute_vectors(model, vectors[part], length[part], direction)
+            return lambda part: method.compute_vectors(model, carried[part], length[part], direction)
         format = self.interpolator.END_FORMAT
         left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]

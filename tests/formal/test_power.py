@@ -13,7 +13,7 @@ from blysk.sim.engines.simulate import simulate
 
 from .test_specular import OPERANDS, of_argument, reads_one_word
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 EXPONENTS = range(1, MAX_EXPONENT + 1)
 

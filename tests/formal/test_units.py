@@ -44,6 +44,15 @@ UNITS = {
     "line_accumulator": partial(LineAccumulatorUnit, RenormaliseInterpolator()),
 }
 KINDS = {name: getattr(make, "func", make) for name, make in UNITS.items()}
+SELDOM = ("geometry", "render", "pixel_pipelines", "motion")
+"""Units whose proofs take minutes; their parts are proved, and they are held by runs of other tests."""
+
+
+def of_units(names):
+    """Parameters of tests: names of units, those of `SELDOM` with their mark."""
+    return [pytest.param(name, marks=[pytest.mark.seldom] * name.startswith(SELDOM)) for name in names]
+
+
 PIPELINED = [
     name for name, kind in KINDS.items() if isinstance(kind, type) and issubclass(kind, PipelinedUnit)
 ]
@@ -67,7 +76,7 @@ def short_fifos(monkeypatch):
     monkeypatch.setattr("blysk.hdl.render.WAITING_SPANS", 5)
 
 
-@pytest.mark.parametrize("name", UNITS)
+@pytest.mark.parametrize("name", of_units(UNITS))
 def test_beats_that_wait_stay(prove, name):
     """Inductive: a valid beat stays, with its payload, until it is accepted."""
     unit = UNITS[name]()
@@ -90,7 +99,7 @@ def of_beats(unit):
     return h
 
 
-@pytest.mark.parametrize("name", PIPELINED)
+@pytest.mark.parametrize("name", of_units(PIPELINED))
 def test_beats_of_a_pipelined_unit(prove, name):
     """Inductive: each beat that comes leaves ``latency`` cycles after, without those on which it is stalled.
 

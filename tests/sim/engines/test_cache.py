@@ -15,7 +15,7 @@ from blysk.sim.engines.simulate import simulate
 
 from .scale import BEATS, Scale, entries, scaled, script, start
 
-pytestmark = pytest.mark.usefixtures("cache")
+pytestmark = [pytest.mark.usefixtures("cache"), pytest.mark.long, pytest.mark.ci]
 
 
 def _mode(folder):

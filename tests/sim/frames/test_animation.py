@@ -314,6 +314,8 @@ def test_gif_of_many_colors(tmp_path):
     assert error.max() <= 8
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_gif_is_whole_or_not_there(tmp_path):
     write_image(tmp_path / "a.png", np.zeros((4, 4, 3), dtype=np.uint8))
     with pytest.raises(FileNotFoundError):
