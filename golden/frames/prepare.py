@@ -14,7 +14,7 @@ from blysk.golden.frames.missed import missed_spans
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise, quantise_direction
 from blysk.golden.pipeline import Design, Spans
-from blysk.golden.reference.geometry import any_component
+from blysk.golden.reference.faces import face_normals
 from blysk.golden.reference.light_frame import LightFrame, light_frame
 from blysk.golden.reference.lighting import Material, halfway_vector
 from blysk.golden.reference.raster import Raster, rasterise
@@ -103,11 +103,7 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
         values, factors = local_operands(scene, cut, design.lights, design.factors, scale)
         spans = replace(spans, values=values, factors=factors)
     elif design.interpolator.takes_line:
-        left, right = line_ends(cut)
-        # A pixel between opposite normals has no line.
-        none = ~(any_component(left) | any_component(right))
-        left[none] = right[none] = cut.normal_left[none]
-        left, right = quantise_line(left, right)
+        left, right = quantise_line(*_true_ends(scene, cut))
         spans = replace(spans, normal_left=left, normal_right=right)
     elif design.interpolator.TAKES_MIDDLE:
         spans = replace(spans, normal_middle=quantise(middle_normals(cut)))
@@ -117,6 +113,20 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
             ends = dict(zip(("normal_left", "normal_right", "normal_middle"), normals, strict=True))
             spans = replace(spans, **{name: quantise_direction(normal) for name, normal in ends.items()})
     return spans
+
+
+def _true_ends(scene: Scene, cut: Raster) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the true line; where both vanish, the normal of the face, as `fragment_normals` has it."""
+    left, right = line_ends(cut)
+    lost = np.ones(len(left), dtype=bool)
+    for end, weights in ((left, cut.weights_left), (right, cut.weights_right)):
+        lost &= np.linalg.norm(end, axis=1) <= 1e-12 * weights.sum(axis=1)
+    if lost.any():
+        triangle = cut.triangle[lost]
+        face = face_normals(scene.mesh)[triangle]
+        flip = cut.back[lost] & scene.flips[triangle]
+        left[lost] = right[lost] = np.where(flip[:, np.newaxis], -face, face)
+    return left, right
 
 
 def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
@@ -153,10 +163,7 @@ def span_vectors(scene: Scene, cut: Raster, design: Design) -> SpanVectors:
             y = frame.cosine * y
         rows |= {f"x{k}": x, f"y{k}": y, f"z{k}": z}
     axes = np.stack([rows[name] for name in model.components])
-    left, right = (end @ axes.T for end in line_ends(cut))
-    # Where no length is known the direction serves.
-    lost = ~(left.any(axis=1) | right.any(axis=1))
-    left[lost], right[lost] = (normal[lost] @ axes.T for normal in (cut.normal_left, cut.normal_right))
+    left, right = (end @ axes.T for end in _true_ends(scene, cut))
     return SpanVectors.quantise(left, right, cut.length)
 
 

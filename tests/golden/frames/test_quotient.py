@@ -12,7 +12,7 @@ from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.raster import fragment_normals, rasterise
+from blysk.golden.reference.raster import fragment_barycentrics, fragment_normals, rasterise
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 
@@ -131,6 +131,21 @@ def test_materials_of_other_exponents(model):
     frame = model_frame(scene, design)
     assert compare(scene, design, frame).method_error.steady_lsb < 0.56
     assert frame.image[:16].sum() > 2 * frame.image[16:].sum() > 0
+
+
+@pytest.mark.parametrize("method", ["quotient", "renormalise"])
+def test_pixels_where_opposite_normals_cancel(method):
+    """They have the normal of the face, as in the reference."""
+    places = (-0.0375, -0.0375), (0.4625, -0.0375), (-0.0375, 0.4625)
+    scene = one(((0, 0, 1), (0, 0, -1), (0, 0, 1)), places, (1, 1, 1), size=(44, 44), exponent=3)
+    shown = rasterise(scene)
+    line = (1 - (t := fragment_barycentrics(shown, slice(None))[:, 1])) - t
+    assert (line == 0).sum() >= 5
+    for model in ("blinn",) if method == "renormalise" else ("blinn", "phong"):
+        design = preset(method, model)
+        frame = model_frame(scene, design)
+        assert frame.out_of_range_spans == 0
+        assert compare(scene, design, frame).method_error.max_lsb < 0.56
 
 
 def test_local_lights_are_refused():
