@@ -6,10 +6,11 @@ from functools import partial
 import numpy as np
 
 from blysk.golden.lighting.lobe import Lobe, LobeTable
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX, TabulatedModel
-from blysk.golden.reference.reflection import BLINN
+from blysk.golden.reference.reflection import BLINN, PHONG
 from blysk.hdl.lighting.lobe import LobeUnit
 from blysk.sim.units.lighting.specular import any_exponent
 from blysk.sim.units.operands import any_codes, exponents
@@ -52,6 +53,8 @@ def _measure(rng, count, lobe):
 
 def _operands(parameters, rng, count):
     """The first ``count`` of corner cases, any codes, ends of every table step, and codes of every octave."""
+    if parameters.operand == "place":
+        return _places(parameters, rng, count)
     format, bits = parameters.operand_format, parameters.fraction_bits
     knots = np.ldexp(parameters.knots, bits).astype(np.int64)
     u = np.r_[knots, knots - 1, (2.0 ** (bits - rng.uniform(-1, bits, count))).astype(np.int64)]
@@ -63,6 +66,15 @@ def _operands(parameters, rng, count):
         corners = np.r_[corners, 1 << np.arange(34)]
     codes = np.r_[corners, format.max_code, any_codes(rng, format, count // 8), codes][:count]
     return np.clip(rng.permutation(codes), format.min_code, format.max_code)
+
+
+def _places(parameters, rng, count):
+    """Places of the first ``count`` of ends of every step of all parts, any, and some past the end."""
+    format, rows = parameters.operand_format, parameters.rows * parameters.steps
+    steps = np.arange(rows) << parameters.fraction_format.width
+    past = (rows << parameters.fraction_format.width) + np.r_[0, 1, 1 << rng.integers(0, 12, 6)]
+    codes = np.r_[steps, steps[1:] - 1, past, format.max_code, any_codes(rng, format, count)]
+    return rng.permutation(np.clip(codes[:count], 0, format.max_code))
 
 
 def _case(unit, rng, count, tables):
@@ -167,6 +179,9 @@ def _variants():
         "blinn, 30 octaves, 34 fraction bits",
         Variant(partial(LobeUnit, Lobe(octaves=30, fraction_bits=34))),
     )
+    yield "blinn, of a quotient", Variant(partial(LobeUnit, QuotientLobe()))
+    mirrored = QuotientLobe(PHONG, banks=2)
+    yield "phong, 2 banks, interval 3, of a quotient", Variant(partial(LobeUnit, mirrored, 3), long=True)
     fixed = {
         "ggx, fixed": (Lobe(GGX, fixed=(0.3,)), 1),
         "blinn, 2 banks, fixed, interval 2": (chord(banks=2, fixed=(7, 1000)), 2),
