@@ -12,6 +12,7 @@ from blysk.golden.geometry.edge_normals import TrueSpans
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.span_adapter import LineSpans, shading_spans
 from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.geometry.vector_adapter import VectorSpans
 from blysk.golden.pipeline import Design
 
 __all__ = ["DrawnPixels", "Renderer"]
@@ -31,7 +32,7 @@ class DrawnPixels:
         0 to 2^24 - 2.
     triangle : int64 array, shape (P,)
         Index of the triangle.
-    spans : TrueSpans or LineSpans
+    spans : TrueSpans, LineSpans or VectorSpans
         What was shaded.
     counts : dict of str to int
         `COUNTERS` of geometry; numbers of ``spans`` and ``pixels`` that were shaded; number of these pixels
@@ -48,7 +49,7 @@ class DrawnPixels:
     color: np.ndarray
     depth: np.ndarray
     triangle: np.ndarray
-    spans: TrueSpans | LineSpans
+    spans: TrueSpans | LineSpans | VectorSpans
     counts: dict[str, int]
     out_of_range_spans: int
     wide_spans: int
@@ -67,10 +68,10 @@ class Renderer:
     Parameters
     ----------
     design : Design
-        The shading pipeline, of a method that takes normals.
+        The shading pipeline, of a method that takes normals; or vectors for one light, without R·V.
     geometry : Geometry
-        The part that makes spans of triangles, with ``lines`` for a method that takes true lines. ``None``:
-        the geometry that suits the method.
+        The part that makes spans of triangles, with ``lines`` for a method that takes true lines, with
+        ``vectors`` for one that takes vectors. ``None``: the geometry that suits the method.
     coarse : CoarseDepth, optional
         Depth test that drops spans, before they are shaded, if all of their pixels are hidden; the picture is
         the same.
@@ -78,7 +79,8 @@ class Renderer:
     Raises
     ------
     ValueError
-        If the method takes values or vectors, or other normals than the geometry gives.
+        If the method takes values, vectors of several lights or for R·V, or other words than the geometry
+        gives.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -88,14 +90,22 @@ class Renderer:
     coarse: CoarseDepth | None = None
 
     def __post_init__(self):
-        lines = self.design.interpolator.takes_line
+        design, vectors = self.design, self.design.takes_vectors
+        suits = Geometry(lines=design.interpolator.takes_line and not vectors, vectors=vectors)
         if self.geometry is None:
-            object.__setattr__(self, "geometry", Geometry(lines=lines))
-        if self.design.takes_values or self.design.takes_vectors:
-            raise ValueError(f"method {self.design.method} takes no normals, which is what triangles give")
-        if self.geometry.lines != lines:
-            taken, given = ("unit normals", "true lines")[lines], ("unit normals", "true lines")[not lines]
-            raise ValueError(f"method {self.design.method} takes {taken}, the geometry gives {given}")
+            object.__setattr__(self, "geometry", suits)
+        if design.takes_values:
+            raise ValueError(f"triangles give normals, and {design.method} takes values; use another method")
+        if vectors and design.lights > 1:
+            reason = f"triangles give vectors for one light, not {design.lights}"
+            raise ValueError(f"{reason}; give one light, or use method chord")
+        if vectors and design.specular is not None and design.vector_spans.mirror:
+            raise ValueError(
+                f"triangles give vectors of three components, and {design.model} takes four; use model blinn"
+            )
+        if self.geometry.gives != suits.gives:
+            taken, given = suits.gives, self.geometry.gives
+            raise ValueError(f"method {design.method} takes {taken}, the geometry gives {given}")
 
     def compute(
         self, triangles: Triangles, frame: Frame, constants: FrameConstants | Sequence[FrameConstants]

@@ -135,9 +135,10 @@ class RenderUnit(wiring.Component):
         clears: bool = False,
     ):
         self.parameters = parameters or Renderer()
-        design, grid = self.parameters.design, self.parameters.geometry.grid
+        design, geometry = self.parameters.design, self.parameters.geometry
+        grid = geometry.grid
         compact = design.build.style == "compact" if compact is None else compact
-        self.geometry = GeometryUnit(grid, compact, self.parameters.geometry.lines, setups)
+        self.geometry = GeometryUnit(grid, compact, geometry.lines, setups, geometry.vectors)
         self.pipeline = ShadingPipelineUnit(design)
         coarse, bits = self.parameters.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)

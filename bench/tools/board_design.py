@@ -100,6 +100,9 @@ def gpu_of(
     if len(scene.lights) > MAX_LIGHTS:
         raise settings.refuse("lights", f"{len(scene.lights)} lights", f"give at most {MAX_LIGHTS}", "")
     design = design_of(settings, len(scene.lights), len(scene.materials))
+    if design.takes_vectors:
+        reason = "the vertex unit turns normals to no light's frame"
+        raise settings.refuse("method", reason, "use method chord", design.method)
     background = tuple(round(255 * channel) for channel in scene.background)
     buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=background)
     _check_memory(board, mesh, scene, buffer)

@@ -5,12 +5,14 @@ import numpy as np
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks
 from blysk.golden.frames.pieces import Pieces
+from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.geometry.span_adapter import LineAdapter
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.span_attributes import Pieces as HardwarePieces
 from blysk.golden.geometry.triangles import ATTRIBUTE
+from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.geometry.vertex_sort import SortedTriangles
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.normals.line_setup import LineSetup
@@ -98,10 +100,12 @@ def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dic
     Source: docs/theory/geometry.md#normals.
     """
     drawn, pieces, _ = renderer.geometry.pieces(sent.triangles, sent.frame)
-    limits = HighlightLimits.of(scene.materials, renderer.design)
+    design = renderer.design
+    limits = HighlightLimits.of(scene.materials, design)
     turn = _turn(drawn, pieces, renderer)
-    raster = _raster(pieces, sent.source[drawn.source])
-    curve, words = _missed(scene, raster, renderer.design.interpolator, limits, turn)
+    axes = vector_axes(scene, design) if design.takes_vectors and design.lights else np.eye(3)
+    raster = _raster(pieces, sent.source[drawn.source], axes)
+    curve, words = _missed(scene, raster, design.interpolator, limits, turn)
     return {"missed_pieces": int(curve.sum()), "short_normals": int(words.sum())}
 
 
@@ -117,6 +121,9 @@ def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) ->
     error = np.sqrt(3) * error[pieces.triangle]
     if renderer.geometry.lines:
         error += longest * (2 * np.sqrt(3) * LineAdapter.ERROR + LineSetup.ERROR)
+    elif renderer.geometry.vectors:
+        change = np.linalg.norm(right - left, axis=1)
+        error += np.sqrt(3) * (np.maximum(longest, VectorAdapter.SHORTEST) + change) * VectorAdapter.ERROR
     return np.minimum(error / np.maximum(_nearest(left, right), SPAN_NORMAL.step), np.pi)
 
 
@@ -128,11 +135,14 @@ def _nearest(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.linalg.norm(left + np.clip(t, 0, 1)[:, np.newaxis] * step, axis=1)
 
 
-def _raster(pieces: HardwarePieces, source: np.ndarray) -> Raster:
-    """Spans of the pieces, without fragments; ``source`` is the mesh's face of each triangle."""
+def _raster(pieces: HardwarePieces, source: np.ndarray, axes: np.ndarray) -> Raster:
+    """Spans of the pieces, without fragments; ``source`` is the mesh's face of each triangle.
+
+    ``axes``, by rows, is the frame of the pieces' normals.
+    """
     ends = {}
     sign = np.where(pieces.flip, -1.0, 1.0)[:, np.newaxis]
-    for side, end in (("left", pieces.left.values), ("right", pieces.right.values)):
+    for side, end in (("left", pieces.left.values @ axes), ("right", pieces.right.values @ axes)):
         magnitude = np.linalg.norm(end, axis=1)
         ends[f"normal_{side}"] = sign * end / np.where(magnitude, magnitude, 1.0)[:, np.newaxis]
         ends[f"magnitude_{side}"] = magnitude

@@ -11,11 +11,11 @@ from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands, middle_normals
 from blysk.golden.frames.missed import missed_spans
+from blysk.golden.frames.vector_axes import light_frames, vector_axes
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise, quantise_direction
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.faces import face_normals
-from blysk.golden.reference.light_frame import LightFrame, light_frame
 from blysk.golden.reference.lighting import Material, halfway_vector
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
@@ -23,7 +23,6 @@ from blysk.golden.reference.scene import Scene
 __all__ = [
     "PreparedFrame",
     "constants_of",
-    "light_frames",
     "prepare",
     "quantise_spans",
     "sort_by_material",
@@ -129,17 +128,8 @@ def _true_ends(scene: Scene, cut: Raster) -> tuple[np.ndarray, np.ndarray]:
     return left, right
 
 
-def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
-    """Frames of a pipeline's lights; those that the scene lacks have the frame of the viewer."""
-    viewer = scene.camera.viewer
-    directions = [light.direction for light in scene.lights]
-    return [light_frame(direction, viewer) for direction in (directions + [viewer] * lights)[:lights]]
-
-
 def span_vectors(scene: Scene, cut: Raster, design: Design) -> SpanVectors:
     """Vectors ``N/W`` of spans in the frames of the lights, quantised, for a method that takes them.
-
-    Without highlights z is along each light.
 
     Parameters
     ----------
@@ -150,19 +140,7 @@ def span_vectors(scene: Scene, cut: Raster, design: Design) -> SpanVectors:
     design : Design
         The pipeline.
     """
-    model = design.vector_spans
-    frames = light_frames(scene, design.lights)
-    rows = {}
-    for k, frame in enumerate(frames):
-        x, y, z = frame.axes
-        if not model.highlights:
-            # x and y lie across L, z along it.
-            x, z = frame.cosine * x - frame.sine * z, frame.sine * x + frame.cosine * z
-        elif model.mirror:
-            rows.setdefault("s0", frame.sine * y)
-            y = frame.cosine * y
-        rows |= {f"x{k}": x, f"y{k}": y, f"z{k}": z}
-    axes = np.stack([rows[name] for name in model.components])
+    axes = vector_axes(scene, design)
     left, right = (end @ axes.T for end in _true_ends(scene, cut))
     return SpanVectors.quantise(left, right, cut.length)
 

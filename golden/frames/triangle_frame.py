@@ -7,6 +7,7 @@ import numpy as np
 
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.prepare import constants_of
+from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
 from blysk.golden.geometry.triangles import Frame
 from blysk.golden.pipeline import Design
@@ -14,6 +15,9 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
 __all__ = ["TriangleFrame", "frame_of_pixels", "sent_triangles", "span_angle", "triangle_frame"]
+
+_WIDEST_ANGLE = 60.0
+"""Widest piece of a span of vectors in degrees: with the largest `Frame.limit`, see `VectorAdapter`."""
 
 _SPAN_ANGLE = 5.0
 """Widest piece of a span in degrees, for methods without a `SpanLimit`."""
@@ -42,7 +46,12 @@ class TriangleFrame:
 
 
 def span_angle(scene: Scene, design: Design) -> float:
-    """Widest piece of a span in degrees: `SpanLimit.angle` of the steepest highlight, else 5."""
+    """Widest piece of a span in degrees.
+
+    `SpanLimit.angle` of the steepest highlight; 60 for a method that takes vectors; 5 for the others.
+    """
+    if design.takes_vectors:
+        return _WIDEST_ANGLE
     limit = design.span_limit
     if limit is None:
         return _SPAN_ANGLE
@@ -59,7 +68,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     renderer : Renderer
         Geometry and shading.
     angle : float, optional
-        In degrees, 0 to 59; by default `span_angle`. True lines are not cut.
+        In degrees, 0 to 60; by default `span_angle`. True lines are not cut.
 
     Raises
     ------
@@ -69,7 +78,9 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     if scene.local:
         raise ValueError("point lights and a near viewer need spans with values, which triangles do not give")
     angle = span_angle(scene, renderer.design) if angle is None else angle
-    return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle)).by_material()
+    design = renderer.design
+    axes = vector_axes(scene, design) if design.takes_vectors and design.lights else None
+    return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle), axes).by_material()
 
 
 def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarray) -> np.ndarray:

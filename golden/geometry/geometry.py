@@ -15,6 +15,7 @@ from blysk.golden.geometry.span_adapter import LineAdapter, LineSpans
 from blysk.golden.geometry.span_attributes import Pieces, SpanAttributes
 from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
 from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triangles
+from blysk.golden.geometry.vector_adapter import VectorAdapter, VectorSpans
 from blysk.golden.geometry.vertex_sort import SortedTriangles, VertexSort
 from blysk.golden.number.fixed import Fixed
 
@@ -26,7 +27,7 @@ COUNTERS = ("empty", "zero_area", "culled", "sliver", "cut", "repaired")
 
 @dataclass(frozen=True)
 class Geometry:
-    """The bit-accurate models in a row, from `VertexSort` to `EdgeNormals` or `LineAdapter`.
+    """The bit-accurate models in a row, from `VertexSort` to `EdgeNormals`, `LineAdapter` or `VectorAdapter`.
 
     Parameters
     ----------
@@ -35,12 +36,30 @@ class Geometry:
     lines : bool
         Whether spans have their true line, N/W at both ends, in place of unit normals; then no span is cut
         into pieces, and no normal is normalised.
+    vectors : bool
+        Whether spans have N/W at the first pixel and its step in place of unit normals; no normal is
+        normalised. Not with ``lines``.
+
+    Raises
+    ------
+    ValueError
+        If spans are to have both lines and vectors.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
     grid: Grid = GRID
     lines: bool = False
+    vectors: bool = False
+
+    def __post_init__(self):
+        if self.lines and self.vectors:
+            raise ValueError("spans have true lines or vectors, not both")
+
+    @property
+    def gives(self) -> str:
+        """What spans have: ``"unit normals"``, ``"true lines"`` or ``"vectors"``."""
+        return "true lines" if self.lines else "vectors" if self.vectors else "unit normals"
 
     def rows(
         self, triangles: Triangles, frame: Frame
@@ -66,7 +85,7 @@ class Geometry:
         """Sorted triangles, the pieces of their spans with N/W at both ends, and the counts so far."""
         drawn, rows, _, counts = self.rows(triangles, frame)
         planes, sliver = self.planes(drawn, frame)
-        pieces, more = SpanAttributes().compute(rows, planes)
+        pieces, more = SpanAttributes(self.vectors).compute(rows, planes)
         counts = {
             **counts,
             "empty": counts["empty"] + more["empty"],
@@ -75,7 +94,9 @@ class Geometry:
         }
         return drawn, pieces, counts
 
-    def compute(self, triangles: Triangles, frame: Frame) -> tuple[TrueSpans | LineSpans, dict[str, int]]:
+    def compute(
+        self, triangles: Triangles, frame: Frame
+    ) -> tuple[TrueSpans | LineSpans | VectorSpans, dict[str, int]]:
         """Bit-accurate spans, and the counters.
 
         Parameters
@@ -87,7 +108,7 @@ class Geometry:
 
         Returns
         -------
-        spans : TrueSpans, or with ``lines`` LineSpans
+        spans : TrueSpans, or with ``lines`` LineSpans, with ``vectors`` VectorSpans
             In the order of the triangles, within a triangle from top to bottom, within a scanline from the
             long edge on. Their ``triangle`` is the index in ``triangles``.
         counts : dict of str to int
@@ -99,6 +120,12 @@ class Geometry:
             If a coordinate is out of the grid's range.
         """
         drawn, pieces, counts = self.pieces(triangles, frame)
-        spans, repaired = (LineAdapter().compute(pieces), 0) if self.lines else EdgeNormals().compute(pieces)
+        spans, repaired = self._shaded(pieces)
         counts = {**counts, "repaired": repaired}
         return replace(spans, triangle=drawn.source[spans.triangle]), counts
+
+    def _shaded(self, pieces: Pieces) -> tuple[TrueSpans | LineSpans | VectorSpans, int]:
+        """What the pipeline reads of pieces, and the number of normals that were repaired."""
+        if self.lines or self.vectors:
+            return (LineAdapter() if self.lines else VectorAdapter()).compute(pieces), 0
+        return EdgeNormals().compute(pieces)

@@ -53,7 +53,9 @@ class SceneTriangles:
         return replace(self, triangles=self.triangles[order], source=self.source[order])
 
 
-def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -> SceneTriangles:
+def scene_triangles(
+    scene: Scene, grid: Grid = GRID, limit: int = Frame.limit, axes: np.ndarray | None = None
+) -> SceneTriangles:
     """Transform a scene's triangles, clip and round them.
 
     Vertices go through the camera in float64. A triangle is cut by the near plane and by the guard band, so
@@ -70,6 +72,9 @@ def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -
         Fraction bits of the coordinates.
     limit : int
         `Frame.limit`.
+    axes : float64 array, shape (3, 3), optional
+        Unit vectors x, y and z of the frame that normals are given in, see `vector_axes`; ``None``: the
+        scene's.
 
     Returns
     -------
@@ -86,7 +91,8 @@ def scene_triangles(scene: Scene, grid: Grid = GRID, limit: int = Frame.limit) -
     # The grid's origin is in the middle of the picture.
     homogeneous[:, 0] += frame.left * homogeneous[:, 2]
     homogeneous[:, 1] += frame.top * homogeneous[:, 2]
-    records = np.concatenate((homogeneous[mesh.faces], mesh.normals[mesh.faces]), axis=-1)
+    normals = mesh.normals if axes is None else mesh.normals @ axes.T
+    records = np.concatenate((homogeneous[mesh.faces], normals[mesh.faces]), axis=-1)
     source = np.arange(len(records))
     low, high = grid.coordinate.min_code / grid.steps, grid.coordinate.max_code / grid.steps
     # Half a step of the grid is left for the rounding.

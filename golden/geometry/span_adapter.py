@@ -6,6 +6,7 @@ import numpy as np
 
 from blysk.golden.geometry.edge_normals import PlacedSpans, TrueSpans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL, Pieces
+from blysk.golden.geometry.vector_adapter import VectorSpans
 from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.pipeline import Spans
@@ -93,14 +94,19 @@ class LineAdapter:
         return ends[:, :3], ends[:, 3:]
 
 
-def shading_spans(spans: TrueSpans | LineSpans) -> Spans:
-    """Spans of the shading pipeline: first pixel, length, material, and normals or the true line.
+def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
+    """Spans of the shading pipeline: first pixel, length, material, and normals, the true line or vectors.
 
     Parameters
     ----------
-    spans : TrueSpans or LineSpans
-        From `EdgeNormals`, with left, middle and right unit normals; or from `LineAdapter`.
+    spans : TrueSpans, LineSpans or VectorSpans
+        From `EdgeNormals`, with left, middle and right unit normals; from `LineAdapter`; or from
+        `VectorAdapter`: their normals are 0.
     """
+    if isinstance(spans, VectorSpans):
+        none = np.zeros_like(spans.start)
+        placed = spans.x, spans.y, spans.length, none, none, spans.material
+        return Spans(*placed, vectors=spans.vectors)
     return Spans(
         x=spans.x,
         y=spans.y,

@@ -9,10 +9,13 @@ from blysk.golden.geometry.plane_assembler import Planes
 from blysk.golden.geometry.span_clip import ClippedRows
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 
-__all__ = ["DEPTH_STEP", "SPAN_DEPTH", "SPAN_NORMAL", "Pieces", "SpanAttributes"]
+__all__ = ["DEPTH_STEP", "SPAN_DEPTH", "SPAN_NORMAL", "SPAN_STEP", "Pieces", "SpanAttributes"]
 
 SPAN_NORMAL = SQ(1, 26)
 """Number format of a component of N/W at a pixel."""
+
+SPAN_STEP = GradientSetup.FORMAT
+"""Number format of the step of a component of N/W from a pixel to the next."""
 
 SPAN_DEPTH = UQ(24, 9)
 """Number format of the depth at a pixel."""
@@ -41,6 +44,8 @@ class Pieces:
         Index of the material.
     triangle : int64 array, shape (S,)
         Index of the triangle.
+    step : Fixed, shape (S, 3), SQ(2, 32), optional
+        Step of N/W from a pixel to the next; without meaning in a span of one pixel.
     """
 
     x: np.ndarray
@@ -54,6 +59,7 @@ class Pieces:
     flip: np.ndarray
     material: np.ndarray
     triangle: np.ndarray
+    step: Fixed | None = None
 
     def __len__(self) -> int:
         return len(self.x)
@@ -64,7 +70,7 @@ class Pieces:
         return {
             name: value.codes if isinstance(value, Fixed) else value
             for name, value in vars(self).items()
-            if name != "triangle"
+            if name != "triangle" and value is not None
         }
 
 
@@ -83,8 +89,16 @@ class SpanAttributes:
     Values are exact sums of the gradients' codes, modulo 4. They are cut to the pieces' formats, and saturate
     where errors carry them out of range.
 
+    Parameters
+    ----------
+    steps : bool
+        Whether pieces have the step of N/W, too: the triangle's ``inward``, negated where the span goes to
+        the long edge.
+
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
+
+    steps: bool = False
 
     def compute(self, rows: ClippedRows, planes: Planes) -> tuple[Pieces, dict[str, int]]:
         """Bit-accurate pieces, and the counts of triangles without a span and of spans that were cut.
@@ -134,7 +148,8 @@ class SpanAttributes:
         x = rows.x[spans][span]
         turned = right[:, np.newaxis]
         left_end, right_end = np.where(turned, far, near), np.where(turned, near, far)
-        step = inward[span, 3]
+        step = inward[span]
+        step = format.wrap(np.where(turned, -step, step))
         pieces = Pieces(
             x=np.where(right, x + length[span] - before - pixels, x + before),
             y=rows.y[spans][span],
@@ -143,10 +158,11 @@ class SpanAttributes:
             right=_normal(right_end),
             depth=_depth(left_end),
             depth_last=_depth(right_end),
-            depth_step=Fixed(DEPTH_STEP, format.wrap(np.where(right, -step, step))),
+            depth_step=Fixed(DEPTH_STEP, step[:, 3]),
             flip=rows.flip[spans][span],
             material=rows.material[spans][span],
             triangle=source,
+            step=Fixed(SPAN_STEP, step[:, :3]) if self.steps else None,
         )
         drawn = np.zeros(len(planes), dtype=bool)
         drawn[triangle] = True

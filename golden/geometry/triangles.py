@@ -148,7 +148,7 @@ class Frame:
 
     @staticmethod
     def limit_of(angle: float) -> int:
-        """Largest ``limit`` for which no span's normals are more than ``angle`` degrees apart, 0 to 59."""
+        """Largest ``limit`` for which no span's normals are more than ``angle`` degrees apart, 0 to 60."""
         return min(int(2048 * np.sin(np.radians(angle) / 2)), (1 << LIMIT_BITS) - 1)
 
     @property

@@ -154,13 +154,18 @@ class Drawing:
         Raises
         ------
         ValueError
-            If a scene does not fit the design, the mesh the memory, or the camera the matrix.
+            If a scene does not fit the design, the mesh the memory, or the camera the matrix; or the method
+            takes vectors.
         """
         scene, transform = scenes[0], transform or VertexTransform()
         design = design or board_design(max(len(each.lights) for each in scenes), len(scene.materials))
         size = scene.width, scene.height
         x_bits, y_bits = cls.place_bits(size, lines)
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
+        if design.takes_vectors:
+            raise ValueError(
+                f"the vertex unit turns normals to no light's frame, which {design.method} takes"
+            )
         mesh = MeshMemory.of([scene.mesh])
         presets = tuple(tuple(constants_of(each, design)) for each in scenes)
         widest = [span_angle(each, design) if angle is None else angle for each in scenes]

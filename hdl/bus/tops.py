@@ -41,7 +41,8 @@ class Top:
 
 def _geometry(parameters: Renderer, **options) -> GeometryUnit:
     geometry: Geometry = parameters.geometry
-    return GeometryUnit(geometry.grid, parameters.design.build.style == "compact", geometry.lines, **options)
+    compact = parameters.design.build.style == "compact"
+    return GeometryUnit(geometry.grid, compact, geometry.lines, vectors=geometry.vectors, **options)
 
 
 def _shader(parameters: Design) -> ShadingPipelineUnit:

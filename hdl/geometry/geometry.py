@@ -20,6 +20,7 @@ from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
+from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit, vector_spans_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
 __all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
@@ -28,6 +29,9 @@ PORT_DESCRIPTIONS = {
     "normal_left": "unit normal at the first pixel; of a true line its end, N/W",
     "normal_middle": "unit normal in the middle",
     "normal_right": "unit normal at the last pixel; of a true line its end, N/W",
+    "start": "N/W at the first pixel, in the frame of the light",
+    "step": "its step to the next pixel, times 2^exponent",
+    "exponent": "exponent of the step",
     "line_left": "N/W at the first pixel",
     "line_right": "N/W at the last pixel",
     "x": "column of the first pixel",
@@ -159,13 +163,13 @@ class GeometryUnit(wiring.Component):
       that the sort drops takes 4 to 9 cycles, compact 5 to 15 (`VertexSortUnit`);
     - in the walk one cycle for each scanline without pixels in the picture;
     - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits, but at least 1 for 1
-      pixel, 2 for 2 pixels and 3 for more (with ``lines`` at least 1): never more than it has pixels. For n
-      pixels cut off at the long edge it takes as many cycles more as n has bits. In the compact style it
-      takes four cycles for each scanline and for every two of those bits; at the same time the normals take
-      three cycles each.
+      pixel, 2 for 2 pixels and 3 for more (with ``lines`` or ``vectors`` at least 1): never more than it has
+      pixels. For n pixels cut off at the long edge it takes as many cycles more as n has bits. In the compact
+      style it takes four cycles for each scanline and for every two of those bits; at the same time the
+      normals take three cycles each.
 
-    The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` 4 and 2. The second
-    lane adds 4, in the compact style 2.
+    The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` or ``vectors``
+    4 and 2. The second lane adds 4, in the compact style 2.
 
     Parameters
     ----------
@@ -178,18 +182,21 @@ class GeometryUnit(wiring.Component):
         into pieces, and no normal is normalised.
     setups : int
         Number of lanes, from the edges to the planes, that triangles take in turns: 1 or 2.
+    vectors : bool
+        Whether spans have N/W at the first pixel and its step in place of unit normals, and no normal is
+        normalised; not with ``lines``.
 
     Raises
     ------
     ValueError
-        If ``setups`` is another number.
+        If ``setups`` is another number, or spans are to have both lines and vectors.
 
     Members
     -------
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
-        Their spans; with ``lines`` of `line_spans_shape`.
+        Their spans; with ``lines`` of `line_spans_shape`, with ``vectors`` of `vector_spans_shape`.
     constants : :py:`In(frame_shape())`
         The frame; stays while triangles are inside.
     status : :py:`Out(counters_shape(*COUNTERS))`
@@ -203,25 +210,39 @@ class GeometryUnit(wiring.Component):
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
-    def __init__(self, grid: Grid = GRID, compact: bool = False, lines: bool = False, setups: int = 1):
+    def __init__(
+        self,
+        grid: Grid = GRID,
+        compact: bool = False,
+        lines: bool = False,
+        setups: int = 1,
+        vectors: bool = False,
+    ):
         if setups not in (1, 2):
             raise ValueError(f"setups must be 1 or 2, not {setups!r}")
-        self.grid, self.compact, self.lines = grid, compact, lines
+        if lines and vectors:
+            raise ValueError("spans have true lines or vectors, not both")
+        self.grid, self.compact, self.lines, self.vectors = grid, compact, lines, vectors
         self._sort = VertexSortUnit(grid, compact)
         self._lanes = [_TriangleSetup(grid, compact, not lines) for _ in range(setups)]
         self.interval = -(-self._lanes[0].interval // setups)
         self._attributes, self._walk, self._clip = (
-            SpanAttributesUnit(compact),
+            SpanAttributesUnit(compact, vectors),
             EdgeWalkUnit(grid, skid=not compact),
             SpanClipUnit(skid=not compact),
         )
-        self._normals = LineAdapterUnit() if lines else EdgeNormalsUnit(compact=compact)
-        normaliser = 0 if lines else self._normals.multipliers
+        if lines:
+            self._normals, shape = LineAdapterUnit(), line_spans_shape()
+        elif vectors:
+            self._normals, shape = VectorAdapterUnit(), vector_spans_shape()
+        else:
+            self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
+        normaliser = 0 if lines or vectors else self._normals.multipliers
         self.multipliers = sum(lane.multipliers for lane in self._lanes) + normaliser
         super().__init__(
             {
                 "i": In(stream.Signature(triangle_shape(grid))),
-                "o": Out(stream.Signature(line_spans_shape() if lines else true_spans_shape())),
+                "o": Out(stream.Signature(shape)),
                 "constants": In(frame_shape()),
                 "status": Out(counters_shape(*COUNTERS)),
             }
@@ -336,7 +357,7 @@ class GeometryUnit(wiring.Component):
             self.status.culled.eq(sort.culled),
             self.status.sliver.eq(sliver),
             self.status.cut.eq(attributes.cut),
-            self.status.repaired.eq(0 if self.lines else self._normals.status.repaired),
+            self.status.repaired.eq(0 if self.lines or self.vectors else self._normals.status.repaired),
         ]
 
 

@@ -83,18 +83,18 @@ def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
     m : Module
         Module that gets the wires.
     span : View
-        Of `true_spans_shape` or `line_spans_shape`.
+        Of `true_spans_shape`, `line_spans_shape` or `vector_spans_shape`.
     shaded : View
         Of `blysk.hdl.pipeline.span_shape`.
 
     Raises
     ------
     TypeError
-        If a normal has different formats in the two spans.
+        If a normal or a vector has different formats in the two spans.
     """
     given = span.shape().members
     for name, shape in shaded.shape().members.items():
-        if name.startswith("normal") and shape != given[name]:
+        if name.startswith(("normal", "start", "step")) and shape != given[name]:
             raise TypeError(f"{name} is {given[name]!r} on one side, {shape!r} on the other")
         code, width = Value.cast(span[name]), len(Value.cast(shaded[name]))
         if name == "material":

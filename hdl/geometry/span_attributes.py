@@ -5,7 +5,7 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.gradient_setup import GradientSetup
-from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL
+from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, SPAN_STEP
 from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
@@ -38,10 +38,14 @@ def span_words_shape() -> dict:
     return words | depth | rest
 
 
-def pieces_shape() -> data.StructLayout:
-    """Shape of `Pieces.beats`: first pixel, length, N/W and depth at both ends, flip and material."""
+def pieces_shape(steps: bool = False) -> data.StructLayout:
+    """Shape of `Pieces.beats`: first pixel, length, N/W and depth at both ends, flip and material.
+
+    With ``steps`` also the step of N/W.
+    """
     normal = data.ArrayLayout(FixedShape(SPAN_NORMAL), 3)
-    return data.StructLayout({"left": normal, "right": normal} | span_words_shape())
+    step = {"step": data.ArrayLayout(FixedShape(SPAN_STEP), 3)} if steps else {}
+    return data.StructLayout({"left": normal, "right": normal} | step | span_words_shape())
 
 
 class SpanAttributesUnit(wiring.Component):
@@ -62,13 +66,15 @@ class SpanAttributesUnit(wiring.Component):
     ----------
     serial : bool
         Whether the attributes of a scanline come and are computed one after the other.
+    steps : bool
+        Whether pieces have the step of N/W, too.
 
     Members
     -------
     i : :py:`In(stream.Signature(planes_rows_shape(serial)))`
         Scanlines. The planes are read with the first scanline of a triangle: the first of all, or the one
         after a scanline with ``last``.
-    o : :py:`Out(stream.Signature(pieces_shape()))`
+    o : :py:`Out(stream.Signature(pieces_shape(steps)))`
         Pieces.
     status : :py:`Out(counters_shape("empty", "cut"))`
         Number of triangles without a span, and of spans of more than one piece, since the reset.
@@ -81,12 +87,12 @@ class SpanAttributesUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
-    def __init__(self, serial: bool = False):
-        self.serial, self.latency = serial, 6 if serial else 3
+    def __init__(self, serial: bool = False, steps: bool = False):
+        self.serial, self.steps, self.latency = serial, steps, 6 if serial else 3
         super().__init__(
             {
                 "i": In(stream.Signature(planes_rows_shape(serial))),
-                "o": Out(stream.Signature(pieces_shape())),
+                "o": Out(stream.Signature(pieces_shape(steps))),
                 "status": Out(counters_shape("empty", "cut")),
             }
         )
@@ -213,9 +219,15 @@ class SpanAttributesUnit(wiring.Component):
                 if self.serial or k == components:
                     code = Value.cast(value.saturate(SQ(1, GradientSetup.FORMAT.fraction_bits)))
                     m.d.sync += Value.cast(result[depth]).eq(Cat(code[:-1], ~code[-1]))
-        step = Value.cast(found.step[len(found.step) - 1])
+        steps = [Mux(right, -Value.cast(step), Value.cast(step))[:_BITS] for step in found.step]
+        if self.steps and self.serial:
+            words = [Value.cast(word) for word in result.step]
+            with m.If(valid & ~found.ends):
+                m.d.sync += [word.eq(other) for word, other in zip(words, [*words[1:], *steps], strict=True)]
+        elif self.steps:
+            m.d.sync += [Value.cast(result.step[k]).eq(steps[k]) for k in range(components)]
         m.d.sync += [
-            Value.cast(result.depth_step).eq(Mux(right, -step, step)),
+            Value.cast(result.depth_step).eq(steps[-1]),
             *(result[name].eq(found[name]) for name in ("x", "length")),
             *(result[name].eq(found.tag[name]) for name in ("y", "flip", "material")),
         ]

@@ -11,7 +11,7 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.quotient_spans import MARGIN
 from blysk.golden.frame_constants import address_table
 from blysk.golden.geometry.coarse_depth import CoarseDepth
-from blysk.golden.geometry.triangles import ATTRIBUTE
+from blysk.golden.geometry.triangles import ATTRIBUTE, Frame
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
@@ -156,13 +156,13 @@ def renderer_of(design: Design, option: str = "geometry", value: str = "hardware
     Raises
     ------
     OptionError
-        If the method takes values or vectors of a span in place of normals.
+        If the design does not fit triangles, see `Renderer`.
     """
     try:
         return Renderer(design)
-    except ValueError:
-        reason = f"triangles give normals, and {design.method} takes {design.span_members}"
-        raise OptionError(option, value, reason, "use another method, or spans from software") from None
+    except ValueError as error:
+        reason, _, remedy = str(error).partition("; ")
+        raise OptionError(option, value, reason, f"{remedy}, or spans from software") from None
 
 
 def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> ShadingUnit:
@@ -323,13 +323,18 @@ def _geometry_lines(geometry: GeometryUnit) -> list[str]:
     """Description of the input of a core from triangles to spans."""
     grid = geometry.grid
     spans = "their true lines, uncut" if geometry.lines else "three unit normals, wide ones cut"
+    normal, limit = "vertex normal", "is not read" if geometry.lines else _LIMIT
+    if geometry.vectors:
+        spans = "N/W and its step, wide ones cut"
+        normal = "vertex normal in the frame of the light (H along z, L and V in the xz plane)"
+        limit = f"chord of the widest span in 1/1024; any is right, {Frame.limit_of(60)} cuts least"
     return [
         f"geometry: at most a triangle in {geometry.interval} cycles; spans with {spans}; {grid.coordinate} "
         "coordinates",
-        "i_normal_*: vertex normal times 1/W over the largest 1/W of the triangle, "
+        f"i_normal_*: {normal} times 1/W over the largest 1/W of the triangle, "
         f"{ATTRIBUTE}; i_depth: linear on the screen",
         f"constants_*: the picture's borders in pixels; back faces {', '.join(map(_numbered, BACK_FACES))}",
-        f"constants_limit: {'is not read' if geometry.lines else _LIMIT}",
+        f"constants_limit: {limit}",
         "constants_* change only while no triangle, span or pixel is inside; status_*: counters since reset",
     ]
 

@@ -388,15 +388,17 @@ def _check_geometry(settings: Settings, design: Design) -> None:
         if settings["coarse"]:
             raise settings.refuse("coarse", "software leaves hidden spans out", remedy, "")
         return
-    reason = None
-    if design.span_members != "normals":
-        taken = design.span_members
-        reason, remedy = f"triangles give normals, and {design.method} takes {taken}", "use another method"
-    elif settings["specialise"]:
-        reason, remedy = "a specialised pipeline takes spans", "leave out specialise"
+    reason = ""
+    if settings["specialise"]:
+        reason = "a specialised pipeline takes spans; leave out specialise"
     elif settings["pipes"] > 1:
-        reason, remedy = "triangles go to one pipeline", "leave out pipes"
-    if reason is not None:
+        reason = "triangles go to one pipeline; leave out pipes"
+    try:
+        Renderer(design)
+    except ValueError as error:
+        reason = str(error)
+    if reason:
+        reason, _, remedy = reason.partition("; ")
         raise settings.refuse("geometry", reason, f"{remedy}, or use software")
 
 

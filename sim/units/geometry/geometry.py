@@ -16,7 +16,9 @@ __all__ = ["RECORD"]
 
 @once
 def _spans(unit, case):
-    return Geometry(unit.grid, unit.lines).compute(Triangles(**case.beats), frame_of(case.constants))
+    return Geometry(unit.grid, unit.lines, unit.vectors).compute(
+        Triangles(**case.beats), frame_of(case.constants)
+    )
 
 
 def _small(unit, rng, count):
@@ -94,7 +96,9 @@ RECORD = Record(
         "compact": Variant(partial(GeometryUnit, compact=True), long=True),
         "compact, two lanes": Variant(partial(GeometryUnit, compact=True, setups=2), long=True),
         "compact, true lines": Variant(partial(GeometryUnit, compact=True, lines=True), long=True),
+        "compact, vectors": Variant(partial(GeometryUnit, compact=True, vectors=True), long=True),
         "true lines": Variant(partial(GeometryUnit, lines=True), long=True),
+        "vectors": Variant(partial(GeometryUnit, vectors=True), long=True),
         "two lanes": Variant(partial(GeometryUnit, setups=2), long=True),
         "4 fraction bits": Variant(partial(GeometryUnit, Grid(4)), long=True),
     },

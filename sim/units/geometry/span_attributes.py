@@ -23,7 +23,7 @@ def _firsts(last):
     return np.r_[True, last[:-1]]
 
 
-def _pieces(beats):
+def _pieces(beats, steps):
     words = {field.name: beats["row"][field.name] for field in fields(ClippedRows)}
     rows, at = ClippedRows(**words), _firsts(words["last"])
     planes = {name: value[at] for name, value in beats["planes"].items()}
@@ -31,7 +31,7 @@ def _pieces(beats):
         ("short", "long", "inward"), GradientSetup.FORMAT
     )
     words = {name: Fixed(format, planes[name]) for name, format in formats.items()}
-    return SpanAttributes().compute(rows, Planes(Gradients(**words, size=np.zeros(0)), planes["piece"]))
+    return SpanAttributes(steps).compute(rows, Planes(Gradients(**words, size=np.zeros(0)), planes["piece"]))
 
 
 def _rows_of(unit, beats):
@@ -60,7 +60,7 @@ def _beats_of(unit, planes, row):
 
 def _status(unit, case):
     beats = _rows_of(unit, case.beats)
-    counts, rows = _pieces(beats)[1], beats["row"]
+    counts, rows = _pieces(beats, unit.steps)[1], beats["row"]
     # A triangle is not yet known to be empty before its last scanline.
     begun = np.flatnonzero(_firsts(rows["last"]))[-1]
     unknown = not rows["last"][-1] and not rows["length"][begun:].any()
@@ -130,8 +130,12 @@ RECORD = Record(
     variants={
         "": Variant(SpanAttributesUnit, note="exact sums of the steps"),
         "serial": Variant(partial(SpanAttributesUnit, serial=True), note="exact sums of the steps"),
+        "serial, steps": Variant(
+            partial(SpanAttributesUnit, serial=True, steps=True), note="exact sums of the steps", long=True
+        ),
+        "steps": Variant(partial(SpanAttributesUnit, steps=True), note="exact sums of the steps", long=True),
     },
-    expect=lambda unit, case: _pieces(_rows_of(unit, case.beats))[0].beats,
+    expect=lambda unit, case: _pieces(_rows_of(unit, case.beats), unit.steps)[0].beats,
     status=_status,
     stimuli={
         "rows": Stimulus(_rows, 1500),

@@ -79,6 +79,15 @@ def test_unequal_lengths_are_counted():
     assert errors(scene, design, model_frame(scene, design).image).max() < PROMISED
 
 
+def test_unequal_lengths_do_not_matter_to_vectors():
+    """The same triangle, and W of 1 to 100: within 0.6 LSB; nothing is counted."""
+    design = preset("quotient", "blinn")
+    for scene in (scene_of(*([part] for part in WORST), 992, 0.98), deep_scene(100, 1000)):
+        error, counts = by_hardware(scene, design)
+        assert 0.49 < error.max() < 0.6
+        assert not any(counts.values())
+
+
 @pytest.mark.parametrize("exponent", [30, 992])
 def test_what_is_not_counted_is_as_promised(exponent):
     """The worst triangle, flatter and flatter, and its like: each is within the promise or counted."""

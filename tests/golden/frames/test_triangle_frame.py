@@ -35,6 +35,33 @@ def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
     assert np.isnan(compared.arithmetic_error.max_lsb)
 
 
+@pytest.mark.parametrize(
+    ("triangles", "exponent", "back_faces"), [(1000, 50, "flip"), (1000, 1000, "cull"), (64, 50, "flip")]
+)
+def test_vectors_within_0_6_lsb_of_exact_normals(triangles, exponent, back_faces):
+    """The quotient method, with one light and Blinn's highlights; hardly a pixel is not the nearest code."""
+    drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent, back_faces=back_faces)
+    renderer = Renderer(preset("quotient", "blinn"))
+    frame, exact = triangle_frame(drawn, renderer), render(drawn, "phong", REFLECTION_MODELS["blinn"])
+    np.testing.assert_array_equal(frame.owner >= 0, exact.mask)
+    error = np.abs(frame.image - exact.image * 255)[exact.mask]
+    assert 0.49 < error.max() < 0.6
+    assert 0 < (error > 0.5).mean() < 0.01
+    # Fewer pieces than chord's, and more than there are spans only where normals turn far in a triangle.
+    chord = triangle_frame(drawn, Renderer(preset("chord", "blinn"))).counts
+    assert frame.counts["pixels"] == chord["pixels"]
+    assert frame.counts["spans"] < 0.7 * chord["spans"]
+
+
+def test_vectors_without_highlights():
+    """z of the frame is along the light."""
+    drawn = scene("teapot", size=(64, 48), triangles=220, specular=0)
+    frame = triangle_frame(drawn, Renderer(preset("quotient", None)))
+    exact = render(drawn, "phong", REFLECTION_MODELS["blinn"])
+    error = np.abs(frame.image - exact.image * 255)[exact.mask]
+    assert 0.4 < error.max() < 0.6
+
+
 def test_another_surface_only_within_the_depths_rounding():
     """Sheets folded flat at their edge: where the other one shows, depths in float64 are nearly equal."""
     drawn = scene("teapot", size=(640, 480), triangles=64)
@@ -104,8 +131,16 @@ def test_widest_span():
 
 def test_methods_and_geometry_must_fit():
     """Values are not what triangles give, nor normals where lines are taken."""
-    with pytest.raises(ValueError, match="takes no normals"):
+    with pytest.raises(ValueError, match="triangles give normals, and chord-local takes values"):
         Renderer(preset("chord-local", "cosquad"))
+    with pytest.raises(ValueError, match="vectors for one light, not 2; give one light"):
+        Renderer(preset("quotient", "blinn", lights=2))
+    with pytest.raises(ValueError, match="phong takes four; use model blinn"):
+        Renderer(preset("quotient", "phong"))
+    with pytest.raises(ValueError, match="takes vectors, the geometry gives unit normals"):
+        Renderer(preset("quotient", "blinn"), Geometry())
+    with pytest.raises(ValueError, match="true lines or vectors, not both"):
+        Geometry(lines=True, vectors=True)
     with pytest.raises(ValueError, match="takes unit normals, the geometry gives true lines"):
         Renderer(preset("chord", "cosquad"), Geometry(lines=True))
     with pytest.raises(ValueError, match="takes true lines, the geometry gives unit normals"):

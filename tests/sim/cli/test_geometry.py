@@ -123,6 +123,11 @@ def test_same_from_python(capsys):
     text = capsys.readouterr().out
     assert "true lines, uncut" in text
     assert "_geometry_normals_normaliser" not in text
+    assert main(["verilog", *HARDWARE, "--method", "quotient", "--model", "blinn"]) == 0
+    text = capsys.readouterr().out
+    assert "N/W and its step, wide ones cut" in text
+    assert "vertex normal in the frame of the light (H along z, L and V in the xz plane)" in text
+    assert "_geometry_normals_normaliser" not in text
 
 
 RENDER, VERILOG = ("render", *SMALL), ("verilog",)
@@ -130,6 +135,8 @@ POINT_LIGHT = "--point-light", "3,4,5"
 SPANS = "a specialised pipeline takes spans; leave out specialise"
 VALUES = "triangles give normals, and chord-local takes values"
 LOCAL = "--method", "chord-local"
+QUOTIENT = "--method", "quotient"
+ONE_LIGHT = "vectors for one light, not 2; give one light"
 NO_SETUP = "spans need no triangle setup; "
 UNKNOWN = "use one of software, hardware"
 
@@ -150,6 +157,9 @@ UNKNOWN = "use one of software, hardware"
         ((*RENDER, "--coarse"), "--coarse", "give geometry hardware, too"),
         ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "give geometry hardware, too"),
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
+        ((*RENDER, *HARDWARE, *QUOTIENT, "--light", "1,1,1", "--light", "0,1,1"), "", ONE_LIGHT),
+        ((*VERILOG, *HARDWARE, *QUOTIENT, "--lights", "2"), "", ONE_LIGHT),
+        ((*RENDER, *HARDWARE, *QUOTIENT, "--model", "phong"), "", "use model blinn, or use software"),
         # It would send spans.
         ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
         ((*VERILOG, "--coarse", "64x48"), "--coarse", "give --top render, too"),

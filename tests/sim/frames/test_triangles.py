@@ -46,6 +46,18 @@ def test_frame_is_the_model_s(simulator, triangles, back_faces):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("style", ["throughput", "compact"])
+def test_vectors(style):
+    """Of the quotient method: picture and counters are the model's; nothing is missed."""
+    simulator = TriangleSimulator(Renderer(design(method="quotient", model="blinn", style=style)), SIZE)
+    drawn = scene("teapot", size=SIZE, triangles=200)
+    frame, model = simulator.render(drawn), triangle_frame(drawn, simulator.renderer)
+    np.testing.assert_array_equal(frame.image, model.image)
+    assert {name: frame.counts[name] for name in model.counts} == model.counts
+    assert frame.counts["missed_pieces"] == frame.counts["out_of_range_spans"] == 0
+
+
+@pytest.mark.long
 def test_small_triangles_with_two_lanes():
     """Every triangle of the teapot is sent: 1.1 cycles a shaded pixel at most."""
     size = 640, 480

@@ -1,0 +1,48 @@
+"""Axes of the vectors that a method takes: the frames of a scene's lights."""
+
+import numpy as np
+
+from blysk.golden.pipeline import Design
+from blysk.golden.reference.light_frame import LightFrame, light_frame
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["light_frames", "vector_axes"]
+
+
+def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
+    """Frames of a pipeline's lights; those that the scene lacks have the frame of the viewer."""
+    viewer = scene.camera.viewer
+    directions = [light.direction for light in scene.lights]
+    return [light_frame(direction, viewer) for direction in (directions + [viewer] * lights)[:lights]]
+
+
+def vector_axes(scene: Scene, design: Design) -> np.ndarray:
+    """Axes in the scene's frame of the components that a method takes of ``N/W``, by rows.
+
+    Without highlights z is along each light.
+
+    Parameters
+    ----------
+    scene : Scene
+        Lights and viewer.
+    design : Design
+        The pipeline, of a method that takes vectors.
+
+    Returns
+    -------
+    float64 array, shape (components, 3)
+        In the order of `QuotientSpans.components`.
+    """
+    model = design.vector_spans
+    frames = light_frames(scene, design.lights)
+    rows = {}
+    for k, frame in enumerate(frames):
+        x, y, z = frame.axes
+        if not model.highlights:
+            # x and y lie across L, z along it.
+            x, z = frame.cosine * x - frame.sine * z, frame.sine * x + frame.cosine * z
+        elif model.mirror:
+            rows.setdefault("s0", frame.sine * y)
+            y = frame.cosine * y
+        rows |= {f"x{k}": x, f"y{k}": y, f"z{k}": z}
+    return np.stack([rows[name] for name in model.components])

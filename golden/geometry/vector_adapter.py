@@ -1,0 +1,121 @@
+"""The vector adapter: N/W at the first pixel of a span and its step, for methods that take vectors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
+from blysk.golden.geometry.edge_normals import PlacedSpans
+from blysk.golden.geometry.span_attributes import SPAN_NORMAL, SPAN_STEP, Pieces
+
+__all__ = ["VectorAdapter", "VectorSpans"]
+
+
+@dataclass(frozen=True)
+class VectorSpans(PlacedSpans):
+    """Spans with vectors ``N/W`` at their first pixels, and steps, in place of unit normals.
+
+    Parameters
+    ----------
+    x, y, length, depth, depth_last, depth_step, material, triangle
+        As in `PlacedSpans`.
+    start, step : int64 arrays, shape (S, 3)
+        As in `SpanVectors`. The step of a span of one pixel has no meaning.
+    exponent : int64 array, shape (S,)
+        As in `SpanVectors`.
+    """
+
+    start: np.ndarray
+    step: np.ndarray
+    exponent: np.ndarray
+
+    @property
+    def vectors(self) -> SpanVectors:
+        """Vectors of the spans."""
+        return SpanVectors(self.start, self.step, self.exponent)
+
+
+@dataclass(frozen=True)
+class VectorAdapter:
+    """Words of `SpanVectors` from N/W at both ends of a span and its step: shifts and roundings alone.
+
+    The components of both ends and of the step are shifted left by the same number s of places: the sign
+    copies that all components of the ends have, at most `LARGEST_SHIFT`. Then each word x becomes
+    ``x - 2^-14 x``, cut: so 8 steps of 2^-17 are left to 1, which no pixel may reach, and nothing saturates.
+    The step is shifted left by e places more: as many as leave it under 1, at most 15. All are negated where
+    ``flip`` is set, and rounded half up to 17 fraction bits.
+
+    ========== ============ =====================================================================
+    word       format       why
+    ========== ============ =====================================================================
+    N/W        SQ(1, 26)    of `SpanAttributes`
+    its step   SQ(2, 32)    of `SpanAttributes`; under 1 after the shift, see below
+    start      SQ(1, 17)    of `QuotientSpans`; the largest component of both ends is ``1/2 - 2^-15`` or
+                            more where the shift reaches
+    step       SQ(1, 17)    in steps of ``2^-e``
+    exponent   UQ(4, 0)     e
+    ========== ============ =====================================================================
+
+    Geometry cuts a span to pieces of p pixels where ``p |step|`` would be over the least ``|N/W|`` of the
+    triangle. So the step of a piece of two pixels or more is under half of the length of an end, which after
+    the shift is under ``sqrt(3)``: the step fits. Along a piece ``|N/W|`` changes by a factor of 2 at most,
+    and its direction by 60 degrees at most: the method needs no other cuts.
+
+    Rounding moves a component of the start by half a step of its word: `ERROR` times the length of the longer
+    end at most, if that is at least `SHORTEST`. Rounding of the step adds `ERROR` times the distance of the
+    ends at the right end, or a sixteenth of a step, and its cut up to an eighth. The errors of N/W and of the
+    triangle's gradient are added to that. All together are under 4 steps.
+
+    Source: docs/theory/geometry.md#composition; not in the documents.
+    """
+
+    LARGEST_SHIFT = 7
+    MARGIN_SHIFT = 14
+    ERROR = 2.0**-17
+    SHORTEST = 2.0**-8
+    FORMAT = QuotientSpans.COMPONENT_FORMAT
+    LARGEST_EXPONENT = QuotientSpans.EXPONENT_FORMAT.max_code
+    STEP_BITS = SPAN_STEP.fraction_bits
+    """Bits of a shifted step below 1."""
+
+    def compute(self, pieces: Pieces) -> VectorSpans:
+        """Bit-accurate spans.
+
+        Parameters
+        ----------
+        pieces : Pieces
+            From `SpanAttributes` with ``steps``.
+
+        Raises
+        ------
+        ValueError
+            If the pieces have no steps, or an operand has another format.
+        """
+        step = pieces.step
+        if step is None or {pieces.left.format, pieces.right.format, step.format} != {SPAN_NORMAL, SPAN_STEP}:
+            raise ValueError(f"pieces must have ends of {SPAN_NORMAL} and steps of {SPAN_STEP}")
+        flip = np.asarray(pieces.flip, dtype=bool)[:, np.newaxis]
+        used = _used(np.concatenate((pieces.left.codes, pieces.right.codes), axis=-1))
+        shift = np.minimum(SPAN_NORMAL.fraction_bits - used, self.LARGEST_SHIFT)[:, np.newaxis]
+        start = self._rounded(self._smaller(pieces.left.codes << shift), flip, SPAN_NORMAL.fraction_bits)
+        # Modulo 2: steps that are larger come in pieces of one pixel alone.
+        whole = 1 << self.STEP_BITS
+        shifted = (((step.codes << shift) + whole) & (2 * whole - 1)) - whole
+        exponent = np.minimum(self.STEP_BITS - _used(shifted), self.LARGEST_EXPONENT)
+        word = self._rounded(self._smaller(shifted) << exponent[:, np.newaxis], flip, self.STEP_BITS)
+        return VectorSpans.of(pieces, start=start, step=word, exponent=exponent)
+
+    def _rounded(self, codes: np.ndarray, flip: np.ndarray, point: int) -> np.ndarray:
+        """Codes with ``point`` fraction bits, negated where told, in `FORMAT`."""
+        cut = point - self.FORMAT.fraction_bits
+        return (np.where(flip, -codes, codes) + (1 << (cut - 1))) >> cut
+
+    def _smaller(self, codes: np.ndarray) -> np.ndarray:
+        """Codes with a margin to 1."""
+        return codes - (codes >> self.MARGIN_SHIFT)
+
+
+def _used(codes: np.ndarray) -> np.ndarray:
+    """Bits, without those that repeat the sign, of the components of each vector together."""
+    used = np.bitwise_or.reduce(np.where(codes < 0, ~codes, codes), axis=-1)
+    return np.frexp(used.astype(np.float64))[1].astype(np.int64)

@@ -1,0 +1,85 @@
+"""Record of the vector adapter."""
+
+import numpy as np
+
+from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, SPAN_STEP, Pieces
+from blysk.golden.geometry.vector_adapter import VectorAdapter
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit
+from blysk.sim.units.operands import any_codes, sphere
+from blysk.sim.units.record import Case, Record, Stimulus, Variant
+
+__all__ = ["RECORD"]
+
+_FORMATS = {
+    "left": SPAN_NORMAL,
+    "right": SPAN_NORMAL,
+    "step": SPAN_STEP,
+    "depth": SPAN_DEPTH,
+    "depth_last": SPAN_DEPTH,
+    "depth_step": DEPTH_STEP,
+}
+
+_VECTORS = "left", "right", "step"
+
+
+def _expect(unit, case):
+    words = dict(case.beats)
+    words |= {name: Fixed(format, words[name]) for name, format in _FORMATS.items()}
+    pieces = Pieces(**words | {"flip": words["flip"].astype(bool)}, triangle=np.zeros(0))
+    return VectorAdapter().compute(pieces).beats
+
+
+def _case(rng, **vectors):
+    count = len(vectors["left"])
+    beats = dict(vectors)
+    for name in ("depth", "depth_last", "depth_step"):
+        beats[name] = any_codes(rng, _FORMATS[name], count)
+    beats |= {name: rng.integers(0, 4096, count) for name in ("x", "y")}
+    beats.setdefault("length", rng.integers(1, 4096, count))
+    return Case(beats | {"flip": rng.integers(0, 2, count), "material": rng.integers(0, 1024, count)})
+
+
+def _lines(unit, rng, count):
+    """Ends of all lengths, and the step that leads from the one to the other in 1 to 4095 pixels."""
+    start = sphere(rng, count) * 2.0 ** rng.uniform(-14, 0, (count, 1))
+    end = start + np.linalg.norm(start, axis=1, keepdims=True) * rng.uniform(-0.5, 0.5, (count, 3))
+    length = 4095 >> rng.integers(0, 12, count)
+    step = (end - start) / np.maximum(length - 1, 1)[:, np.newaxis]
+    vectors = {}
+    for name, value in zip(_VECTORS, (start, end, step), strict=True):
+        vectors[name] = Fixed.round(_FORMATS[name], np.clip(value, -1, 1 - 2.0**-26)).codes
+    return _case(rng, length=length, **vectors)
+
+
+def _any(unit, rng, count):
+    """Words of any codes, ends of the range, steps of every size."""
+    return _case(rng, **{name: any_codes(rng, _FORMATS[name], count, 3) for name in _VECTORS})
+
+
+def _sizes(unit, rng, count):
+    """Powers of two, and one less, that decide each bit of a shift."""
+    beats = {}
+    for name in _VECTORS:
+        bits = _FORMATS[name].width - 1
+        largest = rng.integers(0, bits, (count, 1))
+        codes = rng.integers(0, 1 << largest, (count, 3), endpoint=True)
+        codes[:, 0] = (1 << largest[:, 0]) - rng.integers(0, 2, count)
+        codes = np.where(rng.random((count, 3)) < 0.5, codes, ~codes)
+        beats[name] = rng.permuted(codes, axis=1)
+    return _case(rng, **beats)
+
+
+RECORD = Record(
+    name="vector_adapter",
+    title="N/W at the first pixel of a span and its step, as words of the quotient method",
+    source="docs/theory/geometry.md#composition",
+    variants={"": Variant(VectorAdapterUnit, note="1/2 step of each word; shifts are exact")},
+    expect=_expect,
+    stimuli={
+        "lines": Stimulus(_lines, 1000),
+        "any": Stimulus(_any, 1000),
+        "sizes": Stimulus(_sizes, 1000),
+    },
+    axis="",
+)
