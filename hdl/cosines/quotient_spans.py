@@ -133,7 +133,7 @@ class QuotientSpansUnit(wiring.Component):
             }
         )
         second, first = (Signal(waiting, name=name, reset_less=True) for name in ("second", "first"))
-        second_waits, first_waits = Signal(), Signal()
+        second_waits, first_waits = (Signal(name=f"{name}_waits") for name in ("second", "first"))
         start = stream.Signature(self._start_shape()).create(path=("start",))
         self._set_up(m, moves, (second, second_waits), (first, first_waits), start)
 
@@ -148,7 +148,7 @@ class QuotientSpansUnit(wiring.Component):
         m.d.comb += start.ready.eq(advance & takes_start)
         self._take(m, advance, takes, (second_waits, first_waits), start)
         # Half of the second difference is added on the cycle after the first one was taken.
-        halves, ready = Signal(), self._ready
+        halves, ready = Signal(name="halves"), self._ready
         with m.If(advance):
             m.d.sync += halves.eq(takes_first)
         steps = advance & (takes_first | halves | ~ready)
@@ -211,7 +211,7 @@ class QuotientSpansUnit(wiring.Component):
         p, span = self.parameters, self.i.payload
         place = {name: index for index, name in enumerate(p.components)}
         # The turn is a register: it drives the multiplexers of all operands.
-        kind, ends = Signal(_Kind), Signal()
+        kind, ends = Signal(_Kind, name="kind"), Signal(name="ends")
         m.d.comb += [
             ends.eq(Mux(kind == _Kind.START, ~span.length[1:].any(), kind == _Kind.SECOND)),
             self.i.ready.eq(moves & ends),
@@ -325,9 +325,9 @@ class QuotientSpansUnit(wiring.Component):
         """Take words where the span before needs its own no more; count pixels."""
         # Whether at most one, two, three pixels of a span are left, the one on the output among them.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
-        left, valid = Signal(self.length_bits), Signal()
+        left, valid = Signal(self.length_bits, name="left"), Signal(name="valid")
         # Whether the second, the first differences of the next span were taken.
-        has_second, self._ready = Signal(), Signal(name="ready")
+        has_second, self._ready = Signal(name="has_second"), Signal(name="ready")
         # Of the start that waits: two pixels and more; at most two; at most three.
         is_long, at_most_two, at_most_three = self._few
         m.d.comb += [

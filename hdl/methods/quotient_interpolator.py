@@ -90,7 +90,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
             accepted.eq(self.o.valid & self.o.ready),
         ]
         # The bit alternates from span to span, 1 in the first: the state starts as after a span with 0.
-        last, flagged = Signal(), Signal()
+        last, flagged = Signal(name="last"), Signal(name="flagged")
         before = flagged & (last == result.span)
         m.d.sync += self.out_of_range.eq(0)
         with m.If(accepted):

@@ -26,7 +26,7 @@ flatten
 opt_clean
 memory_collect
 opt_clean
-select -set cut t:$mul t:$mem_v2 r:WR_PORTS=0 %i %u
+select -set cut CUT
 cutpoint @cut
 memory_map
 async2sync
@@ -36,6 +36,7 @@ opt_merge
 opt_clean
 chformal -lower
 setundef -undriven -anyseq
+alumacc
 techmap
 aigmap
 write_aiger -zinit -symbols top.aig
@@ -56,6 +57,8 @@ class Harness:
     ----------
     unit : Component
         Unit; it is elaborated at once, so that claims may name what its `elaborate` keeps.
+    multiplies : bool
+        Multipliers are true ones; for operands of few bits.
 
     Attributes
     ----------
@@ -63,8 +66,8 @@ class Harness:
         Module for the registers of a model.
     """
 
-    def __init__(self, unit: Component | None = None):
-        self.m = Module()
+    def __init__(self, unit: Component | None = None, *, multiplies: bool = False):
+        self.m, self.multiplies = Module(), multiplies
         self.unit = unit
         self._ports: list[Value] = []
         self._claims: list[Value] = []
@@ -105,7 +108,7 @@ class Harness:
 
     def without_claims(self) -> "Harness":
         """The same runs, of which nothing is claimed yet."""
-        other = Harness()
+        other = Harness(multiplies=self.multiplies)
         other.m.submodules.runs, other.unit, other._ports = self.m, self.unit, self._ports
         return other
 
@@ -171,7 +174,8 @@ def decide(harness: Harness, folder: Path, cycles: int | None = None) -> Verdict
         If Yosys or ABC fails.
     """
     (folder / "top.il").write_text(harness.netlist())
-    _run_yosys(_SCRIPT, folder)
+    cut = "t:$mem_v2 r:WR_PORTS=0 %i" + ("" if harness.multiplies else " t:$mul %u")
+    _run_yosys(_SCRIPT.replace("CUT", cut), folder)
     engine = f"lcorr; pdr -T {_SECONDS}" if cycles is None else f"bmc3 -F {cycles} -T {_SECONDS}"
     abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
     command = f"read_aiger top.aig; fold; {engine}; print_status; write_cex -n top.cex"

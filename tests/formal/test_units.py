@@ -32,6 +32,7 @@ FURTHER = {
     "pipeline": ("chord, cosquad", "compact", "gate"),
     "power": ("sequential",),
     "quadratic_evaluator": ("horner",),
+    "quotient": ("interval 3",),
     "recurrence": ("direct", "reinsch, interleaved"),
     "specular": ("cosquad, interval 3",),
 }

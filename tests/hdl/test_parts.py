@@ -225,4 +225,4 @@ def test_times_and_parts_of_quotients(lights, highlights):
 def test_parts_of_spans_of_quotients(parameters, multipliers):
     cost = cost_of(unit := QuotientSpansUnit(parameters))
     assert (cost.multipliers, cost.constant_multipliers) == ({(18, 18): multipliers}, 0)
-    assert (unit.multipliers, unit.latency, unit.short_latency) == (multipliers, 7, 5)
+    assert (unit.multipliers, unit.latency, unit.short_latency) == (multipliers, 7, 6)

@@ -1,0 +1,216 @@
+# amaranth: UnusedElaboratable=no
+"""Proofs about spans of the quotient method: each pixel has the words of its own span, and none is lost.
+
+Words have few bits, and the multipliers are true ones. So a start that meets the differences of another span,
+or differences that are overwritten, give words that are refuted.
+"""
+
+from dataclasses import dataclass
+
+import pytest
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.cosines.quotient_spans import QuotientSpans
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.cosines.quotient import pixel_words_shape
+from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit
+
+from .prover import Harness
+from .rules import answers, pixels_follow, stays, taken
+
+pytestmark = pytest.mark.prove
+
+LENGTH_BITS, BITS = 2, 2
+"""Of lengths, and of components."""
+
+
+@dataclass(frozen=True)
+class FewBits(QuotientSpans):
+    """Squares of one fraction bit more than products have, as their differences are halved."""
+
+    @property
+    def square_format(self):
+        """12 bits."""
+        return SQ(-24, 35)
+
+
+class ShortSpansUnit(wiring.Component):
+    """The unit with x and z of `BITS` bits, y = 0, exponents 0 and 1, ``l = x + z``, and few starts."""
+
+    def __init__(self):
+        self.parameters = FewBits()
+        vector = data.StructLayout({"x": signed(BITS), "z": signed(BITS)})
+        span = {"start": vector, "step": vector, "exponent": 1, "length": LENGTH_BITS}
+        super().__init__(
+            {
+                "i": In(stream.Signature(data.StructLayout(span))),
+                "o": Out(stream.Signature(pixel_words_shape(self.parameters))),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.spans = self.spans = spans = QuotientSpansUnit(self.parameters, LENGTH_BITS)
+        spans.DEPTH = DEPTH
+        given, payload = self.i.payload, spans.i.payload
+        for name in ("start", "step"):
+            for place, axis in ((0, "x"), (2, "z")):
+                m.d.comb += payload[name][place].as_value().eq(given[name][axis])
+        m.d.comb += [
+            payload.exponent.eq(given.exponent),
+            payload.length.eq(given.length),
+            spans.i.valid.eq(self.i.valid),
+            self.i.ready.eq(spans.i.ready),
+            *(part.as_value().eq(1) for part in spans.constants[0]),
+            self.o.payload.eq(spans.o.payload),
+            self.o.valid.eq(spans.o.valid),
+            spans.o.ready.eq(self.o.ready),
+        ]
+        return m
+
+
+LONGEST = (1 << LENGTH_BITS) - 1
+DEPTH = 4
+"""Words of the memory of starts, in place of 16; with 2 a start would wait for its own differences."""
+
+
+def words_of(span, place):
+    """m, w, l and z of a pixel of a span, from its vectors alone; a product is one of few bits."""
+    e = span.exponent
+
+    def shifted(value):
+        return Mux(e, value >> 1, value)
+
+    def square(a, d):
+        second = Mux(e, (d * d) << 2 >> 2, (d * d) << 2)
+        first = shifted((a * d) << 2) + (second >> 1)
+        return ((a * a) << 1) + times(first, place) + times(second, pairs(place))
+
+    def line(a, d, bits):
+        return (a << bits) + times(shifted(d << bits), place)
+
+    start, step = span.start, span.step
+    return (
+        square(start.x, step.x),
+        square(start.z, step.z),
+        line(start.x + start.z, step.x + step.z, 2),
+        line(start.z, step.z, 12),
+    )
+
+
+def pairs(place):
+    """``i (i - 1)/2``"""
+    return Mux(place == 3, 3, place == 2)
+
+
+def times(value, count):
+    """Product with 0 to 3."""
+    return Mux(count[0], value, 0) + Mux(count[1], value << 1, 0)
+
+
+def of_spans(*, multiplies=False, held=True):
+    """Spans of 1 to 3 pixels; a span that was offered stays until it is accepted, but may pause."""
+    h = Harness(unit := ShortSpansUnit(), multiplies=multiplies)
+    given = Value.cast(unit.i.payload)
+    offered, before = Signal(), Signal.like(given)
+    h.m.d.sync += [offered.eq((offered | unit.i.valid) & ~taken(unit.i)), before.eq(given)]
+    h.assume(unit.i.payload.length != 0)
+    if held:
+        h.assume(~offered | (given == before))
+    return h
+
+
+def of_words(*, held=True):
+    """Each pixel of any span has the words of that span alone; and its bit differs from the span before."""
+    h = of_spans(multiplies=True, held=held)
+    unit, before = h.unit, Signal()
+    with h.m.If(taken(unit.o)):
+        h.m.d.sync += before.eq(unit.o.payload.span)
+
+    def right(span, place, last, pixel):
+        m, w, line, z = words_of(span, place)
+        found = (pixel.numerator[0], m), (pixel.rest, w), (pixel.line[0], line)
+        same = [Value.cast(word).as_signed() == exact for word, exact in found]
+        return Cat(*same, pixel.away[0] == (z < 0), (pixel.span != before) == (place == 0)).all()
+
+    pixels_follow(h, unit.i, unit.o, unit.i.payload.length, unit.spans.spans_inside * LONGEST, right)
+    return h
+
+
+def of_progress():
+    """While a pixel is to come and the output is ready, a pixel leaves in as many cycles as the latency."""
+    h = of_spans()
+    unit = h.unit
+    owed = pixels_follow(h, unit.i, unit.o, unit.i.payload.length, unit.spans.spans_inside * LONGEST)
+    answers(h, owed.any(), taken(unit.o), unit.spans.latency, unit.o.ready)
+    return h
+
+
+CYCLES = 12
+"""From power-up, of what is not decided in time for runs of any length; each one more doubles the time."""
+
+
+def test_words(prove):
+    """Spans of 1 to 3 pixels, in `CYCLES`: each pixel leaves once, in order, with the words of its span.
+
+    So no start is taken before its differences, no differences are overwritten, and no start is lost.
+    """
+    prove(of_words(), CYCLES)
+
+
+def test_progress(prove):
+    """In `CYCLES`: pixels leave without a pause longer than the latency."""
+    prove(of_progress(), CYCLES)
+
+
+def test_stability_and_admission(prove):
+    """Inductive: what waits stays; a span is accepted in 9 cycles while the output is ready.
+
+    These are its three turns, and two spans of three pixels before it.
+    """
+    h = of_spans()
+    stays(h, h.unit.o)
+    answers(h, h.unit.i.valid, h.unit.i.ready, 9, h.unit.o.ready)
+    prove(h)
+
+
+BUGS = {
+    "a start does not wait for its differences": ("_take", "last & (self._ready | ~is_long)", "last"),
+    "starts are lost": ("_set_up", " | (at_sums[2] & ~to_start.ready)", ""),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_bugs_are_found(refute, inject, bug):
+    """Injected in the unit, each refutes the claims on words."""
+    inject(QuotientSpansUnit, *BUGS[bug])
+    refute(of_words(), CYCLES)
+
+
+def of_waiting():
+    """Differences that wait, second and first ones, are the same as a cycle before if they waited then."""
+    h = Harness(QuotientSpansUnit(length_bits=LENGTH_BITS))
+    for name in ("second", "first"):
+        waits, word = h.register(f"{name}_waits"), Value.cast(h.register(name))
+        waited, before = Signal(), Signal(len(word))
+        h.m.d.sync += [waited.eq(waits), before.eq(word)]
+        h.claim(~(waited & waits) | (word == before))
+    return h
+
+
+def test_differences_that_wait_stay(prove):
+    """Inductive, of the whole unit: none is overwritten before it is taken."""
+    prove(of_waiting())
+
+
+def test_overwritten_differences_are_found(refute, inject):
+    """Without the stall that holds first ones off. Second ones never come before their register is free."""
+    inject(QuotientSpansUnit, "_set_up", "(at_coarse[1] & first[1]) | ", "")
+    refute(of_waiting(), 30)
+
+
+def test_a_span_that_changes_is_found(refute):
+    """A span that changes between its turns refutes them: so its source has to hold the payload."""
+    refute(of_words(held=False), CYCLES)
