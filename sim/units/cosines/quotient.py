@@ -136,4 +136,12 @@ RECORD = Record(
     stimuli={"vectors": Stimulus(_vectors, 3000), "words": Stimulus(_words, 3000)},
     axis="length of the vector",
     logarithmic=True,
+    still={
+        "r is 1/2 at least": (
+            "{roots_word,roots,port__data}[18] {root,cosine_0_b,square_root_a,square_root_b}[16]"
+        ),
+        "no square has bit 1": "square_root[1]",
+        "shifts of q and m are even": "octave_0[0]",
+        "the smaller of m and w is under q": "octaves_0[5]",
+    },
 )

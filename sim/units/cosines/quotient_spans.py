@@ -83,12 +83,12 @@ def _spans(unit, rng, count):
 
 
 def _words(unit, rng, count):
-    """Ends of words in every component; steps and exponents at random: sums wrap, as in the model."""
+    """Ends of words in every component and light; any steps and exponents: sums wrap, as in the model."""
     length = np.maximum(rng.choice([1, 1, 1, 2, 3, 4, 5, 6, 7, 9, 40], count) % (1 << unit.length_bits), 1)
     shape = count, len(unit.parameters.components)
     start, step = (np.maximum(word_ends(rng, *shape), 1 - (1 << 17)) for _ in range(2))
     vectors = SpanVectors(start, step, rng.integers(0, 16, count))
-    return _case(unit, vectors, length, line_directions(rng, unit.parameters.lights))
+    return _case(unit, vectors, length, word_ends(rng, unit.parameters.lights, 2))
 
 
 def _long_spans(unit, rng, count):
@@ -134,9 +134,15 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "spans": Stimulus(_spans, 3000),
-        "words": Stimulus(_words, 500),
+        "words": Stimulus(_words, 500, repeats=4),
         "long spans": Stimulus(_long_spans, stalled=False),
     },
     axis="pixels of the span",
     logarithmic=True,
+    still={
+        "a word of the memory stays free": "starts_level[4]",
+        "w's second difference is positive and under 2": "second[97] change_1[48]",
+        "that of z is a multiple of 2^3": "second[98-100]",
+        "cos a is not negative": "line_z0_b[17]",
+    },
 )
