@@ -224,7 +224,7 @@ BUGS = {
         "return source.valid, source.ready",
         "return source.valid, 1",
     ),
-    "spans overtake a write": ("ambient", "_admit", "unlocked.eq(~self.write.valid & ", "unlocked.eq("),
+    "spans overtake a write": ("ambient", "_admit", "unlocked.eq(~write_waits & ", "unlocked.eq("),
     "a light takes what the other does not": (
         "compact",
         "_connect_lights",
@@ -251,9 +251,9 @@ def test_bugs_are_found(refute, inject, stubs, bug):
 
 
 WRITE_BUGS = {
-    "constants change under a span": ("frame.hold.eq(~idle)", "frame.hold.eq(0)"),
+    "constants change under a span": ("hold = ~idle", "hold = idle & ~idle"),
     "a write waits for ever": ("finished & is_one", "finished & ~is_one"),
-    "a span is taken in beside a write": ("unlocked.eq(~self.write.valid & ", "unlocked.eq("),
+    "a span is taken in beside a write": ("unlocked.eq(~write_waits & ", "unlocked.eq("),
     "the count forgets a span that came": ("Mux(went, 2, 0)", "Mux(went, 2, 1)"),
     "empty spans are counted": ("self.i.valid & (self.i.payload.length != 0)", "self.i.valid"),
 }
@@ -270,8 +270,8 @@ CONSTANT_BUGS = {
     "constants change under a span": (
         ShadingPipelineUnit,
         "_admit",
-        "frame.hold.eq(~idle)",
-        "frame.hold.eq(0)",
+        "hold = ~idle",
+        "hold = idle & ~idle",
     ),
     "a write is kept before it is taken": (
         FrameConstantsUnit,
