@@ -73,7 +73,8 @@ _OF_TYPE = {
 }
 
 _OF_NAME = {
-    "folder": _BAD_FOLDERS,
+    # `blysk pages` makes its folder, and those above it.
+    "folder": [*split("file|file/folder"), "x" * 300],
     "mesh": _BAD_MESHES,
     "meshes": _BAD_MESHES,
     "address": _BAD_ADDRESSES,
