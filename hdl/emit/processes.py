@@ -38,14 +38,17 @@ class _Guard:
         self._process: subprocess.Popen | None = None
         self._owner = 0
 
-    def add(self, number: int) -> None:
-        """Guard a process group; start the guard with the first."""
+    def begin(self) -> None:
+        """Start the guard unless it runs, before a program that may be killed at once with its parent."""
         with self._lock:
-            self._running.add(number)
             if self._process is None or self._owner != os.getpid():
                 self._start()
-            else:
-                self._tell(b"+%d\n" % number)
+
+    def add(self, number: int) -> None:
+        """Guard a process group; the guard has begun."""
+        with self._lock:
+            self._running.add(number)
+            self._tell(b"+%d\n" % number)
 
     def discard(self, number: int) -> None:
         """Guard it no more; nothing happens if it is not guarded."""
@@ -107,8 +110,10 @@ class Process(_Popen):
 
     def __init__(self, command: Sequence[Any], *rest: Any, **options: Any):
         self._grouped = os.name == "posix"
-        if self._grouped and not options.get("start_new_session"):
-            options.setdefault("process_group", 0)
+        if self._grouped:
+            _guard.begin()
+            if not options.get("start_new_session"):
+                options.setdefault("process_group", 0)
         super().__init__(command, *rest, **options)
         if self._grouped:
             _guard.add(self.pid)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from blysk.hdl.emit import processes
 from blysk.hdl.emit.processes import Process, run_program
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
@@ -16,6 +17,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
 # A shell that starts a program in turn, as a compiler does.
 PARENT = """
 import sys, threading
+from blysk.hdl.emit import processes
 from blysk.hdl.emit.processes import Process, run_program
 run_program(["true"])
 shell = ["sh", "-c", "sleep 300 & echo $! >> numbers; sleep 300 & echo $! >> numbers; wait"]
@@ -79,6 +81,21 @@ def test_a_guard_that_was_killed_is_replaced(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == -signal.SIGKILL
     wait(lambda: not any(map(runs, map(int, done.stdout.split()))))
+
+
+def test_the_guard_begins_before_the_first_program(monkeypatch):
+    """A parent that is killed as soon as its first program runs leaves it to a guard that is there."""
+    begun, begin = [], processes._Popen.__init__
+
+    def begins(self, command, *rest, **options):
+        begun.append(command[-1])
+        begin(self, command, *rest, **options)
+
+    monkeypatch.setattr(processes._Popen, "__init__", begins)
+    monkeypatch.setattr(processes, "_guard", guard := processes._Guard())
+    run_program(["true"])
+    guard.stop()
+    assert begun == [processes._GUARD, "true"]
 
 
 def test_run_program_is_run():
