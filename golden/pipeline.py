@@ -112,7 +112,7 @@ class Design:
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
-    interpolator: Interpolator = field(default_factory=ChordInterpolator)
+    interpolator: Interpolator = field(default_factory=QuotientInterpolator)
     specular: Specular | Power | Lobe | None = field(default_factory=Lobe)
     lights: int = 1
     materials: int = 1

@@ -22,7 +22,17 @@ from blysk.golden.pipeline import Build, Design
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
 from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS, ReflectionModel
 
-__all__ = ["LOBES", "METHODS", "METHOD_LINES", "MIRROR_LOBES", "MODELS", "MODEL_LINES", "PUBLISHED", "preset"]
+__all__ = [
+    "LOBES",
+    "METHODS",
+    "METHOD_LINES",
+    "MIRROR_LOBES",
+    "MODELS",
+    "MODEL_LINES",
+    "PUBLISHED",
+    "default_method",
+    "preset",
+]
 
 _MODULES = (
     linear_interpolator,
@@ -85,8 +95,29 @@ MODEL_LINES: dict[str, str] = {
 """A line about each reflection model, for the help of the command line."""
 
 
+def default_method(
+    model: str | ReflectionModel | None = "blinn",
+    gate: bool = False,
+    operand: Operand | None = None,
+    setup_interval: int | None = None,
+) -> str:
+    """The method of a design that names none.
+
+    It is ``quotient``. ``chord`` serves what ``quotient`` lacks: a model of `MODELS`, which has a unit of its
+    own in place of a table; a highlight gate; an operand; a setup interval. Models of R·V need ``quotient``.
+
+    Parameters
+    ----------
+    model, gate, operand, setup_interval
+        As for `preset`.
+    """
+    if model in MIRROR_LOBES:
+        return "quotient"
+    return "chord" if model in MODELS or gate or operand or setup_interval else "quotient"
+
+
 def preset(
-    method: str = "chord",
+    method: str | None = None,
     model: str | ReflectionModel | None = "blinn",
     lights: int = 1,
     *,
@@ -101,11 +132,11 @@ def preset(
 
     Parameters
     ----------
-    method : str
-        One of `METHODS` or `PUBLISHED`.
+    method : str, optional
+        One of `METHODS` or `PUBLISHED`; by default that of `default_method`.
     model : str or ReflectionModel or None
-        One of `MODELS` or `LOBES`; or a reflection model of N·H, such as a `TabulatedModel`, for which the
-        design has a table; ``None``: no specular light.
+        One of `MODELS`, `LOBES` or, of the method ``quotient``, `MIRROR_LOBES`; or a reflection model of N·H,
+        such as a `TabulatedModel`, for which the design has a table; ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16.
     operand : {"cosine", "one_minus_cosine"}, optional
@@ -127,13 +158,15 @@ def preset(
     ValueError
         If a name is unknown, the method lacks an option, or `Design` refuses a value.
     """
+    if method is None:
+        method = default_method(model, options.get("gate", False), operand, setup_interval)
     if method not in METHODS | PUBLISHED:
         raise ValueError(f"method must be one of {', '.join(METHODS | PUBLISHED)}, not {method!r}")
     specular = _specular(model)
     interpolator = (METHODS | PUBLISHED)[method]
     if operand not in (None, interpolator.operand):
         if not isinstance(interpolator, NormalInterpolator):
-            raise ValueError(f"method {method} finds no normals, and gives 1 - cos gamma")
+            raise ValueError(f"method {method} finds no normals, so it has one operand")
         interpolator = replace(interpolator, operand=operand)
     of_design = {field.name for field in fields(Design)}
     own = {name: options.pop(name) for name in list(options) if name not in of_design}

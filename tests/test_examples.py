@@ -44,7 +44,7 @@ def test_notebook(path, capsys):
     assert "data:image/png;base64," in frame._repr_html_()
     drawn = capsys.readouterr().out
     rows = [line.split()[0] for line in drawn.splitlines() if "cycles, largest" in line]
-    assert rows == ["linear", "chord"]
+    assert rows == ["linear", "quotient"]
     assert namespace["text"].startswith("//")
     assert namespace["scene"].width == 160
     assert np.unique(frame.image.reshape(-1, 3), axis=0).shape[0] > 100

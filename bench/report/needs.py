@@ -109,9 +109,9 @@ QUICK_SCENES = (
 def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]:
     build, options = SCENES[name]
     scene = build(*size)
-    return scene, specialise(
-        scene, options and preset(**{"model": "cosquad", "lights": len(scene.lights)} | options)
-    )
+    counts = {"lights": max(len(scene.lights), 1), "materials": len(scene.materials)}
+    options = options or {"method": "chord", "gate": True}
+    return scene, specialise(scene, preset(**{"model": "cosquad"} | counts | options))
 
 
 def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:

@@ -38,7 +38,7 @@ COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 
 _LEFT_OUT = ("size", "projection", "viewer", "target", "method", "operand", "gate", "setup_interval", "style")
 
-_DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
+_DEFAULTS = {"triangles": 1000, "back_faces": "cull", "method": "chord"}
 
 _TOLD = _DEFAULTS | {"model": "blinn, on a 25F cosquad"}
 

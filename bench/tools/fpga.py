@@ -125,10 +125,10 @@ def _pipelines(
     given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1, top: str = "shader", setups: int = 1
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
     """The pipeline or another core by the given options, with one method or with every method."""
-    for method in METHODS if every else (given.get("method", DESIGN["method"].default),):
+    for method in METHODS if every else (given.get("method"),):
         chosen = {**given, "method": method}
         made = design(lights=lights, **chosen)
-        name = [f"{'pipeline' if top == 'shader' else top} {method}", made.model or "no model"]
+        name = [f"{'pipeline' if top == 'shader' else top} {made.method}", made.model or "no model"]
         name += [f"{lights} lights" if lights != 1 else "1 light"]
         name += [chosen[option] for option in ("operand",) if option in chosen]
         name += [made.build.style] if made.build.style != "throughput" else []

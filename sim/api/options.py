@@ -311,14 +311,15 @@ SCENE: dict[str, Option] = {
 DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
-        "chord",
-        "Interpolation along a span.",
+        None,
+        "Interpolation along a span.  [default: quotient; chord with --gate, --operand, --setup-interval, or "
+        "a model that is from no table]",
         "pipeline.method",
     ),
     "model": Option(
         Model(),
         "blinn",
-        "Reflection model; every method serves each but phong. A file holds a curve of N.H, measured.",
+        "Reflection model; every method serves each, phong quotient alone. A file holds a curve of N.H.",
         "pipeline.model",
     ),
     "operand": Option(

@@ -404,7 +404,8 @@ def _check_geometry(settings: Settings, design: Design) -> None:
 
 def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:
     """Refuse materials with more lobes than the pipeline has tables, or with others than its fixed ones."""
-    if not design.loads_tables:
+    counted = len(scene.materials) == design.materials and len(scene.lights) <= design.lights
+    if not (design.loads_tables and counted):
         return
     try:
         constants_of(scene, design)
@@ -440,8 +441,7 @@ def _shrink(settings: Settings, error: CompilerMissing) -> None:
     share = min(1.0, *(most / side for most, side in zip(SLOW_SIZE, size, strict=True)))
     width, height = (max(1, round(side * share)) for side in size)
     settings.values["size"] = width, height
-    text = f"pysim at {width}x{height} instead of cxxrtl, {error}"
-    warnings.warn(text, RuntimeWarning, stacklevel=4)
+    warnings.warn(f"pysim at {width}x{height} instead of cxxrtl, {error}", RuntimeWarning, stacklevel=4)
 
 
 def render(

@@ -84,14 +84,14 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         # fresnel                           # F_0 of Schlick's reflection, a colour; by default none
 
         [pipeline]
-        method = "chord"
-        model = "cosquad"
-        operand = "cosine"                  # "one_minus_cosine"
-        setup_interval = 4
+        method = "quotient"
+        model = "blinn"
         style = "throughput"                # "compact"
-        gate = false                        # the highlight gate
+        gate = false                        # the highlight gate, of other methods
         specialise = false                  # only what the scene needs
         short_words = false                 # with specialise: words as short as the error bound allows
+        # operand = "cosine"                # "one_minus_cosine", of methods that find unit normals
+        # setup_interval = 4                # of methods with that choice
         # geometry = "software"             # "hardware": simulate triangles to spans and the depth test, too
         # setups = 1                        # with hardware: lanes of triangle setup, 1 or 2
         # coarse = false                    # with hardware: drop hidden spans before shading

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from blysk.golden.presets import default_method
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Triple
 from blysk.golden.reference.scene import Scene
@@ -129,6 +130,9 @@ def read_settings(
     merged = dict.fromkeys(table) | every | values | given
     if "view" in merged:
         _turn_view(merged, {*given, *values})
+    if "method" in merged and merged["method"] is None:
+        lacked = ("model", "gate", "operand", "setup_interval")
+        merged["method"] = default_method(**{name: merged[name] for name in lacked})
     settings = Settings(source, merged, frozenset(given) | frozenset(values), origins)
     with settings.located():
         _check_pairs(settings)

@@ -91,8 +91,7 @@ def specialise(
     scenes : Scene or sequence of Scene
         One scene, or several that differ in the camera only.
     full : Design, optional
-        Method and model, with as many lights and materials as the scene. By default, the chord method with a
-        highlight gate.
+        Method and model, with as many lights and materials as the scene; by default those of `preset`.
     exact : bool
         Whether the pixels must be those of the full pipeline to the bit.
 
@@ -104,7 +103,7 @@ def specialise(
     scenes = (scenes,) if isinstance(scenes, Scene) else tuple(scenes)
     if full is None:
         lights, materials = max(len(scenes[0].lights), 1), len(scenes[0].materials)
-        full = preset("chord", "cosquad", lights=lights, materials=materials, gate=True)
+        full = preset(lights=lights, materials=materials)
     scenes, unlit = _without_dark_lights(scenes, full, exact)
     scenes, merged = _without_equal_materials(scenes, full)
     reductions = [*unlit, *merged]

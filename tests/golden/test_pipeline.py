@@ -128,11 +128,11 @@ def test_empty_spans_give_nothing():
 def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
         preset("quadratic", "cosquad", operand="sine")
-    for method in ("angular", "chord"):
-        with pytest.raises(ValueError, match=rf"^method {method} finds no normals, and gives 1 - cos gamma$"):
+    for method in ("angular", "chord", "quotient"):
+        with pytest.raises(ValueError, match=rf"^method {method} finds no normals, so it has one operand$"):
             preset(method, "cosquad", operand="cosine")
     with pytest.raises(ValueError, match=r"^lights must be 0 to 16, not -1$"):
-        preset(model="cosquad", lights=-1)
+        preset(lights=-1)
     spans = Spans(*np.zeros((3, 1), dtype=int), np.array([[0, 0, ONE]]), np.array([[0, 0, 2**17]]))
     spans.length[:] = 2
     constants = constants_of([(UP, 0.5, 0.5)])

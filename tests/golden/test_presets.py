@@ -1,7 +1,9 @@
 """Designs by name: a line about each method and model, and names that there are not."""
 
+import numpy as np
 import pytest
 
+from blysk.golden.pipeline import Design
 from blysk.golden.presets import (
     LOBES,
     METHOD_LINES,
@@ -10,8 +12,10 @@ from blysk.golden.presets import (
     MODEL_LINES,
     MODELS,
     PUBLISHED,
+    default_method,
     preset,
 )
+from blysk.golden.reference.lobes import TabulatedModel
 
 
 def test_every_name_has_a_line():
@@ -32,3 +36,25 @@ def test_every_name_has_a_line():
 def test_unknown_names(names, message):
     with pytest.raises(ValueError, match=message):
         preset(**names)
+
+
+CURVE = TabulatedModel.of_points("curve", np.array([0.0, 0.5, 1.0]), np.array([0.1, 0.2, 1.0]))
+
+
+@pytest.mark.parametrize("model", [*MODELS, *LOBES, *MIRROR_LOBES, CURVE, None], ids=str)
+def test_the_default_method_serves_every_model(model):
+    """By the unit that the model has: ``quotient`` where that is a table."""
+    made = preset(model=model)
+    assert made.method == ("chord" if model in MODELS else "quotient")
+    assert made == preset(default_method(model), model)
+    assert made.loads_tables == (model is not None and model not in MODELS)
+    assert Design() == preset()
+
+
+@pytest.mark.parametrize(
+    "asked", [{"gate": True}, {"operand": "one_minus_cosine"}, {"setup_interval": 9}], ids=str
+)
+def test_chord_is_the_default_of_what_quotient_lacks(asked):
+    assert preset(**asked) == preset("chord", **asked)
+    assert default_method("phong", **asked) == "quotient"
+    assert not METHODS["quotient"].serves_gate

@@ -164,6 +164,8 @@ def test_designs():
     full = {"method": "chord", "style": "compact", "setup_interval": 9, "gate": True}
     whole = "pipeline chord, blinn, 2 lights, compact, interval 9, gate"
     assert names(fpga._pipelines(full, 2, False)) == [whole]
+    assert names(fpga._pipelines({}, 1, False)) == ["pipeline quotient, blinn, 1 light"]
+    assert names(fpga._pipelines({"model": "exp"}, 1, False)) == ["pipeline chord, exp, 1 light"]
     assert names(fpga._pipelines({}, 1, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
 
 
@@ -187,7 +189,7 @@ def test_designs():
         (["--family", "ice40"], "--family ice40: unknown family; use one of ecp5, nexus"),
         (["--method", "none"], "--method none: unknown method; use one of"),
         (
-            ["--model", "phong"],
+            ["--method", "chord", "--model", "phong"],
             "--model phong: method chord finds N.H, not R.V; use method quotient; or phong_coplanar",
         ),
         (["--json", "nowhere/x"], "nowhere/x: cannot be written, there is no folder nowhere; make"),

@@ -25,7 +25,7 @@ TINY = {"triangles": 100, "size": (16, 12)}
 
 @pytest.fixture(scope="module")
 def frame():
-    return blysk.render("teapot", method="chord", exponent=200, triangles=500, size=(64, 48))
+    return blysk.render("teapot", exponent=200, triangles=500, size=(64, 48))
 
 
 def test_import_is_quick():
@@ -59,7 +59,7 @@ def test_a_scene_warns_of_what_is_not_read(tmp_path):
 def test_frame_is_that_of_the_model(frame):
     expected = model_frame(frame.scene, frame.design)
     np.testing.assert_array_equal(frame.image, expected.image)
-    assert frame.design == preset("chord", "blinn")
+    assert frame.design == preset("quotient", "blinn")
     assert frame.error == compare(frame.scene, frame.design, expected).method_error
     assert (frame.spans, frame.pixels) == (expected.spans, expected.pixels)
     assert frame.cycles == frame.figures["cycles"] > frame.pixels
@@ -72,11 +72,11 @@ def test_frame_in_a_notebook(frame):
         np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png))), frame.image)
     assert f"{frame.cycles:,}" in frame._repr_html_()
     assert f"{frame.error.max_lsb:.3f} LSB" in frame._repr_html_()
-    assert repr(frame) == f"<RenderedFrame teapot 64x48, chord, blinn, {frame.cycles:,} cycles>"
+    assert repr(frame) == f"<RenderedFrame teapot 64x48, quotient, blinn, {frame.cycles:,} cycles>"
 
 
 def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
-    options = ["--method", "chord", "--exponent", "200", "--triangles", "500", "--size", "64x48"]
+    options = ["--exponent", "200", "--triangles", "500", "--size", "64x48"]
     assert main(["render", "teapot", *options, "-o", str(tmp_path / "a.png")]) == 0
     short = capsys.readouterr().out.splitlines()
     assert len(short) <= 8
@@ -100,7 +100,7 @@ def test_design_and_verilog(capsys):
         "chord", "blinn", lights=2, materials=3, gate=True, style="compact", setup_interval=9
     )
     assert design.build == build
-    assert blysk.design() == preset(model="blinn") == blysk.Design()
+    assert blysk.design() == preset("quotient", "blinn") == preset() == blysk.Design()
     assert main(["verilog", "--method", "linear", "--name", "core"]) == 0
     assert blysk.verilog(blysk.design(method="linear"), name="core") == capsys.readouterr().out
 
@@ -209,11 +209,11 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         ("teapot", {"target": (1, 2, 3)}, "target 1,2,3: the camera has no position; "),
         (
             "teapot",
-            {"model": "phong"},
+            {"method": "chord", "model": "phong"},
             "model phong: method chord finds N.H, not R.V; use method quotient; or phong_coplanar, ",
         ),
         ("teapot", {"method": "chord", "operand": "cosine"}, "operand cosine: method chord finds no normals"),
-        ("teapot", {"viewer": "near"}, "method chord: point lights and a near viewer need "),
+        ("teapot", {"viewer": "near"}, "method quotient: point lights and a near viewer need "),
         ("teapot", {"pipes": 3}, "pipes 3: no such number; give one of 1, 2, 4, 8"),
         ("teapot", {"pipes": 16}, "pipes 16: out of range; give one of 1, 2, 4, 8"),
         ("teapot", {"pipes": 8, "size": (40, 7)}, "pipes 8: the picture has 7 rows; give at most one for "),
@@ -225,10 +225,10 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         (SCENE_OF_ITS_OWN, {"exponent": 3}, "exponent 3: the scene has its own; "),
         (
             SCENE_OF_ITS_OWN,
-            {"design": preset(model="cosquad"), "method": "chord"},
+            {"design": preset(), "method": "quotient"},
             "method: the design has its own; ",
         ),
-        (SCENE_OF_ITS_OWN, {"design": preset(model="cosquad", materials=2)}, "design: the "),
+        (SCENE_OF_ITS_OWN, {"design": preset(materials=2)}, "design: the "),
     ],
     ids=str,
 )

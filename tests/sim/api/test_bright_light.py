@@ -46,4 +46,4 @@ def test_a_light_that_is_off_is_not_built():
     settings = rendering_settings("teapot", {"lights": [key, *off], "size": (16, 12), "triangles": 220})
     ready = prepare_rendering(settings, engine="pysim")
     assert ready.scenes[0].lights == (key,)
-    assert (ready.design.lights, ready.design.method) == (1, "chord")
+    assert (ready.design.lights, ready.design.method) == (1, "quotient")

@@ -157,9 +157,9 @@ UNKNOWN = "use one of software, hardware"
         ((*RENDER, "--coarse"), "--coarse", "give geometry hardware, too"),
         ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "give geometry hardware, too"),
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
-        ((*RENDER, *HARDWARE, *QUOTIENT, "--light", "1,1,1", "--light", "0,1,1"), "", ONE_LIGHT),
+        ((*RENDER, *HARDWARE, "--light", "1,1,1", "--light", "0,1,1"), "", ONE_LIGHT),
         ((*VERILOG, *HARDWARE, *QUOTIENT, "--lights", "2"), "", ONE_LIGHT),
-        ((*RENDER, *HARDWARE, *QUOTIENT, "--model", "phong"), "", "use model blinn, or use software"),
+        ((*RENDER, *HARDWARE, "--model", "phong"), "", "use model blinn, or use software"),
         # It would send spans.
         ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
         ((*VERILOG, "--coarse", "64x48"), "--coarse", "give --top render, too"),

@@ -78,7 +78,7 @@ KNOWN_LOBES = f"use one of {', '.join(LOBES)}, "
         (["--point-light", "1,2,3,1,1,1,1,-1,0"], "--point-light 1,2,3,1,1,1,1,-1,0", "coefficients of 0 or"),
         (["--spot-light", "1,2,3,0,0,0,10,20"], "--spot-light 1,2,3,0,0,0,10,20", "spot must not be 0, 0, 0"),
         (["--spot-light", "1,2,3,0,1,0,20,10"], "--spot-light 1,2,3,0,1,0,20,10", "give an axis other than"),
-        (["--spot-light", "1,2,3,0,1,0,10,20"], "--method chord", "use method chord-local"),
+        (["--spot-light", "1,2,3,0,1,0,10,20"], "--method quotient", "use method chord-local"),
         (["--roughness", "0.3"], "--roughness 0.3", "leave it out, or give exponent"),
     ],
 )
@@ -89,7 +89,9 @@ def test_bad_option(refused, options, thing, says):
 @pytest.mark.parametrize("command", [["render", "teapot"], ["verilog", "-o", "core.v"]])
 def test_design_that_cannot_be(refused, command):
     says = "finds N.H, not R.V; use method quotient; or phong_coplanar, "
-    refused(*command, "--model", "phong", thing="--model phong", says=says)
+    refused(*command, "--method", "chord", "--model", "phong", thing="--model phong", says=says)
+    says = "quotient has no error bound for one; leave it out"
+    refused(*command, "--gate", "--model", "phong", thing="--gate", says=says)
     says = "method chord finds no normals"
     refused(*command, "--method", "chord", "--operand", "cosine", thing="--operand cosine", says=says)
     says = "method linear is not built for it; "

@@ -67,7 +67,7 @@ def test_picture_is_the_simulated_frame(rendered):
         height=48,
         **DEFAULTS,
     )
-    expected = FrameSimulator(preset("chord", "blinn")).render(scene).image
+    expected = FrameSimulator(preset()).render(scene).image
     folder, _ = rendered
     assert np.array_equal(picture(folder / "a.png"), expected)
     both = picture(folder / "both.png")
@@ -81,7 +81,7 @@ def test_figures(rendered):
     figures = json.loads((folder / "a.json").read_text())
     fixed = {
         "mesh": "teapot",
-        "method": "chord",
+        "method": "quotient",
         "model": "blinn",
         "exponent": 50,
         "lights": 1,

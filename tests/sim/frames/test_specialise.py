@@ -268,9 +268,9 @@ def test_nothing_on_the_picture():
     assert (special.design.model, special.design.length_bits) == (None, 2)
 
 
-def test_default_is_the_chord_method_with_a_gate():
+def test_default_is_that_of_the_presets():
     scene = scene_of(lights=())
-    assert specialise(scene).full == preset("chord", "cosquad", gate=True)
+    assert specialise(scene).full == preset()
 
 
 @pytest.mark.long

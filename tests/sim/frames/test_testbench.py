@@ -28,7 +28,7 @@ LAYERS = ("golden", "hdl", "sim", "bench")
 def made(tmp_path_factory):
     """A folder as the command writes it."""
     folder = tmp_path_factory.mktemp("made") / "bench"
-    assert main(["verilog", "--method", "chord", "--testbench", str(folder)]) == 0
+    assert main(["verilog", "--testbench", str(folder)]) == 0
     return folder
 
 
@@ -80,7 +80,7 @@ def rows(path):
 @pytest.mark.parametrize(
     "design",
     [
-        preset(model="cosquad", lights=0),
+        preset(lights=0),
         pytest.param(preset("chord-local", "cosquad", lights=2, materials=3), marks=pytest.mark.long),
         pytest.param(preset("linear", None, grey=True, exponent=9), marks=pytest.mark.long),
     ],
@@ -120,7 +120,7 @@ def test_what_is_in_the_folder(made):
     assert sorted(path.name for path in made.iterdir()) == FILES
     assert sorted(path.name for path in (made / "vectors").iterdir()) == TABLES
     readme = (made / "README.md").read_text()
-    assert "- method chord, model blinn, lights 1, materials 1, throughput style\n" in readme
+    assert "- method quotient, model blinn, lights 1, materials 1, throughput style\n" in readme
     assert "$" not in readme
     for table, counted in (
         ("spans", "spans of a teapot"),
@@ -148,7 +148,7 @@ def test_imports_nothing_of_the_project(made):
 def test_an_empty_folder_will_do_and_verilog_in_a_file_too(made, tmp_path, capsys):
     core, folder = tmp_path / "core.v", tmp_path / "bench"
     folder.mkdir()
-    assert main(["verilog", "--method", "chord", "-o", str(core), "--testbench", str(folder)]) == 0
+    assert main(["verilog", "-o", str(core), "--testbench", str(folder)]) == 0
     assert capsys.readouterr().out == ""
     assert sorted(path.name for path in folder.iterdir()) == FILES
     assert core.read_text() == (folder / "blysk.v").read_text() == (made / "blysk.v").read_text()
