@@ -11,7 +11,7 @@ PORT_DESCRIPTIONS = {
     "i_normal_right": "normal at the last pixel centre, see above",
     "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
     "i_factors": "codes of a, each light's that fades, at the same three pixels",
-    "i_start": "N/W at the first pixel centre in the frame of each light, see above, times any factor",
+    "i_start": "N/W at the first pixel centre, in each light's frame: H along z, L and V in the xz plane",
     "i_step": "its step to the next pixel, times 2^exponent",
     "i_exponent": "0 to 15",
     "i_material": "index of the span's material; past the last it counts as the last",

@@ -3,15 +3,23 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 
-from blysk.golden.bus.byte_layout import ByteLayout
+from amaranth.lib.wiring import Component
+
+from blysk.golden.bus.byte_layout import ByteLayout, Field
 from blysk.golden.bus.registers import ADDRESS_BITS, ERRORS, WORD_BITS, Register
 from blysk.hdl.bus.bus import BusUnit
 from blysk.sim.run_files import MARK
 
-__all__ = ["DOCUMENTS", "documents_of", "layout_lines"]
+__all__ = ["DOCUMENTS", "FRAME", "documents_of", "layout_lines", "takes_frame"]
 
 DOCUMENTS = (".md", ".h", ".svd")
 """Suffixes of the documents."""
+
+FRAME = "in the light's frame: H along z, L and V in the xz plane"
+"""Of which frame the vectors N/W of spans or corners are, for a method that takes them."""
+
+_IN_FRAME = ("normal", "start")
+"""Fields of a beat that hold such vectors."""
 
 _SPACE = 1 << ADDRESS_BITS
 _IN_SVD = {
@@ -37,6 +45,19 @@ def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
     return dict(zip(DOCUMENTS, texts, strict=True))
 
 
+def takes_frame(core: Component) -> bool:
+    """Whether the vectors of a core's spans or corners are those of a light's frame."""
+    if "step" in core.i.payload.shape().members:
+        return True
+    return getattr(getattr(core, "geometry", core), "vectors", False)
+
+
+def _values(unit: BusUnit, field: Field) -> str:
+    """Number format of a field, and what its vector is."""
+    core = unit.framing.core
+    return f"{field.values}; N/W {FRAME}" if field.name in _IN_FRAME and takes_frame(core) else field.values
+
+
 def layout_lines(layout: ByteLayout) -> list[str]:
     """A line for each field of TDATA: first byte, C type, name, number format."""
     return [
@@ -45,7 +66,7 @@ def layout_lines(layout: ByteLayout) -> list[str]:
     ]
 
 
-def _declared(field) -> str:
+def _declared(field: Field) -> str:
     return f"{field.c_type} {field.name}" + "".join(f"[{size}]" for size in field.shape)
 
 
@@ -83,8 +104,7 @@ def _markdown(unit: BusUnit, name: str) -> str:
             "| ---: | --- | --- |",
         ]
         for field, offset in zip(layout.fields, layout.offsets, strict=True):
-            form = field.values
-            lines.append(f"| {offset} | `{_declared(field)}` | {form} |")
+            lines.append(f"| {offset} | `{_declared(field)}` | {_values(unit, field)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -117,7 +137,7 @@ def _header(unit: BusUnit, name: str) -> str:
     for kind, (title, layout) in zip(("input", "output"), _layouts(unit), strict=True):
         lines += ["", f"/* A beat of {title}. */", f"struct {name}_{kind} {{"]
         for field in layout.fields:
-            lines.append(f"    {_declared(field)}; /* {field.values} */")
+            lines.append(f"    {_declared(field)}; /* {_values(unit, field)} */")
         lines.append("};")
     return "\n".join([*lines, "", "#endif", ""])
 

@@ -8,9 +8,10 @@ from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCRIPTIONS
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
-from blysk.sim.api.bus_documents import layout_lines
+from blysk.hdl.render import RenderUnit
+from blysk.sim.api.bus_documents import FRAME, layout_lines, takes_frame
 
-__all__ = ["bus_descriptions", "bus_header", "geometry_descriptions", "unit_of_top"]
+__all__ = ["bus_descriptions", "bus_header", "triangle_descriptions", "unit_of_top"]
 
 _MARKS = {
     "span": "the last pixel of its span",
@@ -42,19 +43,20 @@ def unit_of_top(top: str, bus: str, parameters, **options):
     )
 
 
-def geometry_descriptions(unit: GeometryUnit) -> dict[str, str]:
-    """Descriptions of the ports of a core from triangles to spans."""
+def triangle_descriptions(unit: RenderUnit | GeometryUnit) -> dict[str, str]:
+    """Descriptions of the ports of a core that takes triangles."""
+    given = dict(RENDER_PORT_DESCRIPTIONS)
+    if takes_frame(unit):
+        given["i_normal"] += f", {FRAME}"
+    if isinstance(unit, RenderUnit):
+        return given
     made = set(unit.o.payload.shape().members)
     words = {
         f"{member}_{name}"
         for member in ("constants", "status")
         for name in getattr(unit, member).shape().members
     }
-    shared = {
-        port: text
-        for port, text in RENDER_PORT_DESCRIPTIONS.items()
-        if port in words or port.startswith("i_")
-    }
+    shared = {port: text for port, text in given.items() if port in words or port.startswith("i_")}
     return shared | {f"o_{name}": text for name, text in GEOMETRY_PORT_DESCRIPTIONS.items() if name in made}
 
 

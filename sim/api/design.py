@@ -28,9 +28,8 @@ from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
 from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
-from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
-from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, geometry_descriptions, unit_of_top
+from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions, unit_of_top
 from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.api.verilog_example import example_of
@@ -67,7 +66,7 @@ def design(
     factors : int
         Number of lights, counted from the first, that fade by distance or as spots; ``chord-local`` only.
     method : str
-        Interpolation along a span: one of `METHODS`, by default ``"chord"``.
+        Interpolation along a span: one of `METHODS`, by default that of `default_method`: ``"quotient"``.
     model : str
         Reflection model: one of `MODELS` or `LOBES`, by default ``"blinn"``; or the curve of a file.
     operand : {"cosine", "one_minus_cosine"}
@@ -351,7 +350,7 @@ def _geometry_header(unit: GeometryUnit) -> list[str]:
 def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, str]:
     """Descriptions of the ports of a core with pixels as output."""
     if isinstance(unit, RenderUnit):
-        return dict(RENDER_PORT_DESCRIPTIONS)
+        return triangle_descriptions(unit)
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
     return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
@@ -476,7 +475,7 @@ def verilog_and_unit(
     if isinstance(unit, BusUnit):
         header, descriptions = bus_header(unit, bus, lines, words), bus_descriptions(unit)
     elif isinstance(unit, GeometryUnit):
-        header, descriptions = lines, geometry_descriptions(unit)
+        header, descriptions = lines, triangle_descriptions(unit)
     else:
         header = [*lines, "", "Frame constants, through the write port:", *words]
         descriptions = _descriptions(unit, pipes)

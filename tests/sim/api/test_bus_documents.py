@@ -10,13 +10,13 @@ import pytest
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import BusUnit
-from blysk.sim.api.bus_documents import documents_of
+from blysk.sim.api.bus_documents import FRAME, documents_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::amaranth.hdl._ir.UnusedElaboratable")
 
 CORES = {
-    "shader": preset("chord", "blinn", 2, materials=3),
-    "render": Renderer(preset("chord", "cosquad")),
+    "shader": preset("quotient", "blinn", 2, materials=3),
+    "render": Renderer(preset()),
     "geometry": Renderer(preset("chord", "cosquad")),
 }
 
@@ -49,6 +49,17 @@ def test_documents_have_every_register(unit):
             for part in one.findall(".//field")
         ]
         assert max(ends) == register.width
+
+
+def test_documents_state_the_frame_of_vectors(unit):
+    """Where a method takes vectors, beside the field that holds them; else nowhere."""
+    of_packets = {"span": "int32_t start[", "run": "int32_t normal["}
+    field = of_packets.get(unit.framing.packets)
+    for suffix in (".md", ".h"):
+        text = documents_of(unit, "core")[suffix]
+        lines = [line for line in text.splitlines() if FRAME in line]
+        assert len(lines) == (field is not None)
+        assert all(field in line for line in lines)
 
 
 @pytest.mark.skipif(which("c++") is None, reason="there is no C++ compiler")
