@@ -29,10 +29,12 @@ def test_measures_every_exponent():
 @pytest.mark.parametrize(
     ("column", "options"),
     [
-        (0, {"method": "chord"}),
-        (1, {"method": "renormalise"}),
-        (2, {"method": "quadratic", "operand": "one_minus_cosine"}),
-        (3, {"method": "quadratic", "model": "cosquad"}),
+        (0, {}),
+        (1, {"model": "phong"}),
+        (2, {"method": "chord"}),
+        (3, {"method": "renormalise"}),
+        (4, {"method": "quadratic", "operand": "one_minus_cosine"}),
+        (5, {"method": "quadratic", "model": "cosquad"}),
     ],
     ids=str,
 )
@@ -40,10 +42,14 @@ def test_the_table_in_readme_is_what_its_command_prints(column, options):
     """Its errors, by the bit-accurate model of the frame that the command simulates."""
     text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     assert "`blysk render teapot --exponent 100 --method ... --model ...`" in text
-    (row,) = re.findall(r"^\| largest error found, against exact Blinn, LSB \|(.+)\|$", text, re.MULTILINE)
+    rows = [
+        row.split("|")[column].strip()
+        for row in re.findall(r"^\| (?:largest error found|bound of it)[^|]*\|(.+)\|$", text, re.MULTILINE)
+    ]
     scene = blysk.scene("teapot", exponent=100)
     design = blysk.design(**options).for_materials(scene.materials)
     found = compare(scene, design, model_frame(scene, design))
-    assert found.target == "blinn"
-    written = row.split("|")[column].strip()
-    assert f"{found.total_error.steady_lsb:.{len(written.partition('.')[2])}f}" == written
+    assert found.target == ("phong" if design.mirror else "blinn")
+    for figure, written in zip((found.total_error.steady_lsb, found.bound_lsb), rows, strict=True):
+        places = len(written.partition(".")[2])
+        assert ("none" if figure is None else f"{figure:.{places}f}") == written
