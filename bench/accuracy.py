@@ -4,22 +4,32 @@ from collections.abc import Iterator, Sequence
 
 from blysk.golden.frames.compare import Comparison, compare
 from blysk.golden.pipeline import Design
-from blysk.golden.presets import METHODS
+from blysk.golden.presets import METHODS, PUBLISHED
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 
-__all__ = ["DESIGNS", "EXPONENTS", "measure", "scene_for"]
+__all__ = ["DESIGNS", "EXPONENTS", "measure", "model_of", "scene_for"]
 
 EXPONENTS = (1, 10, 100, 1000)
 
-DESIGNS = [(method, "cosquad") for method in METHODS]
+
+def model_of(method: str) -> str:
+    """Reflection model by which methods are compared.
+
+    It is ``cosquad``, the documents'. A method whose highlights come from a table at any rate has ``blinn``.
+    """
+    return "blinn" if (METHODS | PUBLISHED)[method].TAKES_VECTORS else "cosquad"
+
+
 _MODELS = ("cosquad7", "cosquad_lin", "lyon3_refitted", "exp", "blinn_product", "blinn")
 
+DESIGNS = [("quotient", "blinn"), ("quotient", "phong")]
+DESIGNS += [(method, model_of(method)) for method in METHODS if method != "quotient"]
 DESIGNS += [("chord", model) for model in _MODELS]
-"""Method and model of each row of README's table."""
+"""Method and model of each row of the table of errors in docs/guide/accuracy.md."""
 
 
 def scene_for(mesh: Mesh, exponent: int, width: int = 640, height: int = 480) -> Scene:

@@ -17,7 +17,6 @@ from blysk.bench.report.stability_conclusion import conclusion
 from blysk.bench.report.stability_errors import (
     FACTORS,
     GOOD,
-    MODEL,
     RANGE_EXPONENTS,
     SWEEP,
     SWEEP_EXPONENT,
@@ -39,7 +38,7 @@ __all__ = [
 ]
 
 
-QUICK_SIMULATED = ("renormalise", "chord")
+QUICK_SIMULATED = ("renormalise", "quotient")
 """Methods that the quick report simulates."""
 
 _LIMITS: dict[Grade, float] = {"good": GOOD, "fair": 4.0, "poor": 16.0}
@@ -104,9 +103,10 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     text = [
         f"{len(methods)} methods in {sum(map(len, cases[methods[0]].values()))} stiff and extreme cases of "
         f"{len(GROUPS)} groups. The pixels are those of the bit-accurate model, which the simulated hardware "
-        f"equals to the bit, with the model `{MODEL}`; group {STREAM_GROUP} is simulated hardware. Each is "
-        "held against exact normals of every pixel in float64 with the same model; 0.5 LSB is a "
-        "correctly rounded pixel. Where N.L is 0 but for the arithmetic, lit and dark are both right.",
+        f"equals to the bit, with the model `cosquad`, of `quotient` with `blinn`; group {STREAM_GROUP} is "
+        "simulated hardware. Each is held against exact normals of every pixel in float64 with the same "
+        "model; 0.5 LSB is a correctly rounded pixel. Where N.L is 0 but for the arithmetic, lit and dark "
+        "are both right.",
         f"Colours follow the error: to {GOOD:g} LSB, to {_LIMITS['fair']:g}, to {_LIMITS['poor']:g}, and "
         f"above. A larger "
         f"error than {GOOD:g} LSB is marked § where the user is told of it: the pipeline flags the span, or "
@@ -226,8 +226,8 @@ def _range_table(ranges: dict[str, dict]) -> Table:
         "`blysk` cuts wider spans before the pipeline, and counts them; the pipeline counts those that it "
         f"gets and can tell, some or all. Errors at exponent {SWEEP_EXPONENT}, spans of 16 pixels with the "
         "highlight in them; no figure where every span is flagged. Of `chord` the widest span is the widest "
-        "lit one that the pipeline does not count as wide; of `chord-local` it is measured, as it depends on "
-        "the light: that of which none of a sample is cut."
+        "lit one that the pipeline does not count as wide; of `chord-local`, where it depends on "
+        "the light, and of `quotient` it is measured: that of which none of a sample is cut."
     )
     title = "Range of each method: served whole, exact to a step, flagged; and what it does outside"
     columns += ["pixels of a span", "exponents"]

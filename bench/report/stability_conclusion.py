@@ -81,14 +81,21 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
         f"its "
         "documentation states."
     )
-    if "chord" in ranges:
-        first, last = (
-            ranges["chord"]["widest"][str(exponent)] for exponent in (RANGE_EXPONENTS[0], RANGE_EXPONENTS[-1])
-        )
+    ends = {
+        method: [ranges[method]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS]
+        for method in ("quotient", "chord")
+        if method in ranges
+    }
+    if "quotient" in ends:
         sentence += (
-            f" The range of `chord` ends at spans that turn by {first:.3g} degrees at exponent "
-            f"{RANGE_EXPONENTS[0]} and "
-            f"{last:.3g} at {RANGE_EXPONENTS[-1]}; wider ones are cut before the pipeline, or flagged by it."
+            f" The range of `quotient` ends at spans that turn by {min(ends['quotient']):.3g} degrees, at "
+            "every exponent, or whose ends have lengths of more than 2:1; others are halved before it."
+        )
+    if "chord" in ends:
+        first, *_, last = ends["chord"]
+        sentence += (
+            f" That of `chord` ends at {first:.3g} degrees at exponent {RANGE_EXPONENTS[0]} and {last:.3g} "
+            f"at {RANGE_EXPONENTS[-1]}; wider spans are cut before the pipeline, or flagged by it."
         )
     return Conclusion(
         "Where is it exact, and where does that end?", sentence, _drawing(cases, ranges, worst, lit)

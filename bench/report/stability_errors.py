@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from blysk.bench.accuracy import model_of
 from blysk.bench.report.section import Grade
 from blysk.bench.report.stability_cases import (
     GROUPS,
@@ -18,10 +19,11 @@ from blysk.bench.report.stability_cases import (
 )
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cut_spans
+from blysk.golden.frames.cut import cut_spans, split_pairs
 from blysk.golden.frames.local import line_ends, local_values
-from blysk.golden.frames.prepare import constants_of, spans_for
+from blysk.golden.frames.prepare import constants_of, span_vectors, spans_for
 from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.methods.quotient_interpolator import QuotientErrors
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
@@ -30,14 +32,12 @@ from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector, intensity_of_cosines, saturate
 from blysk.golden.reference.raster import Raster, fragment_normals
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_operands, shade_spans
 
 __all__ = [
     "FACTORS",
     "GOOD",
     "LENGTH_TOLERANCE",
-    "MODEL",
     "RANGE_EXPONENTS",
     "SWEEP",
     "SWEEP_EXPONENT",
@@ -52,8 +52,6 @@ __all__ = [
 
 RANGE_EXPONENTS = (1, 10, 100, 1000)
 """Exponents of the table of safe ranges."""
-
-MODEL = "cosquad"
 
 SWEEP_EXPONENT = 50
 """Exponent of the spans of `measure_ranges`."""
@@ -89,7 +87,7 @@ class _Shaded(NamedTuple):
 
 
 def _design(case: Case, method: str) -> Design:
-    return preset(method, MODEL, lights=len(case.scene.lights))
+    return preset(method, model_of(method), lights=len(case.scene.lights))
 
 
 def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
@@ -99,7 +97,8 @@ def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
     left, right = case.codes
     if design.takes_vectors:
         given = replace(raster, normal_left=left.astype(np.float64), normal_right=right.astype(np.float64))
-        return spans_for(case.scene, given, design)
+        vectors = span_vectors(case.scene, given, design)
+        return Spans(raster.x, raster.y, raster.length, left, right, vectors=vectors)
     if design.takes_values:
         values = local_values(case.scene, raster)
         return Spans(raster.x, raster.y, raster.length, left, right, values=values)
@@ -139,7 +138,7 @@ def _three_values(
 
 def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray:
     """Picture of the method's own curve in float64, computed from the codes of the spans."""
-    scene, model, method = case.scene, REFLECTION_MODELS[MODEL], design.interpolator
+    scene, model, method = case.scene, design.specular.model, design.interpolator
     if method.TAKES_MIDDLE or design.takes_values:
         values = spans.values
         if values is None:
@@ -184,7 +183,7 @@ def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
                 scene.ambient_light,
                 np.where(near, side, cosine),
                 highlight,
-                REFLECTION_MODELS[MODEL],
+                design.specular.model,
             )
         )
         for side in (0.0, 2.0**-60)
@@ -193,12 +192,22 @@ def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
     own = _own(case, design, raster, spans).reshape(-1, 3)[raster.pixel[shown]] * 255
     light = np.sum([light.color for light in scene.lights], axis=0)
     terms = np.multiply(material.diffuse, error)
-    terms = terms + np.multiply(material.specular, material.exponent * error + design.specular.error)
+    highlight_error = _highlight_error(design, material.exponent, int(raster.length.max(initial=1)), error)
+    terms = terms + np.multiply(material.specular, highlight_error)
     arithmetic = 0.5 + _COLOR_ERROR * len(direction) + 255 * (light * terms).max()
     found, stated = (
         np.min([np.abs(of - one * 255).max(axis=1) for one in exact], axis=0) for of in (color[shown], own)
     )
     return _Shaded(found, stated + arithmetic, raster.span[shown], out_of_range)
+
+
+def _highlight_error(design: Design, exponent: int, longest: int, error: float) -> float:
+    """Stated error of a specular term, for an error of N·L and N·H; with vectors by their own bound."""
+    unit = design.specular
+    if not design.takes_vectors:
+        return exponent * error + unit.error
+    bounds = QuotientErrors.worst(longest, design.mirror)
+    return bounds.highlight(unit.model, exponent) + unit.line_error(exponent) + unit.ERROR
 
 
 def _angles(raster: Raster) -> np.ndarray:
@@ -276,6 +285,7 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
 
     A method serves a span that `cut_spans` leaves whole; a method that takes two normals and has no span
     limit serves spans up to its `Interpolator.widest_span`. Normals have length 1 within `LENGTH_TOLERANCE`.
+    A method that takes vectors is given spans of two pixels as two of one.
 
     Returns
     -------
@@ -287,11 +297,11 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
         the case has its own codes.
     """
     design = _design(case, method)
-    raster = case.raster
+    raster = split_pairs(case.raster) if design.takes_vectors else case.raster
     cut, _ = cut_spans(case.scene, raster, design)
     first = np.flatnonzero(cut.offset == 0)
     parts = np.bincount(raster.span[first], minlength=len(raster.length))
-    if design.takes_values or design.span_limit:
+    if design.takes_values or design.takes_vectors or design.span_limit:
         inside = parts == 1
     else:
         widest = design.interpolator.widest_span(case.scene.materials[0].exponent)
@@ -341,14 +351,15 @@ def widest_span(method: str, exponent: int) -> float:
     """Widest span in degrees that a method serves.
 
     For a method with a span limit it is the widest lit span that is not flagged as wide; for ``chord-local``
-    the widest angle at which no span of a sample is cut; else the widest span that is not cut.
+    and ``quotient`` the widest angle at which no span of a sample is cut; else the widest span that is not
+    cut.
     """
-    design = preset(method, MODEL)
+    design = preset(method, model_of(method))
     if design.span_limit is not None:
         return design.span_limit.angle(exponent)
-    if not design.takes_values:
+    if not (design.takes_values or design.takes_vectors):
         return METHODS[method].widest_span(exponent)
-    low, high = 0.0, 45.0
+    low, high = 0.0, METHODS[method].MAX_ANGLE
     while high - low > 0.05:
         middle = (low + high) / 2
         case = _span_case(middle, exponent)

@@ -8,8 +8,9 @@ import numpy as np
 from amaranth.hdl import Array, Module, ResetInserter, Signal, Value
 from amaranth.lib import wiring
 
+from blysk.bench.accuracy import model_of
 from blysk.bench.report.stability_cases import HALFWAY, STREAM_GROUP, arcs, single_spans
-from blysk.bench.report.stability_errors import MODEL, spans_of
+from blysk.bench.report.stability_errors import spans_of
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -112,7 +113,7 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
         ``case``; number of ``runs``; ``pixels`` of a run; ``wrong``, pixels of all runs that differ from the
         bit-accurate model's, or ``None`` if a run stopped early.
     """
-    design = preset(method, MODEL)
+    design = preset(method, model_of(method))
     unit = ShadingPipelineUnit(design)
     rng = np.random.default_rng(STREAM_GROUP)
     lengths = np.array([5, 0, 1, 1, 0, 0, 9, 2, 3, 0])

@@ -16,7 +16,7 @@ from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["cut_by_angle", "cut_by_ends", "cut_by_error", "cut_by_length", "cut_spans"]
+__all__ = ["cut_by_angle", "cut_by_ends", "cut_by_error", "cut_by_length", "cut_spans", "split_pairs"]
 
 
 def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
@@ -139,6 +139,11 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
     cut = int(np.count_nonzero(differs(spans, np.zeros_like(spans), raster.length.astype(np.int64) - 1)))
     whole, _ = _halve(raster, lambda *piece: differs(*piece) | (piece[2] - piece[1] == 1))
     return whole, cut
+
+
+def split_pairs(raster: Raster) -> Raster:
+    """Spans of two pixels as two of one, as a method that takes vectors asks; the others as they are."""
+    return _halve(raster, lambda _, first, last: last - first == 1)[0]
 
 
 def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -41,7 +41,7 @@ from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 
-QUICK = ("chord", "chord-local")
+QUICK = ("quotient", "chord", "chord-local")
 NAMES = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in METHODS]
 FROM_SPANS = [group for group in GROUPS if group != STREAM_GROUP]
 
@@ -67,8 +67,11 @@ def test_keeps_what_is_promised(group, method):
         assert prepared["grade"] in ("good", "fair"), case.name
         assert prepared["flagged"] == 0, case.name
         # The chord methods count on cut spans alone, and state less than 1 LSB for every exponent, but of the
-        # terminator, where a wide highlight goes out at once; the local one cuts spans there, too.
-        if method == "chord-local" or (method == "chord" and not case.name.startswith("terminator")):
+        # terminator, where a wide highlight goes out at once; the local one cuts spans there, too. That of
+        # the quotient is exact.
+        if method in ("chord-local", "quotient") or (
+            method == "chord" and not case.name.startswith("terminator")
+        ):
             assert prepared["error"] <= GOOD, case.name
 
 
@@ -206,7 +209,10 @@ def test_worst_grade(grades, worst):
 
 @pytest.mark.parametrize(
     "method",
-    [name if name in ("linear", "chord") else pytest.param(name, marks=pytest.mark.long) for name in METHODS],
+    [
+        name if name in ("linear", "chord", "quotient") else pytest.param(name, marks=pytest.mark.long)
+        for name in METHODS
+    ],
 )
 def test_ranges(method):
     """Where the docstrings say that spans are flagged, and every range is good or fair to its end."""
@@ -218,7 +224,7 @@ def test_ranges(method):
         assert found["all_flagged"] > interpolator.MAX_ANGLE
     elif method != "chord-local":
         # Lit ones over the chord method's limit; a line through 0.
-        last = {"chord": SpanLimit.angle(SWEEP_EXPONENT), "renormalise": 179}.get(
+        last = {"chord": SpanLimit.angle(SWEEP_EXPONENT), "renormalise": 179, "quotient": 179}.get(
             method, interpolator.MAX_ANGLE
         )
         assert found["none_flagged"] == int(last)
