@@ -39,9 +39,9 @@ STYLES = {
     "quadratic-horner": Style("#0072b2", "#4fb3ea", ":", "8"),
     "angular": Style("#00805c", "#23c397", marker="P"),
     "recurrence": Style("#3b95c4", "#8fd0f5", "--", "X"),
-    "chord": Style("#d55e00", "#ff8b3d", marker="D"),
+    "chord": Style("#b0508a", "#e08fc0", marker="D"),
     "chord-local": Style("#b0508a", "#e08fc0", "--", "d"),
-    "quotient": Style("#8b1a1a", "#ff6b6b", marker="*"),
+    "quotient": Style("#d55e00", "#ff8b3d", marker="*"),
 }
 """Style of each method."""
 

@@ -8,7 +8,15 @@ import numpy as np
 from blysk.bench.colors import style_of
 from blysk.bench.labels import Label, place_labels
 from blysk.bench.report import energy
-from blysk.bench.report.criteria_figures import EXPONENT, MODEL, frame, refused, resources, simulated
+from blysk.bench.report.criteria_figures import (
+    EXPONENT,
+    METHOD,
+    MODEL,
+    frame,
+    refused,
+    resources,
+    simulated,
+)
 from blysk.bench.report.placed import placed
 from blysk.bench.report.section import Cell, Drawing, Section, Table
 from blysk.bench.store import Task
@@ -29,9 +37,7 @@ _LIGHTS = 1, 2, 4, 8
 def tasks(quick: bool) -> list[Task]:
     """Frames by triangles and size, cycles beside simulation, lights, pipelines, energy, bad input."""
     found = [
-        Task(
-            frame, {"triangles": count, "size": list(size), "methods": list(METHODS if first else ["chord"])}
-        )
+        Task(frame, {"triangles": count, "size": list(size), "methods": list(METHODS if first else [METHOD])})
         for first, size in zip((True, False), SIZES, strict=True)
         # Of the drawing all, as short spans are what it is about.
         for count in (_TRIANGLES if first or not quick else _TRIANGLES[:-1])
@@ -57,31 +63,31 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     frames = [(settings["triangles"], tuple(settings["size"]), result) for settings, result in of[frame]]
     small = [entry for entry in frames if entry[1] == SIZES[0]]
     text = [
-        "What [T] 1.3 asks of a shading method, for the default pipeline (`chord`, exact highlights), "
+        f"What [T] 1.3 asks of a shading method, for the default pipeline (`{METHOD}`, `{MODEL}`), "
         "measured: frames a "
         "second and latency, resources, how they grow, energy, and what it does with bad input.",
         f"Cycles are those of the cycle model. Of a simulated frame of 992 triangles at 160x120 it gives "
         f"the cycles "
         f"exactly for {len(exact)} of {len(deviation)} methods; the largest deviation is that of `{worst}`, "
         f"{deviation[worst]:+.1%}"
-        + (f", that of `chord` {deviation['chord']:+.1%}." if "chord" in deviation else "."),
+        + (f", that of `{METHOD}` {deviation[METHOD]:+.1%}." if METHOD in deviation else "."),
     ]
     parts = [_criteria(frames, of), _drawing(small), _by_triangles(frames), _deviations(of[simulated])]
     return Section("criteria", "The documents' criteria", text, parts)
 
 
 def _criteria(frames: Sequence[tuple], of: Mapping[Any, list]) -> Table:
-    entry = placed(DEVICE).get(("chord", MODEL))
+    entry = placed(DEVICE).get((METHOD, MODEL))
     rate, origin = (entry["fmax_median_mhz"], f"placed {entry['date']}") if entry else (100.0, "assumed")
     rows: list[list[Cell]] = []
     for _, (width, height), result in frames:
-        seconds = result["chord"]["cycles"] / (rate * 1e6)
+        seconds = result[METHOD]["cycles"] / (rate * 1e6)
         scene = f"teapot, {result['triangles']:,} triangles, {width}x{height}"
         condition = f"at {rate:.0f} MHz ({origin}); geometry and frame buffer keep up"
         rows.append(["frames a second", scene, 1 / seconds, "frames/s", condition])
         condition = "first write of a constant to last pixel"
         rows.append(["latency of a frame", scene, 1e3 * seconds, "ms", condition])
-    latency = frames[0][2]["chord"]["latency"]
+    latency = frames[0][2][METHOD]["latency"]
     condition = f"{latency / rate:.2f} µs at {rate:.0f} MHz"
     rows.append(["latency of a pixel", "any", latency, "cycles", condition])
     if entry:
@@ -102,12 +108,12 @@ def _scaling(frames: Sequence[tuple], of: Mapping[Any, list]) -> Iterator[list[C
         bits = result["register_bits"] / ones["register_bits"]
         note = f"register bits {bits:.2f} times; cycles the same"
         yield ["scaling with lights", settings["lights"], result["multipliers"], "multipliers", note]
-    same = [result["chord"] for _, _, result in frames if result["triangles"] == frames[0][2]["triangles"]]
+    same = [result[METHOD] for _, _, result in frames if result["triangles"] == frames[0][2]["triangles"]]
     grows = (same[-1]["cycles"] / same[0]["cycles"]) / (same[-1]["pixels"] / same[0]["pixels"])
     yield ["scaling with pixels", "640x480 to 1920x1080", grows, "cycles over pixels", "1: proportional"]
     of_size = [result for _, size, result in frames if size == SIZES[0]]
     first, last = (
-        result["chord"]["cycles"] / result["chord"]["pixels"] for result in (of_size[0], of_size[-1])
+        result[METHOD]["cycles"] / result[METHOD]["pixels"] for result in (of_size[0], of_size[-1])
     )
     scene = f"{of_size[0]['triangles']:,} to {of_size[-1]['triangles']:,} at 640x480"
     yield ["scaling with triangles", scene, last / first, "times the cycles a pixel", "see the drawing"]
@@ -116,7 +122,7 @@ def _scaling(frames: Sequence[tuple], of: Mapping[Any, list]) -> Iterator[list[C
 
 
 def _energy(frames: Sequence[tuple], of: Mapping[Any, list]) -> Iterator[list[Cell]]:
-    pixels = next(result["chord"]["pixels"] for _, size, result in frames if size == SIZES[0])
+    pixels = next(result[METHOD]["pixels"] for _, size, result in frames if size == SIZES[0])
     for settings, result in of[energy.measure]:
         toggles = sum(result[0]["toggles"].values()) / result[0]["pixels"]
         scene = f"{settings['model']}, exponent {settings['exponents'][0]}"
@@ -186,10 +192,11 @@ def _drawing(frames: Sequence[tuple]) -> Drawing:
     axes.set_yticks((1, 2, 5, 10, 20, 50), ("1", "2", "5", "10", "20", "50"), minor=False)
     axes.set_yticks((), minor=True)
     place_labels(axes, labels, points)
-    size = sum(result["chord"]["pixels"] for _, _, result in frames) // len(frames)
+    size = sum(result[METHOD]["pixels"] for _, _, result in frames) // len(frames)
     note = (
         f"One light, exponent {EXPONENT}, about {size:,} pixels shaded. Small triangles have short spans: "
         f"what is done "
-        "once a span then weighs more than the pixels. A span enters every cycle at most with `chord`."
+        "once a span then weighs more than the pixels. A span of `quotient` takes three cycles at least, "
+        "but of one pixel one; with `chord` a span enters every cycle at most."
     )
     return Drawing("criteria-triangles", "Cycles a pixel against the number of triangles", svg(figure), note)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from blysk.bench.accuracy import scene_for
+from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.speed import cycle_model
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.prepare import constants_of, spans_for
@@ -19,9 +19,10 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.sim.cli.main import main
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["BAD_INPUT", "EXPONENT", "MODEL", "frame", "refused", "resources", "simulated"]
+__all__ = ["BAD_INPUT", "EXPONENT", "METHOD", "MODEL", "frame", "refused", "resources", "simulated"]
 
-MODEL = "blinn"
+METHOD, MODEL = "quotient", "blinn"
+"""The default pipeline."""
 
 EXPONENT = 50
 
@@ -77,14 +78,14 @@ def frame(triangles: int, size: Sequence[int], methods: Sequence[str]) -> dict[s
 
 
 def simulated(method: str) -> dict[str, int]:
-    """Cycles of a simulated frame of ``method`` with cosquad, and those of the cycle model."""
-    simulated, modelled = cycle_model.compare(preset(method, "cosquad"), 992, (160, 120))
+    """Cycles of a simulated frame of ``method`` with `model_of` it, and those of the cycle model."""
+    simulated, modelled = cycle_model.compare(preset(method, model_of(method)), 992, (160, 120))
     return {"simulated": simulated, "modelled": modelled}
 
 
 def resources(lights: int) -> dict[str, int]:
     """Resources of the default pipeline with a number of lights, before synthesis; see `Cost.totals`."""
-    return cost_of(cycle_model.unit_of(preset("chord", MODEL, lights=lights))).totals
+    return cost_of(cycle_model.unit_of(preset(METHOD, MODEL, lights=lights))).totals
 
 
 def refused() -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The report's section on switching: toggled register bits a pixel of a frame, without and with the gate.
+"""The report's section on switching: toggled register bits a pixel of a frame, also with a highlight gate.
 
 They are a proxy of energy: CMOS takes most energy when bits change. `toggles` says which bits are counted.
 """
@@ -13,34 +13,38 @@ from blysk.bench.report.gate import MODELS, frames, same_pixels
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
-from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["BLOCKS", "EXPONENTS", "by_block", "measure", "section", "tasks"]
+__all__ = ["BLOCKS", "DESIGN", "EXPONENTS", "by_block", "measure", "section", "tasks"]
 
 EXPONENTS = (2, 50, 1000)
 
 BLOCKS: dict[str, tuple[str, ...]] = {
-    "frame constants": ("frame_constants", "slope"),
+    "frame constants": ("frame_constants", "slope", "tables"),
     "admission": ("top", "coordinates"),
     "setup of spans": ("interpolator",),
     "highlight gate": ("interpolator.chord_spans.value_gate", "interpolator.chord_spans.decisions"),
     "sums of pixels": ("interpolator.chord_spans.chord_accumulator",),
+    "quotients of pixels": ("interpolator.quotient",),
     "diffuse": ("light_0.diffuse",),
     "specular": ("light_0.specular",),
     "intensity": ("intensity",),
     "assembler": ("shaded", "pixel_assembler"),
 }
-"""Submodules of the pipeline by block, in the stream's order; an inner one counts for its own block."""
+"""Submodules of the pipeline by block, in the stream's order; an inner one counts for its own block. The sums
+of ``quotient`` are in its setup of spans."""
+
+DESIGN = ("quotient", "blinn")
+"""Method and model of the default pipeline, which has no gate; those of the gate are of the method chord."""
 
 _FULL, _QUICK = (320, 240, 10_000), (48, 36, 64)
 _COLORS = (
     *("#9aa0a6", "#5f6368", "#d62728", "#1f77b4", "#6baed6"),
-    *("#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#000000"),
+    *("#17a2a2", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#000000"),
 )
 
 
@@ -63,14 +67,14 @@ def by_block(toggles: dict[str, int]) -> dict[str, int]:
 
 
 def measure(
-    model: str, gate: bool, exponents: Sequence[int], size: Sequence[int], engine: str
+    method: str, model: str, gate: bool, exponents: Sequence[int], size: Sequence[int], engine: str
 ) -> list[dict[str, Any]]:
-    """Toggles of a pipeline of the chord method, one pixel a cycle, in a frame of the teapot.
+    """Toggles of a pipeline, one pixel a cycle, in a frame of the teapot.
 
     Parameters
     ----------
-    model : str
-        Reflection model.
+    method, model : str
+        Method and reflection model.
     gate : bool
         Whether it has a highlight gate.
     exponents : sequence of int
@@ -86,14 +90,14 @@ def measure(
         For each exponent ``spans``, ``pixels``, ``cycles``, ``toggles`` by submodule, and ``same``: whether
         the pixels are those of the bit-accurate model.
     """
-    design = preset("chord", model, gate=gate)
+    design = preset(method, model, gate=gate)
     counter = ToggleCounter(ShadingPipelineUnit(design))
     width, height, triangles = size
     mesh = teapot(triangles)
     results = []
     for exponent in exponents:
         scene = scene_for(mesh, exponent, width, height)
-        spans, constants = prepare(scene, design).spans, FrameConstants.of(scene)
+        spans, (constants,) = prepare(scene, design).spans, constants_of(scene, design)
         [run] = frames([counter], spans, constants, engine)
         results.append(
             {
@@ -108,38 +112,47 @@ def measure(
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Measurements of each model without and with the gate; quick ones in Amaranth's own simulator."""
+    """Measurements of `DESIGN`, then of each model of the method chord without and with the gate.
+
+    Quick ones are in Amaranth's own simulator.
+    """
     exponents = EXPONENTS[1:2] if quick else EXPONENTS
     common = {"exponents": list(exponents), "size": list(_QUICK if quick else _FULL)}
     common["engine"] = "pysim" if quick else "auto"
-    pairs = [(model, gate) for model in (MODELS[:1] if quick else MODELS) for gate in (False, True)]
-    return [Task(measure, {"model": model, "gate": gate} | common) for model, gate in pairs]
+    designs = [(*DESIGN, False)]
+    designs += [
+        ("chord", model, gate) for model in (MODELS[:1] if quick else MODELS) for gate in (False, True)
+    ]
+    names = ("method", "model", "gate")
+    return [Task(measure, dict(zip(names, design, strict=True)) | common) for design in designs]
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """The section: toggles a pixel by block."""
-    found: dict[tuple[str, int], dict[bool, dict]] = {}
+    found: dict[tuple[str, str, int], dict[bool, dict]] = {}
     for task, result in zip(tasks, results, strict=True):
         for exponent, frame in zip(task.settings["exponents"], result, strict=True):
-            found.setdefault((task.settings["model"], exponent), {})[task.settings["gate"]] = frame
+            key = (task.settings["method"], task.settings["model"], exponent)
+            found.setdefault(key, {})[task.settings["gate"]] = frame
     all_frames = [frame for of in found.values() for frame in of.values()]
     blocks = list(dict.fromkeys(block for frame in all_frames for block in by_block(frame["toggles"])))
-    saved = {key: 1 - _total(of[True]) / _total(of[False]) for key, of in found.items()}
+    saved = {key: 1 - _total(of[True]) / _total(of[False]) for key, of in found.items() if True in of}
     best, worst = max(saved, key=saved.get), min(saved, key=saved.get)
     width, height, _ = tasks[0].settings["size"]
-    (model, exponent), pair = next(iter(found.items()))
+    (method, model, exponent), pair = next(iter(found.items()))
+    rival = next(of[False] for key, of in found.items() if key[0] == "chord" and key[2] == exponent)
     shares = {block: _a_pixel(pair[False], block) / _total(pair[False]) for block in blocks}
     largest = max(shares, key=shares.get)
     text = [
-        f"Register bits that change, on the teapot at {width}x{height} in one light, by the chord method, "
-        "one pixel a cycle: what a pixel costs in switching, block by block, from simulation. A highlight "
-        "gate makes the specular unit stand still in spans without a highlight, and itself switches once a "
-        "span.",
-        f"Most is in the block *{largest}*: {shares[largest]:.0%} of all with `{model}` at exponent "
-        f"{exponent}, gate off. With the gate the whole pipeline's count changes by "
-        f"{' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}. What is done once a "
-        "span weighs more, the shorter spans are: these have "
+        f"Register bits that change, on the teapot at {width}x{height} in one light, one pixel a cycle: what "
+        "a pixel costs in switching, block by block, from simulation.",
+        f"The default pipeline, `{method}` with `{model}`, switches {_total(pair[False]):.0f} bits a pixel "
+        f"at exponent {exponent}, one of `chord` {_total(rival):.0f}. Most is in the block *{largest}*: "
+        f"{shares[largest]:.0%}. What is done once a span weighs more, the shorter spans are: these have "
         f"{pair[False]['pixels'] / pair[False]['spans']:.1f} pixels.",
+        "A highlight gate, which `chord` can have, makes the specular unit stand still in spans without a "
+        "highlight, and itself switches once a span. With it the whole pipeline's count changes by "
+        f"{' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}.",
         "**Not counted**: bits inside multipliers and other logic between two registers, glitches, wires, "
         "the clock's own tree, and the bits inside memories. It compares designs; it is no number of joules.",
     ]
@@ -149,8 +162,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     return Section("energy", "Energy proxy: register bits that switch", text, parts)
 
 
-def _change(key: tuple[str, int], saved: dict) -> str:
-    return f"{0 - saved[key]:+.1%} (`{key[0]}`, exponent {key[1]})"
+def _change(key: tuple[str, str, int], saved: dict) -> str:
+    return f"{0 - saved[key]:+.1%} (`{key[1]}`, exponent {key[2]})"
 
 
 def _total(frame: dict) -> float:
@@ -162,17 +175,17 @@ def _a_pixel(frame: dict, block: str) -> float:
 
 
 def _table(found: dict, saved: dict, blocks: Sequence[str]) -> Table:
-    columns = ["model", "exponent", "gate", "spans", "pixels", "cycles"]
+    columns = ["method", "model", "exponent", "gate", "spans", "pixels", "cycles"]
     columns += [*(f"{block}, bits a pixel" for block in blocks), "pipeline, bits a pixel", "saved, share"]
     rows: list[list[Cell]] = []
     grades: list[list[Grade]] = []
-    for (model, exponent), of in found.items():
+    for key, of in found.items():
         for gate, frame in of.items():
-            row: list[Cell] = [model, exponent, "on" if gate else "off"]
+            row: list[Cell] = [*key, "on" if gate else "off"]
             row += [frame[name] for name in ("spans", "pixels", "cycles")]
             row += [*(_a_pixel(frame, block) for block in blocks), _total(frame)]
-            rows.append([*row, saved[model, exponent] if gate else None])
-            grade: Grade = ("good" if saved[model, exponent] > 0 else "fair") if gate else ""
+            rows.append([*row, saved[key] if gate else None])
+            grade: Grade = ("good" if saved[key] > 0 else "fair") if gate else ""
             grades.append([""] * (len(columns) - 1) + [grade])
     note = (
         "Toggled register bits over pixels shaded, hidden ones too. Green: the gate saves more than it "
@@ -184,15 +197,16 @@ def _table(found: dict, saved: dict, blocks: Sequence[str]) -> Table:
 def _drawing(found: dict, blocks: Sequence[str]) -> Drawing:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.6, 0.62 * len(found) + 1.9), layout="constrained")
+    figure = Figure(figsize=(7.6, 0.36 * sum(map(len, found.values())) + 1.9), layout="constrained")
     axes = figure.subplots()
     bars = [
-        (f"{model}, n = {exponent}, gate {'on' if gate else 'off'}", frame)
-        for (model, exponent), of in found.items()
+        (f"{method}, {model}, n = {exponent}" + f", gate {'on' if gate else 'off'}" * (len(of) > 1), frame)
+        for (method, model, exponent), of in found.items()
         for gate, frame in of.items()
     ]
     # The two of a frame stand together.
-    place = np.arange(len(bars)) + np.arange(len(bars)) // 2 * 0.5
+    group = np.repeat(np.arange(len(found)), [len(of) for of in found.values()])
+    place = np.arange(len(bars)) + group * 0.5
     start = np.zeros(len(bars))
     for block, color in zip(blocks, _COLORS, strict=False):
         counts = np.array([_a_pixel(frame, block) for _, frame in bars])
@@ -204,5 +218,8 @@ def _drawing(found: dict, blocks: Sequence[str]) -> Drawing:
     axes.grid(True, axis="x", color="#dddddd", linewidth=0.5)
     axes.set_axisbelow(True)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
-    note = "Blocks in the order in which a span passes them, from left to right."
+    note = (
+        "Blocks in the order in which a span passes them, from left to right. The sums of `quotient` are in "
+        "its setup of spans."
+    )
     return Drawing("energy-blocks", "Register bits that toggle a pixel, by block", svg(figure), note)

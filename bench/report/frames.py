@@ -24,7 +24,7 @@ from blysk.golden.frames.compare import border_mask, method_in_float64
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.methods.interpolator import Operand
-from blysk.golden.presets import LOBES, MODELS, preset
+from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.raster import Raster, rasterise
@@ -148,11 +148,11 @@ def frames(
 
     - ``model``: Phong shading (normals interpolated over the triangle and normalised at every pixel, as on a
       GPU) with the design's model, against the same with Blinn's model; both in float64. It does not depend
-      on the arithmetic;
+      on the arithmetic. A model of R·V approximates no other: this error is 0;
     - ``arithmetic``: the frame against the same method and model in float64; coefficients as published
       count as arithmetic;
     - ``method``: the frame against Phong shading with the same model;
-    - ``total``: the frame against the exact one, Phong shading with Blinn's model.
+    - ``total``: the frame against the exact one, Phong shading with Blinn's model, or with its own of R·V.
 
     Parameters
     ----------
@@ -259,18 +259,19 @@ def _judged(
     model: str,
 ) -> dict[str, Any]:
     """Every error of a frame, its verdicts and its pictures."""
-    exact = render(scene, "phong", REFLECTION_MODELS["blinn"], raster=raster)
+    own = (MODELS | LOBES | MIRROR_LOBES)[model].model
+    exact = render(scene, "phong", own if own.MIRROR else REFLECTION_MODELS["blinn"], raster=raster)
     if not exact.mask.any():
         size = f"{scene.width}x{scene.height}"
         raise InputError(view["source"], f"no pixel shows the surface at {size}", "choose another mesh")
-    golden = render(scene, "phong", (MODELS | LOBES)[model].model, raster=raster).image
+    golden = render(scene, "phong", own, raster=raster).image
     pairs = {
         "model": (golden * 255, exact.image),
         "arithmetic": (image, same_method),
         "method": (image, golden),
         "total": (image, exact.image),
     }
-    border = border_mask(scene, raster, (MODELS | LOBES)[model].model)
+    border = border_mask(scene, raster, own)
     at_border = np.abs(image[border] - 255 * exact.image[border])
     values, verdicts = {}, {}
     for kind, (shown, reference) in pairs.items():

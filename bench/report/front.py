@@ -10,7 +10,7 @@ from blysk.bench.colors import style_of
 from blysk.bench.labels import Label, place_labels
 from blysk.bench.report.section import Conclusion, Drawing, Table
 from blysk.bench.svg import panels, svg
-from blysk.golden.presets import METHODS
+from blysk.golden.presets import METHODS, MIRROR_LOBES
 
 __all__ = ["conclusion", "spread_table", "summaries"]
 
@@ -30,8 +30,9 @@ def summaries(
     Returns
     -------
     list of dict
-        ``label``, ``method``, ``group``, ``samples`` (their number); ``method_error`` and ``total_error``,
-        each largest and smallest over the scenes; ``cycles``, smallest, median and largest cycles a pixel;
+        ``label``, ``method``, ``group``, ``samples`` (their number); ``is_prepared``, whether spans bring dot
+        products; ``is_mirror``, whether the model is one of R·V; ``method_error`` and ``total_error``, each
+        largest and smallest over the scenes; ``cycles``, smallest, median and largest cycles a pixel;
         ``ns``, the same in nanoseconds over scenes and seeds, or ``None``; ``multipliers``, ``luts``,
         ``fmax_mhz``, ``parts``, spans after cutting over spans before.
     """
@@ -68,6 +69,7 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
         "method": method_name,
         "group": point["group"],
         "is_prepared": METHODS.get(method_name) is not None and METHODS[method_name].TAKES_VALUES,
+        "is_mirror": point["settings"]["model"] in MIRROR_LOBES,
         "samples": len(samples),
         "method_error": (min(method), max(method)),
         "total_error": (min(total), max(total)),
@@ -88,22 +90,32 @@ _LEAST_LSB = 1e-2
 
 
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
-    """Sentences on the front of the largest total error over all scenes against cycles a pixel."""
+    """Sentences on the front of the largest total error over all scenes against cycles a pixel.
+
+    Parameters
+    ----------
+    found : sequence of dict
+        From `summaries`.
+    """
     timed = [of for of in found if of["cycles"]]
     if not timed:
         return None
     on_front = _front(timed, "total_error")
     if not on_front:
         return None
-    best = next((of for of in on_front if of["total_error"][1] <= 1), on_front[-1])
+    exact = [of for of in on_front if of["total_error"][1] <= 1] or on_front[-1:]
+    fast = [of for of in exact if of["cycles"][1] <= _ALIKE_TIMES * exact[0]["cycles"][1]]
+    best = min(fast, key=lambda of: of["total_error"][1])
     scenes = max(of["samples"] for of in timed)
     sentence = (
         f"**`{best['label']}`** shades a pixel in {best['cycles'][1]:.2f} cycles; its largest error "
         f"against exact Blinn shading, found on {scenes} scenes, is {best['total_error'][1]:.2f} LSB, with "
-        f"{_costs(best)}. "
-        f"None of the "
-        f"other {len(timed) - 1} designs is both as fast and as exact"
+        f"{_costs(best)}"
     )
+    compared = [of for of in timed if of is not best and _is_compared(of)]
+    equals = [of for of in compared if all(of[key][1] <= best[key][1] for key in ("cycles", "total_error"))]
+    if not equals:
+        sentence += f". None of {len(compared)} others is both as fast and as exact"
     others = [f"`{of['label']}` ({_says(of)})" for of in on_front if of is not best]
     if others:
         more = f" and {len(others) - 3} more" if len(others) > 3 else ""
@@ -125,7 +137,18 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
             f"of every "
             "span are made before it and not counted"
         )
+    mirrors = _cheapest_first(of for of in timed if of["is_mirror"])
+    if mirrors:
+        sentence += (
+            f". True Phong highlights, (R·V)^n by `{mirrors[0]['label']}`, take {_says(mirrors[0])} against "
+            f"exact Phong shading, with {_costs(mirrors[0])}"
+        )
     return Conclusion("What does a pixel cost, and how exact is it?", f"{sentence}.", _drawing(timed))
+
+
+def _is_compared(of: Mapping[str, Any]) -> bool:
+    """Whether a design may be on the front: it works out its dot products, and draws Blinn's highlight."""
+    return not (of["is_prepared"] or of["is_mirror"])
 
 
 def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -133,23 +156,28 @@ def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any
 
 
 def _front(found: Sequence[Mapping[str, Any]], kind: str, time: str = "cycles") -> list[Mapping[str, Any]]:
-    """Designs that no other beats, fastest first; designs that get their dot products as input are left out.
+    """Designs that no other beats, fastest first.
+
+    Designs that get their dot products as input are left out, and those of R·V, which draw another picture.
 
     A design beats another if it is no worse in error (by `_ALIKE_LSB`) and time (by `_ALIKE_TIMES`), and
-    better by more than that in one of both, or has fewer multipliers. `time` is a key of `summaries`,
-    ``cycles`` or ``ns``.
+    better by more than that in one of both, or smaller: it has fewer multipliers, or as many and fewer
+    look-up tables. `time` is a key of `summaries`, ``cycles`` or ``ns``.
     """
-    found = [of for of in found if not of["is_prepared"]]
+    found = [of for of in found if _is_compared(of)]
     if not found:
         return []
     error, times = np.array([(of[kind][1], of[time][1]) for of in found]).T
     multipliers = np.array([of["multipliers"] or np.inf for of in found])
+    # Where one is not known, none has fewer.
+    luts = np.array([of["luts"] or np.nan for of in found])
     # [i, j]: whether j is better than i.
     less_error = error < error[:, np.newaxis] - _ALIKE_LSB
     less_time = times * _ALIKE_TIMES < times[:, np.newaxis]
-    fewer = multipliers < multipliers[:, np.newaxis]
+    smaller = multipliers < multipliers[:, np.newaxis]
+    smaller |= (multipliers == multipliers[:, np.newaxis]) & (luts < luts[:, np.newaxis])
     no_worse = ~(less_error | less_time).T
-    beaten = (no_worse & (less_error | less_time | fewer)).any(axis=1)
+    beaten = (no_worse & (less_error | less_time | smaller)).any(axis=1)
     return sorted(
         (of for of, is_beaten in zip(found, beaten, strict=True) if not is_beaten),
         key=lambda of: of[time][1],
@@ -178,7 +206,7 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
     figure, axes = panels(9.2, 4.4, 2, sharex=True, sharey=True)
     kinds = (
         ("method_error", "method error: the same model, exact normals"),
-        ("total_error", "total error: Blinn's power, exact normals"),
+        ("total_error", "total error: the exact power, exact normals"),
     )
     for panel, (kind, title) in zip(axes, kinds, strict=True):
         panel.set(xscale="log", yscale="log")
@@ -228,7 +256,8 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
         "exponents); bars go to the smallest error, and over the run times of all scenes"
         + (" and seeds of placement" if in_ns else "")
         + ". Open: as published. Asterisk: its dot products at three points of every span are made before "
-        "the pipeline, so that it is not on the front. The line is the front. Named are the front, and the "
+        "the pipeline, so that it is not on the front. Nor is `phong`, whose errors are against (R·V)^n. The "
+        "line is the front. Named are the front, and the "
         "best and the worst of "
         "each method."
         " Not counted: spans are cut from triangles, and their normals prepared, before the pipeline (by "

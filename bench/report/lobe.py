@@ -12,10 +12,12 @@ import click
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
+from blysk.bench.colors import style_of
+from blysk.bench.labels import Label, place_labels
 from blysk.bench.report.cosine_quadratic_figures import sphere
 from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.store import Task
-from blysk.bench.svg import svg
+from blysk.bench.svg import panels, svg
 from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.lighting.lobe import Lobe
@@ -56,8 +58,11 @@ SIZES = ((8, 16), (12, 16), (12, 32), (14, 32), (15, 16), (15, 32), (20, 16))
 MESHES = ("teapot", "sphere", "torus", "waves")
 """Surfaces of the frames."""
 
-FRONT = ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")
-"""Models of the pipelines that are compared: the table, and its baselines."""
+FRONT = (
+    *(("quotient", model) for model in ("blinn", "phong")),
+    *(("chord", model) for model in ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")),
+)
+"""Method and model of the pipelines that are compared: with a table, and the baselines by other circuits."""
 
 EXPONENTS = (1, 10, 100, 1000)
 
@@ -143,9 +148,9 @@ def unit_cost(name: str) -> dict[str, int]:
     }
 
 
-def pipeline_cost(model: str, style: str = "throughput", gate: bool = False) -> dict[str, int]:
-    """`Cost.totals` of a pipeline by the chord method, its latency and cycles a pixel."""
-    unit = ShadingPipelineUnit(preset("chord", model, style=style, gate=gate))
+def pipeline_cost(method: str, model: str) -> dict[str, int]:
+    """`Cost.totals` of a pipeline, its latency and cycles a pixel."""
+    unit = ShadingPipelineUnit(preset(method, model))
     return {**cost_of(unit).totals, "latency": unit.latency, "cycles_per_pixel": unit.cycles_per_pixel}
 
 
@@ -174,16 +179,18 @@ def mesh_of(name: str) -> Mesh:
 
 
 def frame_errors(
-    mesh: str, model: str, values: Sequence[float], size: Sequence[int] = (640, 480)
+    mesh: str, method: str, model: str, values: Sequence[float], size: Sequence[int] = (640, 480)
 ) -> list[dict[str, float]]:
-    """Largest errors of frames by the chord method, in LSB, where ``|N·L| > 0.002``.
+    """Largest errors of frames, in LSB, where ``|N·L| > 0.002``.
 
     Parameters
     ----------
     mesh : str
         One of `MESHES`.
+    method : str
+        Method of interpolation.
     model : str
-        One of `MODELS` or `LOBES`.
+        One of `MODELS` or `LOBES`, or with ``quotient`` of `MIRROR_LOBES`.
     values : sequence of float
         Exponents, or roughnesses if the model has them.
     size : two ints
@@ -197,7 +204,7 @@ def frame_errors(
         error of the method in exact arithmetic with the exact model; ``everywhere``: the total error at
         any N·L.
     """
-    design, surface, found = preset("chord", model), mesh_of(mesh), []
+    design, surface, found = preset(method, model), mesh_of(mesh), []
     target = design.specular.model if design.loads_tables else BLINN
     for value in values:
         scene = scene_for(surface, 10, *size)
@@ -210,7 +217,7 @@ def frame_errors(
         lit[frame.raster.pixel[frame.raster.visible]] = np.abs(normals @ scene.lights[0].direction) > 0.002
         lit = lit.reshape(exact.mask.shape) & exact.mask
         of_method = method_in_float64(scene, design, frame.cut_raster)
-        exact_model = replace(design, specular=Lobe(target))
+        exact_model = design if design.loads_tables else replace(design, specular=Lobe(target))
         of_spans = method_in_float64(scene, exact_model, frame.cut_raster)
 
         def largest(image, reference, mask):
@@ -236,12 +243,18 @@ def tasks(quick: bool) -> list[Task]:
         for octaves, steps in (SIZES[-1:] if quick else SIZES)
     ]
     found += [Task(unit_cost, {"name": name}) for name in _UNITS]
-    found += [Task(pipeline_cost, {"model": model}) for model in FRONT]
+    found += [Task(pipeline_cost, {"method": method, "model": model}) for method, model in FRONT]
+    names = ("method", "model", "values")
     for mesh in MESHES[:1] if quick else MESHES:
-        pairs = [*((model, EXPONENTS) for model in FRONT), ("ggx", ROUGHNESSES), ("beckmann", ROUGHNESSES)]
+        frames = [(*design, list(EXPONENTS)) for design in FRONT]
+        frames += [
+            (method, model, list(ROUGHNESSES))
+            for model in ("ggx", "beckmann")
+            for method in ("quotient", "chord")
+        ]
         found += [
-            Task(frame_errors, {"mesh": mesh, "model": model, "values": list(values), "size": size})
-            for model, values in pairs
+            Task(frame_errors, {"mesh": mesh, **dict(zip(names, frame, strict=True)), "size": size})
+            for frame in frames
         ]
     return found
 
@@ -251,23 +264,35 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     made: dict[str, list[tuple[dict, Any]]] = {}
     for task, result in zip(tasks, results, strict=True):
         made.setdefault(task.function.__name__, []).append((task.settings, result))
-    frames = [(given["mesh"], given["model"], row) for given, rows in made["frame_errors"] for row in rows]
-    pipelines = {given["model"]: cost for given, cost in made["pipeline_cost"]}
+    frames = [
+        (given["mesh"], (given["method"], given["model"]), row)
+        for given, rows in made["frame_errors"]
+        for row in rows
+    ]
+    pipelines = {(given["method"], given["model"]): cost for given, cost in made["pipeline_cost"]}
     worst = {
-        model: max(row["total"] for _, of, row in frames if of == model)
-        for model in dict.fromkeys(of for _, of, _ in frames)
+        design: max(row["total"] for _, of, row in frames if of == design)
+        for design in dict.fromkeys(of for _, of, _ in frames)
     }
-    table, cosquad = pipelines["blinn"], pipelines["cosquad"]
+    table, chord, cosquad = (pipelines[of] for of in (("quotient", "blinn"), *_BASELINES))
+    worst_chord, worst_cosquad = (worst[of] for of in _BASELINES)
+    sharp = _serves(frames, "ggx"), _serves(frames, "beckmann")
     text = [
-        "A table of 336 words, addressed by the octave of 1 - N·H, with one multiplier gives Blinn's power "
-        "at every exponent, and any other curve of N·H: Beckmann's and GGX among them.",
-        f"A pipeline with it has {table['multipliers']} multipliers, one with `cosquad` "
-        f"{cosquad['multipliers']}; both take a span to its first pixel in {table['latency']} and "
-        f"{cosquad['latency']} cycles, and give a pixel every {table['cycles_per_pixel']} and "
-        f"{cosquad['cycles_per_pixel']} cycles. Its largest error against exact shading with Blinn's power "
-        f"is {worst['blinn']:.2f} LSB, that of `cosquad` {worst['cosquad']:.2f}.",
-        "What is left is the method's: it turns normals evenly along a span on the screen, and the "
-        "exact frame evenly on the surface. The column *spans alone* has that error by itself.",
+        "A small table, addressed by octaves, with one multiplier gives Blinn's power at every exponent, and "
+        "any other curve of N·H: Beckmann's and GGX among them. With `quotient` it is addressed by sin² and "
+        "cos² of the angle and has 512 words, and by sin² of half the angle it gives true Phong, (R·V)^n; "
+        "with the other methods it is addressed by 1 - N·H and has 336.",
+        f"A pipeline by `quotient` with it has {table['multipliers']} multipliers, by `chord` "
+        f"{chord['multipliers']}, by `chord` with `cosquad` {cosquad['multipliers']}; they take a span to "
+        f"its first pixel in {table['latency']}, {chord['latency']} and {cosquad['latency']} cycles. Largest "
+        "errors against exact shading with Blinn's power: "
+        f"{worst['quotient', 'blinn']:.2f}, {worst_chord:.2f} and {worst_cosquad:.2f} LSB. True Phong, "
+        f"against itself: {worst['quotient', 'phong']:.2f}.",
+        "What is left with `chord` is the method's: it turns normals evenly along a span on the screen, and "
+        "the exact frame evenly on the surface. The column *spans alone* has that error by itself; spans of "
+        "`quotient` have none.",
+        f"Of sharp lobes the words of `quotient` are too short. Its frames are within 1 LSB with ggx from "
+        f"roughness {sharp[0]:g} on, with beckmann from {sharp[1]:g}; `chord` has finer words for them.",
     ]
     heads = [f"{case.model.name} {case.label} = {value:g}, LSB" for case in CASES for value in case.values]
     sizes = [
@@ -295,16 +320,18 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         ),
         Table(
             "lobe-pipelines",
-            "Pipelines by the chord method, one light",
-            ["model", *names, "largest error, LSB"],
-            [[model, *(cost[name] for name in names), worst[model]] for model, cost in pipelines.items()],
-            "The error against exact shading with Blinn's power, over all frames of the next table.",
+            "Pipelines, one light",
+            ["method", "model", *names, "largest error, LSB"],
+            [[*of, *(cost[name] for name in names), worst[of]] for of, cost in pipelines.items()],
+            "The error against exact shading with Blinn's power, of `phong` with (R·V)^n, over all frames of "
+            "the next table.",
         ),
         Table(
             "lobe-frames",
-            "Largest errors of frames by the chord method",
+            "Largest errors of frames",
             [
                 "mesh",
+                "method",
                 "model",
                 "exponent or roughness",
                 "units, LSB",
@@ -315,36 +342,50 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             [
                 [
                     mesh,
-                    model,
+                    *design,
                     *(row[name] for name in ("value", "units", "total", "total_spans", "everywhere")),
                 ]
-                for mesh, model, row in frames
+                for mesh, design, row in frames
             ],
             "White light, k_d 0.4 and k_s 0.55; pixels with |N·L| over 0.002, but for the last column. "
             "*Units*: against the method and the model in float64, the rounding of a pixel included. *Total* "
-            "and *anywhere*: against exact normals of every pixel with Blinn's power, `ggx` and `beckmann` "
-            "with their own model.",
+            "and *anywhere*: against exact normals of every pixel with Blinn's power, `phong`, `ggx` and "
+            "`beckmann` with their own model.",
         ),
         _front(pipelines, worst),
     ]
     return Section("lobe", "Exact highlights from one small table", text, parts)
 
 
-def _front(pipelines: dict[str, dict], worst: dict[str, float]) -> Drawing:
-    """Drawing of the largest error against the number of multipliers."""
-    from matplotlib.figure import Figure
+_BASELINES = ("chord", "blinn"), ("chord", "cosquad")
 
-    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
-    axes = figure.subplots()
-    for model, cost in pipelines.items():
-        x, y = cost["multipliers"], worst[model]
-        axes.plot(x, y, "o", color="#d55e00" if model == "blinn" else "#0072b2")
-        axes.annotate(model, (x, y), xytext=(6, 4), textcoords="offset points")
+
+def _serves(frames: Sequence[tuple[str, tuple[str, str], dict]], model: str) -> float:
+    """Least roughness from which on `quotient` is within 1 LSB."""
+    off = [row["value"] for _, of, row in frames if of == ("quotient", model) and row["total"] > 1]
+    values = sorted({row["value"] for _, of, row in frames if of == ("quotient", model)})
+    return next((value for value in values if value > max(off, default=0)), float("inf"))
+
+
+def _front(pipelines: dict[tuple[str, str], dict], worst: dict[tuple[str, str], float]) -> Drawing:
+    """Drawing of the largest error against the number of multipliers."""
+    figure, (axes,) = panels(7.6, 3.6)
+    points = {of: (cost["multipliers"], worst[of]) for of, cost in pipelines.items()}
+    for (method, _), (x, y) in points.items():
+        style = style_of(method)
+        axes.plot(x, y, style.marker, color=style.color)
     axes.set(xlabel="multipliers of the pipeline", ylabel="largest error, LSB", yscale="log")
-    axes.margins(x=0.15, y=0.15)
+    axes.margins(x=0.3, y=0.2)
+    axes.set_yticks((0.5, 1, 2, 5, 10, 20, 50), ("0.5", "1", "2", "5", "10", "20", "50"))
+    axes.set_yticks((), minor=True)
+    axes.set_ylim(min(y for _, y in points.values()) / 1.5, max(y for _, y in points.values()) * 1.5)
+    # Lines to labels move no limit.
+    axes.autoscale(False)
     axes.grid(True, color="#dddddd", linewidth=0.5)
     axes.set_axisbelow(True)
-    note = "Against exact shading with Blinn's power. Lower and further left is better."
+    labels = [Label(*at, ", ".join(of), style_of(of[0]).color) for of, at in points.items()]
+    place_labels(axes, labels, list(points.values()))
+    note = "Against exact shading with Blinn's power, `phong` with (R·V)^n. Lower and further left is better."
     return Drawing("lobe-front", "Error of highlights against multipliers", svg(figure), note)
 
 

@@ -2,8 +2,9 @@
 
 ``python -m blysk.bench.report.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
 exponents 1, 30 and 1000 with each pair, also without specular light, in the compiled engine, and compares
-every output pixel, hidden ones too, with `Design.compute`. It prints a line for each pair. The exit status is
-1 if a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
+every output pixel, hidden ones too, with `Design.compute`. It prints a line for each pair. A table of the
+method quotient ends at a right angle: an exponent at which a model lives on beyond is left out, and counted.
+The exit status is 1 if a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
 """
 
 import argparse
@@ -16,7 +17,8 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frames.prepare import constants_of, prepare
-from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.golden.pipeline import Design
+from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.engine import SimulationError
@@ -25,9 +27,11 @@ from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.mesh import load_mesh
 
-__all__ = ["EXPONENTS", "Pair", "main", "measure", "mismatches"]
+__all__ = ["EXPONENTS", "Pair", "main", "measure", "mismatches", "models_of"]
 
 EXPONENTS = (1, 30, 1000)
+
+_ALL_MODELS = ("blinn", *MIRROR_LOBES, *MODELS)
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class Pair:
         Pixels that differ from the bit-accurate model's in coordinates, colour or mark of a span's end.
     failure : str
         One line that says why frames are missing; empty if none are.
+    refused : tuple of int
+        Exponents that the method does not serve with the model.
     """
 
     method: str
@@ -54,6 +60,23 @@ class Pair:
     pixels: int
     mismatches: int
     failure: str = ""
+    refused: tuple[int, ...] = ()
+
+
+def models_of(method: str, models: Sequence[str | None]) -> list[str | None]:
+    """Those of some models that a method serves, in order: of R·V only ``quotient`` does."""
+    return [model for model in models if METHODS[method].TAKES_VECTORS or model not in MIRROR_LOBES]
+
+
+def _refuses(design: Design, exponent: int) -> bool:
+    """Whether a design has no table of its model at an exponent."""
+    if not (design.takes_vectors and design.loads_tables):
+        return False
+    try:
+        design.specular.table(exponent)
+    except ValueError:
+        return True
+    return False
 
 
 def mismatches(
@@ -99,7 +122,7 @@ def mismatches(
 def measure(
     meshes: Sequence[Mesh],
     methods: Sequence[str] = tuple(METHODS),
-    models: Sequence[str | None] = (*MODELS, None),
+    models: Sequence[str | None] = (*_ALL_MODELS, None),
     exponents: Sequence[int] = EXPONENTS,
     width: int = 96,
     height: int = 72,
@@ -118,18 +141,22 @@ def measure(
         Size of a frame.
     """
     for method in methods:
-        for model in models:
+        for model in models_of(method, models):
             frames = pixels = wrong = 0
-            failure = ""
+            failure, refused = "", ()
             try:
-                unit = ShadingPipelineUnit(preset(method, model))
+                design = preset(method, model)
+                refused = tuple(exponent for exponent in exponents if _refuses(design, exponent))
+                unit = ShadingPipelineUnit(design)
                 for mesh in meshes:
                     for exponent in exponents:
+                        if exponent in refused:
+                            continue
                         of_frame = mismatches(unit, mesh, exponent, width, height)
                         frames, pixels, wrong = frames + 1, pixels + of_frame[0], wrong + of_frame[1]
             except (ValueError, SimulationError) as error:
                 failure = f"{type(error).__name__}: {error}".splitlines()[0]
-            yield Pair(method, model, frames, pixels, wrong, failure)
+            yield Pair(method, model, frames, pixels, wrong, failure, refused)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -147,7 +174,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--width", type=int, default=96)
     parser.add_argument("--height", type=int, default=72)
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=tuple(METHODS))
-    parser.add_argument("--models", nargs="+", choices=(*MODELS, "none"), default=(*MODELS, "none"))
+    parser.add_argument(
+        "--models", nargs="+", choices=(*LOBES, *_ALL_MODELS[1:], "none"), default=(*_ALL_MODELS, "none")
+    )
     parser.add_argument("--exponents", nargs="+", type=int, default=EXPONENTS)
     parser.add_argument("--json", help="file for the same figures")
     options = parser.parse_args(arguments)
@@ -163,6 +192,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for pair in measure(meshes, options.methods, models, options.exponents, options.width, options.height):
         pairs.append(pair)
         note = f" {pair.failure} |" if pair.failure else ""
+        note += f" not at exponent {', '.join(map(str, pair.refused))} |" if pair.refused else ""
         print(
             f"| {pair.method} | {pair.model or 'none'} | {pair.frames} | {pair.pixels:,} "
             f"| {pair.mismatches:,} |{note}",
@@ -170,9 +200,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     pixels, wrong = (sum(getattr(pair, name) for pair in pairs) for name in ("pixels", "mismatches"))
     failed = sum(bool(pair.failure) for pair in pairs)
+    refused = sum(len(pair.refused) for pair in pairs)
     print(
         f"\n{len(pairs)} pairs, {len(meshes)} meshes, {pixels:,} pixels: {wrong:,} mismatches, "
-        f"{failed} pairs with frames missing"
+        f"{failed} pairs with frames missing, {refused} exponents that are not served"
     )
     if options.json:
         with open(options.json, "w", encoding="utf-8") as file:

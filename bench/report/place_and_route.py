@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
+from blysk.bench.accuracy import model_of
 from blysk.bench.report.placed import read_store
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.store import Task
@@ -16,9 +17,7 @@ from blysk.sim.installation import install_extra
 
 __all__ = ["measure", "section", "task", "tasks"]
 
-MODEL = "cosquad"
-
-OTHERS = ("quadratic", "chord")
+OTHERS = ("quadratic", "quotient")
 """Methods for the families after the first."""
 
 OTHERS_SEEDS = 3
@@ -58,16 +57,18 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
         return {"reason": str(error)}
 
 
-def task(method: str, model: str = MODEL, family: str = "ecp5") -> Task:
-    """Task that measures a pipeline; with one seed for published methods and other models than `MODEL`.
+def task(method: str, model: str | None = None, family: str = "ecp5") -> Task:
+    """Task that measures a pipeline; with one seed for published methods and other models than `model_of`.
 
     Parameters
     ----------
-    method, model, family
+    method, family
         As for `measure`.
+    model : str, optional
+        As for `measure`; by default `model_of` the method.
     """
-    seeds = 1
-    if method in METHODS and model == MODEL:
+    seeds, model = 1, model or model_of(method)
+    if method in METHODS and model == model_of(method):
         seeds = SEEDS if FAMILIES[family] is ECP5 else OTHERS_SEEDS
     settings = {"method": method, "model": model, "family": family, "seeds": seeds}
     return Task(measure, settings | {"tools": tool_versions(FAMILIES[family])})
@@ -104,8 +105,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     if not tasks:
         return Section(name, title, *_committed())
     text = [
-        f"The pipeline, {MODEL}, one light, three channels, out of context. Placement starts from a seed; "
-        "clock rates are over some of them. At one pixel a cycle, 1920x1080 pixels 60 times a second ask for "
+        "The pipeline with cosquad, of quotient with blinn, one light, three channels, out of context. "
+        "Placement starts from a seed; clock rates are over some of them. At one pixel a cycle, 1920x1080 "
+        "pixels 60 times a second ask for "
         f"{1920 * 1080 * 60 / 1e6:.0f} MHz."
     ]
     tables = []

@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from blysk.bench.accuracy import model_of
 from blysk.bench.colors import style_of
 from blysk.bench.command import run
 from blysk.bench.report import front, front_scenes, place_and_route
@@ -59,7 +60,9 @@ GROUPS = {
 }
 """Groups of points, with their titles."""
 
-DESIGNS = [(method, "cosquad") for method in METHODS]
+DESIGNS = [(method, model_of(method)) for method in METHODS]
+
+DESIGNS += [("quotient", "phong")]
 
 DESIGNS += [("chord", model) for model in ("blinn", *MODELS) if model != "cosquad"]
 
@@ -77,11 +80,13 @@ _BEST_OPERAND = {"operand": "one_minus_cosine"}
 _BEST_MODEL = "blinn"
 """Model, an exact lobe table, with which each method in its best form also has points."""
 
-QUICK_SIMULATED = [(method, "cosquad") for method in (*METHODS, *PUBLISHED)]
-"""Designs that the quick report simulates: one pipeline of every method. The others have frames of the
-bit-accurate model, and the cycles of the same method with the same spans, plus the difference of latency."""
+QUICK_SIMULATED = [(method, model_of(method)) for method in (*METHODS, *PUBLISHED)]
+QUICK_SIMULATED += [("quotient", "phong")]
+"""Designs that the quick report simulates: one pipeline of every method, and true Phong. The others have
+frames of the bit-accurate model, and the cycles of the same method with the same spans, plus the difference
+of latency."""
 
-_SPREAD_MODELS = ("cosquad", "exp", "blinn", "blinn_product")
+_SPREAD_MODELS = ("cosquad", "exp", "blinn", "blinn_product", "phong")
 """Models of the designs that are measured over several scenes."""
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from blysk.bench import accuracy
-from blysk.bench.report import place_and_route
 from blysk.bench.report.frames import ERRORS, TIMES
 from blysk.bench.report.perception import (
     CIEDE2000_MAX,
@@ -96,7 +95,8 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "*Arithmetic*: the frame against the same method and model in float64; 0.5 is a correctly rounded "
         "frame, and the coefficients of a published variant count as arithmetic. *Method*: against the exact "
         "frame with the same model. *Total*: against the exact frame, Phong shading as on a GPU: normals "
-        "exact at every pixel, Blinn's model. Methods of the documents stand here with their operand N.H, "
+        "exact at every pixel, Blinn's model; of `phong`, which is no approximation of Blinn's, its own "
+        "model, (R·V)^n. Methods of the documents stand here with their operand N.H, "
         "with the more exact 1 - N.H, and, where it differs, as published. FLIP and CIEDE2000 tell what an "
         "eye sees of an error; *identical to the eye* is a largest error "
         f"of {LARGEST_LSB:g} LSB, or FLIP to {FLIP_P99:g} in 99 % of the pixels and {FLIP_MAX:g} in all, and "
@@ -108,7 +108,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "Run times: cycles a pixel from the simulation, first write of a constant to last pixel; nanoseconds "
         + (
             f"at the clock rate after place and route on an {DEVICE}, the median of some seeds, of one for "
-            f"published methods and other models than `{place_and_route.MODEL}`; "
+            "published methods and most models; "
             if placed
             else "at committed clock rates after place and route "
             f"({'; '.join(sorted(dates))}), where there are any; "

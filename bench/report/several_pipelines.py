@@ -34,7 +34,7 @@ def tasks(quick: bool) -> list[Task]:
     settings = {
         "meshes": list(meshes),
         "size": [160, 120] if quick else [640, 480],
-        "method": "linear" if quick else "chord",
+        "method": "linear" if quick else "quotient",
     }
     return [Task(measure, {"count": count, **settings}) for count in counts]
 

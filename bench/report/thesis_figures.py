@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from blysk.bench.accuracy import scene_for
+from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.report.thesis_ways import SPANS, WAYS, Counted, finish, random_operands
 from blysk.bench.speed.renderer import timed
 from blysk.bench.speed.throughput import measure, spans_of
@@ -14,7 +14,7 @@ from blysk.bench.tools.blocks import Entry, entry_of, row_of
 from blysk.bench.tools.place_and_route import lay_out
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.presets import preset
 from blysk.golden.reference.metrics import error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import rasterise
@@ -230,7 +230,7 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
 def square_errors(method: str, triangles: int, width: int, height: int) -> dict[str, Any]:
     """MNSE of a frame as published in [T] 4.1, and its well-posed form NMSE.
 
-    The frame is by the bit-accurate model with the reflection model cosquad; the reference is the exact
+    The frame is by the bit-accurate model with `model_of` the method; the reference is the exact
     frame, Phong shading with Blinn's model. Only pixels of the surface count.
 
     Parameters
@@ -251,9 +251,9 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
         1 LSB more in the one value that counts most, or least; ``one``: NMSE of either.
     """
     scene = scene_for(teapot(triangles), 50, width, height)
-    design = preset(method, "cosquad")
+    design = preset(method, model_of(method))
     prepared = prepare(scene, design)
-    color = design.compute(prepared.spans, FrameConstants.of(scene, 1)).color
+    color = design.compute(prepared.spans, constants_of(scene, design)).color
     exact = render(scene, raster=prepared.raster)
     image = np.zeros((height * width, 3))
     seen = prepared.cut_raster.visible

@@ -149,8 +149,10 @@ def tasks(quick: bool) -> list[Task]:
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """The section: the table, and a text on figures that cannot be compared."""
     exact = "Phong shading with exact Blinn highlights at every pixel, {}"
+    quotients = "no unit normal: quotients of quadratics"
     cores = [
-        own("chord", "blinn", (), exact.format("no normal computed: two additions a pixel")),
+        own("quotient", "blinn", (), exact.format(quotients)),
+        own("quotient", "phong", (), exact.replace("Blinn", "Phong").format(quotients)),
         own("renormalise", "blinn", (), exact.format("each normal divided by its length")),
         *OTHERS,
     ]

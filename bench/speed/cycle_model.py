@@ -12,7 +12,7 @@ import click
 import numpy as np
 from amaranth.hdl import UnusedElaboratable
 
-from blysk.bench.accuracy import scene_for
+from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.command import run
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
@@ -155,7 +155,7 @@ def command(methods: Sequence[str]) -> int:
     """Print simulated cycles and the model's."""
     for method in methods or METHODS:
         for triangles, size in ((992, (160, 120)), (8000, (160, 120)), (300, (320, 240))):
-            simulated, modelled = compare(preset(method, "cosquad"), triangles, size)
+            simulated, modelled = compare(preset(method, model_of(method)), triangles, size)
             share = modelled / simulated - 1
             click.echo(f"{method:<18}{triangles:>6}{simulated:>9}{modelled:>9}{share:>8.2%}")
     return 0

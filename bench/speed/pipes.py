@@ -1,7 +1,7 @@
 """Pixels a cycle of several pipelines: how well the spans of meshes keep all of them busy.
 
 ``python -m blysk.bench.speed.pipes`` draws a coarse ring and teapots of about 1,000, 10,000 and 100,000
-triangles at 640x480 by 1, 2, 4 and 8 simulated pipelines of the method chord; pipeline k of n draws the
+triangles at 640x480 by 1, 2, 4 and 8 simulated pipelines of the method quotient; pipeline k of n draws the
 scanlines with y mod n = k. It prints a table in Markdown; ``--json`` prints the same as JSON. Every frame
 must equal that of the bit-accurate model. The exit status is 1 if a frame differs, or if four pipelines give
 less than 3.6 times the pixels a cycle of one on a mesh whose spans have four pixels or more on average.
@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from blysk.bench.accuracy import scene_for
+from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pixel_pipelines import PIPES
@@ -34,7 +34,7 @@ LEAST = 3.6
 
 _OF = 4
 _EXPONENT = 50
-_METHOD = "chord"
+_METHOD = "quotient"
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def measure(
     method : str
         Method of the design, which has one light.
     """
-    design = preset(method, "cosquad")
+    design = preset(method, model_of(method))
     simulator = FrameSimulator(design, "auto", pipes)
     for name in meshes:
         mesh = mesh_of(name)

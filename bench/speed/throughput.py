@@ -1,10 +1,10 @@
 """Cycles a pixel of teapot frames, by the lengths of their spans and the setup interval.
 
 ``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
-1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods chord
-and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each method has. It prints two
-tables in Markdown: lengths of the spans, and cycles. ``--json`` prints the same as JSON. The exit status is 1
-if spans of 16 pixels or more take over 1.05 cycles a pixel.
+1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods
+quotient, chord and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each method has. It
+prints two tables in Markdown: lengths of the spans, and cycles. ``--json`` prints the same as JSON. The exit
+status is 1 if spans of 16 pixels or more take over 1.05 cycles a pixel.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from blysk.bench.accuracy import scene_for
+from blysk.bench.accuracy import model_of, scene_for
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Spans
@@ -32,7 +32,7 @@ __all__ = ["BINS", "INTERVALS", "LARGEST", "LONG", "METHODS", "TRIANGLES", "Leng
 __all__ += ["main", "measure", "spans_of"]
 
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
-METHODS = ("chord", "quadratic")
+METHODS = ("quotient", "chord", "quadratic")
 INTERVALS = (1, 2, 3, 4, 7, 9)
 """Setup intervals to measure; for each method, those that it can be built for."""
 
@@ -94,8 +94,8 @@ class Throughput:
         Triangles of the mesh.
     method : str
         Method of interpolation.
-    setup_interval : int
-        Least cycles from one span to the next.
+    setup_interval : int or None
+        Least cycles from one span to the next; ``None`` for a method with one setup interval.
     pixels, cycles : int
         Pixels of the frame, and cycles from the first write of a constant to the last pixel.
     long_pixels, long_cycles : int
@@ -104,7 +104,7 @@ class Throughput:
 
     triangles: int
     method: str
-    setup_interval: int
+    setup_interval: int | None
     pixels: int
     cycles: int
     long_pixels: int
@@ -128,7 +128,7 @@ class Throughput:
 
 def spans_of(scene: Scene, method: str) -> Spans:
     """Spans of a scene, cut and quantised for a method."""
-    return prepare(scene, preset(method, "cosquad")).spans
+    return prepare(scene, preset(method, model_of(method))).spans
 
 
 def measure(
@@ -159,10 +159,11 @@ def measure(
     return len(run.beats), run.total_cycles
 
 
-def _intervals_of(method: str, intervals: Sequence[int]) -> list[int]:
-    """The setup intervals among ``intervals`` that a method can be built for."""
-    interpolator = preset(method, "cosquad").interpolator
-    return [i for i in intervals if i in unit_of(interpolator).setup_intervals(interpolator)]
+def _intervals_of(method: str, intervals: Sequence[int]) -> Sequence[int | None]:
+    """Those of ``intervals`` that a method can be built for; ``None`` if it has no choice."""
+    interpolator = preset(method, model_of(method)).interpolator
+    served = unit_of(interpolator).setup_intervals(interpolator)
+    return [i for i in intervals if i in served] if served else [None]
 
 
 def _frames(
@@ -170,7 +171,7 @@ def _frames(
 ) -> Iterator[tuple[Lengths, list[Throughput]]]:
     served = {method: _intervals_of(method, intervals) for method in methods}
     units = {
-        (method, interval): ShadingPipelineUnit(preset(method, "cosquad", setup_interval=interval))
+        (method, interval): ShadingPipelineUnit(preset(method, model_of(method), setup_interval=interval))
         for method in methods
         for interval in served[method]
     }
@@ -178,7 +179,7 @@ def _frames(
         mesh = teapot(count)
         scene = scene_for(mesh, _EXPONENT, width, height)
         for method in methods:
-            (constants,) = constants_of(scene, preset(method, "cosquad"))
+            (constants,) = constants_of(scene, preset(method, model_of(method)))
             spans = spans_of(scene, method)
             chosen = np.asarray(spans.length) >= LONG
             long = spans[chosen]
@@ -211,7 +212,7 @@ def _print(lengths: Sequence[Lengths], rows: Sequence[Throughput], width: int, h
     for row in rows:
         long = "-" if row.long_cycles_per_pixel is None else f"{row.long_cycles_per_pixel:.4f}"
         print(
-            f"| {row.triangles:,} | {row.method} | {row.setup_interval} | {row.cycles:,} "
+            f"| {row.triangles:,} | {row.method} | {row.setup_interval or '-'} | {row.cycles:,} "
             f"| {row.cycles_per_pixel:.3f} | {row.setup_share:.1%} | {long} |"
         )
 

@@ -12,9 +12,9 @@ COUNTED = {"multipliers": 17, "register_bits": 5000, "cells": 900, "memory_bits"
 
 
 def test_frame():
-    found = frame(100, (64, 48), ["chord", "linear"])
-    assert set(found) == {"triangles", "chord", "linear"}
-    for method in ("chord", "linear"):
+    found = frame(100, (64, 48), ["quotient", "linear"])
+    assert set(found) == {"triangles", "quotient", "linear"}
+    for method in ("quotient", "linear"):
         of = found[method]
         assert of["cycles"] >= of["pixels"] + of["latency"]
         assert of["spans"] >= of["uncut_spans"]
@@ -39,7 +39,9 @@ def test_section():
                 {"triangles": settings["triangles"], **dict.fromkeys(settings["methods"], made_up)}
             )
         elif task.function is simulated:
-            results.append({"simulated": 1000, "modelled": 1000 + 10 * (task.settings["method"] == "chord")})
+            results.append(
+                {"simulated": 1000, "modelled": 1000 + 10 * (task.settings["method"] == "quotient")}
+            )
         elif task.function is resources:
             results.append(COUNTED)
         elif task.function is energy.measure:

@@ -3,12 +3,19 @@
 
 import pytest
 
-from blysk.bench.report.energy import BLOCKS, EXPONENTS, by_block, measure, section, tasks
+from blysk.bench.report.energy import BLOCKS, DESIGN, EXPONENTS, by_block, measure, section, tasks
 from blysk.bench.report.gate import MODELS
 from blysk.bench.report.section import Drawing, Table
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
+
+
+def test_every_register_of_the_default_is_in_a_block():
+    unit = ToggleCounter(ShadingPipelineUnit(preset(*DESIGN)))
+    found = by_block(dict.fromkeys(unit.status.shape().members, 1))
+    assert set(found) == set(BLOCKS)
+    assert {block for block, count in found.items() if not count} == {"highlight gate", "sums of pixels"}
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -19,7 +26,8 @@ def test_every_register_is_in_a_block(model):
         unit = ToggleCounter(ShadingPipelineUnit(preset("chord", model, gate=gate)))
         found[gate] = by_block(dict.fromkeys(unit.status.shape().members, 1))
         assert set(found[gate]) == set(BLOCKS)
-        assert all(count or (block == "highlight gate" and not gate) for block, count in found[gate].items())
+        none = {"quotients of pixels", *["highlight gate"] * (not gate)}
+        assert {block for block, count in found[gate].items() if not count} == none
         assert sum(found[gate].values()) == len(unit.status.shape().members)
     assert found[False] | {"highlight gate": found[True]["highlight gate"]} == found[True]
 
@@ -48,15 +56,16 @@ def test_inner_submodules_count():
 @pytest.mark.long
 def test_counts_of_a_small_frame():
     """The pixels are the model's, and every block has something to do."""
-    [found] = measure("cosquad", True, [50], [20, 15, 64], "pysim")
-    assert found["same"]
-    assert 20 < found["spans"] <= found["pixels"] < found["cycles"]
-    assert all(by_block(found["toggles"]).values())
+    for design in (("chord", "cosquad", True), (*DESIGN, False)):
+        [found] = measure(*design, [50], [20, 15, 64], "pysim")
+        assert found["same"]
+        assert 20 < found["spans"] <= found["pixels"] < found["cycles"]
+        assert sum(not count for count in by_block(found["toggles"]).values()) <= 2
 
 
 @pytest.mark.long
 def test_the_gate_spares_the_specular_unit():
-    off, on = (measure("cosquad", gate, [2, 1000], [64, 48, 64], "auto") for gate in (False, True))
+    off, on = (measure("chord", "cosquad", gate, [2, 1000], [64, 48, 64], "auto") for gate in (False, True))
     for without, gated in zip(off, on, strict=True):
         assert without["same"]
         assert gated["same"]
@@ -73,30 +82,35 @@ def frame(same=True, **toggles):
 
 def test_section():
     quick = tasks(quick=True)
-    off, on = (
+    own, off, on = (
+        frame(intensity=100, **{"interpolator.quotient": 60}),
         frame(intensity=300, slope=100),
         frame(intensity=280, slope=100, **{"interpolator.chord_spans.value_gate": 40}),
     )
-    made = section(quick, [[off], [on]])
+    made = section(quick, [[own], [off], [on]])
     assert made.name == "energy"
     [table] = (part for part in made.parts if isinstance(part, Table))
     assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["energy-blocks"]
-    first, second = table.records()
+    default, first, second = table.records()
+    assert (default["method"], default["model"], default["gate"]) == (*DESIGN, "off")
+    assert (default["quotients of pixels, bits a pixel"], default["saved, share"]) == (3, None)
+    assert "switches 8 bits a pixel at exponent 50, one of `chord` 20. Most" in made.text[1]
     assert (first["gate"], second["gate"]) == ("off", "on")
     assert (first["intensity, bits a pixel"], first["pipeline, bits a pixel"]) == (15, 20)
     assert second["highlight gate, bits a pixel"] == 2
     assert (first["saved, share"], second["saved, share"]) == (None, pytest.approx(-0.05))
-    assert [row[-1] for row in table.grades] == ["", "fair"]
+    assert [row[-1] for row in table.grades] == ["", "", "fair"]
     assert "void" not in " ".join(made.text)
-    assert "void" in " ".join(section(quick, [[frame(False, top=1)], [on]]).text)
+    assert "void" in " ".join(section(quick, [[own], [frame(False, top=1)], [on]]).text)
 
 
 def test_tasks():
     full = tasks(quick=False)
-    assert [(task.settings["model"], task.settings["gate"]) for task in full] == [
-        (model, gate) for model in MODELS for gate in (False, True)
+    assert [tuple(task.settings[name] for name in ("method", "model", "gate")) for task in full] == [
+        (*DESIGN, False),
+        *(("chord", model, gate) for model in MODELS for gate in (False, True)),
     ]
     assert all(task.settings["exponents"] == list(EXPONENTS) for task in full)
     results = [[frame(top=10), frame(top=20), frame(top=40 - 20 * task.settings["gate"])] for task in full]
     made = section(full, results)
-    assert len(made.parts[0].rows) == 2 * len(MODELS) * len(EXPONENTS)
+    assert len(made.parts[0].rows) == (2 * len(MODELS) + 1) * len(EXPONENTS)

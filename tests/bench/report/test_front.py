@@ -14,6 +14,7 @@ def summary(label, error, cycles, mhz):
         "method": method,
         "group": "own",
         "is_prepared": False,
+        "is_mirror": label.endswith("phong"),
         "samples": 3,
         "method_error": (error / 2, error),
         "total_error": (error / 2, error),
@@ -28,7 +29,7 @@ def summary(label, error, cycles, mhz):
 
 def found(*, angular=None):
     return [
-        summary("chord, blinn", 0.6, 1.0, 150),
+        summary("quotient, blinn", 0.55, 1.006, 150),
         summary("linear, cosquad", 90.0, 1.3, 140),
         summary("quadratic, blinn", 0.7, 1.3, 160),
         summary("angular, cosquad", 20.0, 1.4, angular),
@@ -53,7 +54,28 @@ def test_cycles_where_most_are_not_placed():
 def test_front_in_nanoseconds(mhz, is_on):
     """A design of as small an error, more cycles and a faster clock is on the front: its name is bold."""
     faster = summary("quadratic, blinn", 0.6, 1.3, mhz)
-    drawing = conclusion([faster, summary("chord, blinn", 0.6, 1.0, 150), *found()[1:2]]).drawing
+    drawing = conclusion([faster, summary("quotient, blinn", 0.6, 1.0, 150), *found()[1:2]]).drawing
     (style, *_) = re.findall(r'<text class="(\w+)"[^>]*>quadratic, blinn</text>', drawing.svg)
     (rule,) = re.findall(rf"\.{style} *{{([^}}]*)}}", drawing.svg)
     assert ("bold" in rule or "700" in rule) == is_on
+
+
+@pytest.mark.parametrize(("luts", "others"), [(4929, "None of 2 others"), (3000, "chord, blinn"), (None, "")])
+def test_as_fast_as_another_and_as_exact(luts, others):
+    """Of two with as many multipliers that with fewer look-up tables is on the front, if both are known."""
+    chord = summary("chord, blinn", 0.58, 1.005, 150) | {"luts": luts}
+    own, linear, *_ = found()
+    sentence = conclusion([chord, own | {"luts": 3169}, linear]).sentence
+    best = "chord, blinn" if luts == 3000 else "quotient, blinn"
+    assert sentence.startswith(f"**`{best}`**")
+    assert ("also on the front" in sentence) == (luts is None)
+    assert others in sentence
+
+
+def test_phong_is_told_and_on_no_front():
+    """Its errors are against another picture: no design of Blinn's model is compared with it."""
+    phong = summary("quotient, phong", 0.51, 0.9, 150) | {"multipliers": 1}
+    made = conclusion([phong, *found()[:2]])
+    assert made.sentence.startswith("**`quotient, blinn`**")
+    assert "None of 1 others" in made.sentence
+    assert "by `quotient, phong`, take 0.90 cycles, 0.51 LSB against exact Phong" in made.sentence

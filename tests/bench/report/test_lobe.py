@@ -5,7 +5,7 @@ import pytest
 
 from blysk.bench.report import lobe
 from blysk.bench.report.section import Table
-from blysk.golden.presets import LOBES, MODELS
+from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS
 
 SIZE = (64, 48)
 
@@ -26,23 +26,34 @@ def test_meshes_have_unit_normals_that_are_those_of_their_faces(mesh):
 def test_frames_are_exact(mesh):
     """Half an LSB is the rounding of a pixel; spans cost the rest."""
     for model, values in (("blinn", (1, 100)), ("ggx", (0.2, 0.7))):
-        for row in lobe.frame_errors(mesh, model, values, SIZE):
-            assert row["units"] <= 0.6
-            assert row["total"] <= 0.5 + row["total_spans"] + 0.1
+        for method in ("quotient", "chord"):
+            for row in lobe.frame_errors(mesh, method, model, values, SIZE):
+                assert row["units"] <= 0.6
+                assert row["total"] <= 0.5 + row["total_spans"] + 0.1
+                # Those of the surface itself; their codes have 2^-17.
+                assert method == "chord" or row["total_spans"] < 1e-6
 
 
 def test_errors_of_a_model_that_is_not_exact_count_against_blinn():
-    (row,) = lobe.frame_errors("sphere", "cosquad", (10,), SIZE)
+    (row,) = lobe.frame_errors("sphere", "chord", "cosquad", (10,), SIZE)
     assert row["units"] <= 0.6
     assert row["total"] > 15
     assert row["total_spans"] < 1
 
 
+def test_phong_counts_against_phong():
+    """At no exponent is true Phong Blinn's highlight; the frames hold the one that they are asked for."""
+    for row in lobe.frame_errors("sphere", "quotient", "phong", (1, 100), SIZE):
+        assert row["total"] <= 0.6
+        assert row["everywhere"] <= 0.6
+
+
 @pytest.mark.long
 def test_front_has_the_table_and_its_baselines():
-    assert set(lobe.FRONT) <= {*MODELS, *LOBES}
-    costs = {model: lobe.pipeline_cost(model) for model in ("blinn", "cosquad")}
-    assert costs["blinn"]["multipliers"] <= costs["cosquad"]["multipliers"] + 1
+    assert {model for _, model in lobe.FRONT} <= {*MODELS, *LOBES, *MIRROR_LOBES}
+    costs = {of: lobe.pipeline_cost(*of)["multipliers"] for of in lobe.FRONT[:4]}
+    assert costs["quotient", "blinn"] == costs["chord", "blinn"] < costs["quotient", "phong"]
+    assert costs["chord", "blinn"] <= costs["chord", "cosquad"] + 1
     assert lobe.unit_cost("lobe, memory outside")["memory_bits"] == 0
 
 

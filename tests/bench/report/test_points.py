@@ -63,6 +63,7 @@ def measured():
         *design("angular-published"),
         *design("chord", "exp"),
         *design("chord", "blinn"),
+        *design("quotient", "phong"),
         Task(hardware, dict(zip(("method", "model"), SIMULATED, strict=True))),
         task(software_frames, shading="gouraud"),
         task(software_speeds, timed=True, shading="gouraud"),
@@ -81,6 +82,7 @@ def found(measured):
 def test_every_method_and_model_is_a_design():
     assert {method for method, _ in DESIGNS} == {*METHODS, *PUBLISHED}
     assert {model for method, model in DESIGNS if method == "chord"} == {"blinn", *MODELS}
+    assert {model for method, model in DESIGNS if method == "quotient"} == {"blinn", "phong"}
     assert len(set(DESIGNS)) == len(DESIGNS)
     assert set(QUICK_SIMULATED) < set(DESIGNS)
 
@@ -97,6 +99,7 @@ def test_quick_tasks():
     best = [(s["method"], s["model"]) for s in of_frames(chosen) if s not in own]
     assert best == [(method, model) for model in ("cosquad", "blinn") for method in BEST]
     exact = {s["method"] for s in of_frames(chosen) if s["model"] == "blinn"}
+    assert {s["method"] for s in of_frames(chosen) if s["model"] == "phong"} == {"quotient"}
     assert exact == set(METHODS)
     operands = {
         (s["method"], s.get("operand", METHODS.get(s["method"], s).operand))
@@ -199,6 +202,17 @@ def test_model_error_is_the_models_own(found):
         errors = found[f"teapot/chord/blinn/{exponent}"]["errors"]
         assert errors["model_max_lsb"] == 0
         assert errors["model_psnr_db"] is None
+
+
+def test_phong_is_held_against_phong():
+    """Blinn's highlight of the same exponent is another picture, not the exact one."""
+    for exponent, of in zip((1, 100), frames("quotient", "phong", PLACE, [1, 100], False), strict=True):
+        errors = of["errors"]
+        assert errors["model_max_lsb"] == 0
+        assert errors["method_max_lsb"] == errors["total_max_lsb"] <= 0.6
+        scene = accuracy.scene_for(teapot(PLACE["triangles"]), exponent, 64, 48)
+        exact = [render(scene, model=REFLECTION_MODELS[name]).image for name in ("phong", "blinn")]
+        assert 255 * np.abs(np.subtract(*exact)).max() > 5
 
 
 @pytest.mark.long
@@ -304,7 +318,7 @@ def test_section(measured):
     assert {row["design"] for row in over_scenes.records()} == {
         point["label"] for point in made.figures["points"] if point["group"] != "software"
     }
-    assert len(every.rows) == len(made.figures["points"]) == 2 * 7
+    assert len(every.rows) == len(made.figures["points"]) == 2 * 8
     assert {len(row) for row in every.grades} == {len(every.columns)}
     for record, point in zip(every.records(), made.figures["points"], strict=True):
         assert record["design"] == point["label"]
@@ -319,6 +333,7 @@ def test_section(measured):
         "angular-published, cosquad": "published",
         "chord, exp": "own",
         "chord, blinn": "own",
+        "quotient, phong": "own",
         "gouraud, software": "software",
         "phong, software": "software",
     }
@@ -378,7 +393,9 @@ def test_smaller_pictures_keep_the_largest_error():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["chord-local/cosquad", "angular-published/cosquad", "chord/blinn"])
+@pytest.mark.parametrize(
+    "name", ["chord-local/cosquad", "angular-published/cosquad", "chord/blinn", "quotient/phong"]
+)
 def test_command_makes_the_point_again(found, name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     point = found[f"teapot/{name}/100"]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.accuracy import model_of
 from blysk.bench.speed.cycle_model import WAITING, compare, span_cycles
 from blysk.golden.presets import preset
 
@@ -28,8 +29,9 @@ def test_recurrence(count, waiting):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("method", "share"), [("linear", 0), ("renormalise", 0), ("quadratic", 0), ("chord", 0.03)]
+    ("method", "share"),
+    [("linear", 0), ("renormalise", 0), ("quadratic", 0), ("chord", 0.03), ("quotient", 0.03)],
 )
 def test_frames(method, share):
-    simulated, modelled = compare(preset(method, "cosquad"), 400, (64, 48))
+    simulated, modelled = compare(preset(method, model_of(method)), 400, (64, 48))
     assert abs(modelled - simulated) <= share * simulated

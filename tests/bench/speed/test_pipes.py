@@ -30,9 +30,10 @@ def test_table_and_targets():
 
 
 @pytest.mark.long
-def test_measured_is_simulated():
+@pytest.mark.parametrize(("method", "size"), [("linear", (64, 48)), ("quotient", (240, 180))])
+def test_measured_is_simulated(method, size):
     """Two pipelines halve the cycles of long spans, and draw the same picture."""
-    one, two = (next(measure(n, ["ring"], 64, 48, "linear")) for n in (1, 2))
+    one, two = (next(measure(n, ["ring"], *size, method)) for n in (1, 2))
     assert one.same
     assert two.same
     assert (one.pixels, one.spans, one.triangles) == (two.pixels, two.spans, 324)
