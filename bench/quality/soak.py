@@ -67,6 +67,7 @@ _MODELS = {
     "angular": "coscos2",
     "recurrence": "coscos4",
     "renormalise": "blinn_product",
+    "quotient": "phong",
 }
 """Reflection models by method; a method that is not here has ``cosquad``."""
 
@@ -78,11 +79,12 @@ DESIGNS = (
     ),
     ("chord", "cosquad", True),
     ("chord", "cosquad_q", False),
-    ("chord", "blinn", False),
     ("chord", "blinn", True),
+    ("quotient", "blinn", False),
 )
-"""Method, model and whether there is a highlight gate: every method of one pixel a cycle that takes normals,
-every kind of specular unit, and the default design, for which each batch writes the table of another lobe."""
+"""Method, model and whether there is a highlight gate: every method of one pixel a cycle that takes normals
+or vectors, every kind of specular unit, and the default design, for which each batch writes the table of
+another lobe."""
 
 PIXELS = 10**9
 BEATS = 10**6

@@ -1,8 +1,9 @@
-"""The chord method's error at every exponent: frames of meshes by the bit-accurate model and in float64.
+"""A method's error at every exponent: frames of meshes by the bit-accurate model and in float64.
 
 ``python -m blysk.bench.quality.sweep [MESH ...]`` takes each mesh (the teapot by default) at 320x240, in
-white light and with a grey, glossy material, at every exponent from 1 to 1000 with the model cosquad and at
-30 of them with every other model. Each frame is computed by `Design.compute`, which the simulated pipeline
+white light and with a grey, glossy material, by the method quotient at every exponent from 1 to 1000 with the
+model blinn and at 30 of them with phong; by another method at every exponent with cosquad and at 30 with
+every other model. Each frame is computed by `Design.compute`, which the simulated pipeline
 equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and compared with
 exact normals at every pixel and the same model. ``--json`` keeps the figures of every frame. The exit status
 is 1 if the error of a pixel is over 1 LSB, switched pixels left out (see `Point`); 2 for a mesh that
@@ -17,14 +18,14 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from blysk.bench.accuracy import scene_for
+from blysk.bench.accuracy import model_of, scene_for
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.prepare import constants_of, spans_for
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design, Spans
-from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity_of_cosines, saturate
@@ -34,7 +35,7 @@ from blysk.sim.errors import InputError
 from blysk.sim.meshes.mesh import load_mesh
 
 __all__ = ["EXPONENTS", "FEW_EXPONENTS", "LARGEST", "LARGEST_COSINE", "Frame", "Point", "Summary", "main"]
-__all__ += ["summarise"]
+__all__ += ["models_of", "summarise"]
 
 EXPONENTS = tuple(range(1, MAX_EXPONENT + 1))
 
@@ -46,8 +47,13 @@ LARGEST = 1.0
 """Target: the largest error of a channel, in LSB."""
 
 LARGEST_COSINE = ChordInterpolator.DIFFUSE_BUDGET / 255 + 2.0**-15
-"""Largest ``|N·L|``, 5e-4, whose sign the chord method may change: the error of its fit, and errors of
-vectors and words."""
+"""Largest ``|N·L|``, 5e-4, whose sign a method may change: the error of the chord method's fit, and errors of
+vectors and words; of ``quotient`` less."""
+
+
+def models_of(method: str) -> tuple[str, ...]:
+    """Models that are swept with a method: of ``quotient`` those whose table has no end at a right angle."""
+    return (model_of(method), *MIRROR_LOBES) if METHODS[method].TAKES_VECTORS else tuple(MODELS)
 
 
 @dataclass(frozen=True)
@@ -130,6 +136,8 @@ class Frame:
         halfway = halfway_vector(light.direction, self.scene.camera.viewer)
         self._cosine = normals @ np.asarray(light.direction)
         self._highlight = normals @ halfway
+        viewer = self.scene.camera.viewer
+        self._mirrored = 2 * self._cosine * (normals @ viewer) - light.direction @ viewer
 
     @property
     def pixels(self) -> int:
@@ -145,14 +153,15 @@ class Frame:
 
         These are the colours of the golden renderer's `render`, in the order of the fragments.
         """
-        scene = self.scene_of(exponent)
+        scene, reflection = self.scene_of(exponent), (MODELS | LOBES | MIRROR_LOBES)[model].model
+        highlight = self._mirrored if reflection.MIRROR else self._highlight
         shaded = intensity_of_cosines(
             scene.material,
             scene.lights,
             scene.ambient_light,
             self._cosine[:, np.newaxis],
-            self._highlight[:, np.newaxis],
-            MODELS[model].model,
+            highlight[:, np.newaxis],
+            reflection,
         )
         return 255 * saturate(shaded)
 
@@ -162,7 +171,7 @@ class Frame:
         cut, _ = cut_spans(scene, self.raster, design)
         return cut, spans_for(scene, cut, design)
 
-    def points(self, exponent: int, models: Iterable[str], method: str = "chord") -> Iterator[Point]:
+    def points(self, exponent: int, models: Iterable[str], method: str = "quotient") -> Iterator[Point]:
         """Errors of the frames at an exponent.
 
         Parameters
@@ -170,13 +179,15 @@ class Frame:
         exponent : int
             1 to 1000.
         models : iterable of str
-            Reflection models, one frame each.
+            Reflection models of `models_of`, one frame each.
         method : str
             Method of interpolation.
         """
-        cut, spans = self.spans_of(preset(method, "cosquad"), exponent)
+        cut, spans = self.spans_of(preset(method, model_of(method)), exponent)
         for model in models:
             design = preset(method, model)
+            if design.mirror:
+                cut, spans = self.spans_of(design, exponent)
             (constants,) = constants_of(self.scene_of(exponent), design)
             color = design.compute(spans, constants).color[self._shown]
             error = np.abs(color - self.golden(model, exponent)).max(axis=1, initial=0)
@@ -291,8 +302,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("meshes", nargs="*", default=["teapot"])
     parser.add_argument("--width", type=int, default=320)
     parser.add_argument("--height", type=int, default=240)
-    parser.add_argument("--method", choices=METHODS, default="chord")
-    parser.add_argument("--models", nargs="+", choices=MODELS, default=MODELS)
+    parser.add_argument("--method", choices=METHODS, default="quotient")
+    parser.add_argument("--models", nargs="+", choices=(*LOBES, *MIRROR_LOBES, *MODELS), metavar="MODEL")
     parser.add_argument("--exponents", nargs="+", type=int, help="those of every model")
     for name, meaning in (
         ("coefficients", "k_a, k_d and k_s of every channel"),
@@ -302,7 +313,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.add_argument(f"--{name}", nargs=3, type=float, help=meaning)
     parser.add_argument("--json", help="file for the figures of every frame")
     options = parser.parse_args(arguments)
+    served = models_of(options.method)
+    models = options.models or served
     try:
+        for model in models:
+            if model not in served:
+                raise InputError(
+                    f"--models {model}", f"is not swept with {options.method}", f"use {', '.join(served)}"
+                )
         loaded = [load_mesh(source, materials=False) for source in options.meshes]
     except InputError as error:
         print(f"blysk.bench.quality.sweep: {error}", file=sys.stderr)
@@ -323,12 +341,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for exponent in sorted(whole | few)
             for point in frame.points(
                 exponent,
-                [m for m in options.models if exponent in (whole if m == "cosquad" else few)],
+                [m for m in models if exponent in (whole if m == model_of(options.method) else few)],
                 options.method,
             )
         ]
         figures[one.name] = [asdict(point) for point in points]
-        for row in sorted(summarise(one.name, points), key=lambda row: options.models.index(row.model)):
+        for row in sorted(summarise(one.name, points), key=lambda row: models.index(row.model)):
             summaries.append(row)
             print(
                 f"| {row.mesh} | {row.model} | {row.exponents} | {row.pixels:,} | {row.steady_lsb:.3f} "

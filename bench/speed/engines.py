@@ -1,11 +1,11 @@
 """Speed of the engines and of their baseline, on the same component and beats, in one run.
 
-``python -m blysk.bench.speed.engines`` sends the longer spans of a teapot at 4000x3000 through the chord
-pipeline of one light in both engines and in Verilator's model of the emitted Verilog, and through the same
-pipeline with a highlight gate in the compiled engine. It prints cycles and pixels a second of each, and the
-seconds of ``blysk render`` for a teapot of 50,000 triangles with its model in the cache. The exit status is 1
-if the compiled engine makes less than 5 million pixels a second on one core, is less than 200 times as fast
-as pysim, or is slower than Verilator, or if the picture takes 2 s or more.
+``python -m blysk.bench.speed.engines`` sends the longer spans of a teapot at 4000x3000 through the
+quotient pipeline of one light in both engines and in Verilator's model of the emitted Verilog, and through
+the chord pipeline with a highlight gate in the compiled engine. It prints cycles and pixels a second of each,
+and the seconds of ``blysk render`` for a teapot of 50,000 triangles with its model in the cache. The exit
+status is 1 if the compiled engine makes less than 5 million pixels a second on one core, is less than 200
+times as fast as pysim, or is slower than Verilator, or if the picture takes 2 s or more.
 
 Seconds are processor time of this process, which has one thread: other work on the machine does not count. A
 run of an engine is the whole call, with packing and unpacking of beats; a run of Verilator is only the loop
@@ -20,7 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -31,7 +31,7 @@ from amaranth.lib.wiring import Component
 from blysk.bench.accuracy import scene_for
 from blysk.bench.speed.verilator import Verilated, free_stimulus
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import preset
 from blysk.hdl.emit.processes import run_program
@@ -233,11 +233,11 @@ def teapot_spans(design: Design, width: int, height: int, least: int = 1) -> tup
     spans = prepare(scene, design).spans
     order = np.random.default_rng(20).permutation(np.flatnonzero(spans.length >= least))
     mixed = spans[order]
-    return mixed, FrameConstants.of(scene, 1)
+    return mixed, constants_of(scene, design)[0]
 
 
 def picture_seconds(triangles: int = 50_000, size: str = "640x480", repeats: int = 3) -> tuple[float, float]:
-    """Seconds that ``blysk render`` takes for a teapot by the chord method, its model in the cache.
+    """Seconds that ``blysk render`` takes for a teapot by the method quotient, its model in the cache.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def picture_seconds(triangles: int = 50_000, size: str = "640x480", repeats: int
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         figures = Path(folder) / "figures.json"
         command = [sys.executable, "-c", _TIMED_COMMAND, "render", "teapot"]
-        command += ["--triangles", str(triangles), "--size", size, "--method", "chord"]
+        command += ["--triangles", str(triangles), "--size", size, "--method", "quotient"]
         command += ["--json", str(figures), "-o", str(Path(folder) / "picture.png")]
         for _ in range(1 + repeats):
             done = run_program(command, check=True, capture_output=True, text=True)
@@ -286,38 +286,39 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     int
         0, or 1 when the compiled engine missed a target.
     """
-    design = preset(method="chord", model="cosquad", lights=1)
-    spans, constants = teapot_spans(design, width, height, LEAST_LENGTH)
-    pixels = design.compute(spans, [constants])
-    expected = pixel_beats(pixels)
-    units = {gate: ShadingPipelineUnit(replace(design, gate=gate)) for gate in (False, True)}
+    designs = preset("quotient", "blinn"), preset("chord", "cosquad", gate=True)
+    given = [teapot_spans(design, width, height, LEAST_LENGTH) for design in designs]
+    shaded = [design.compute(*of) for design, of in zip(designs, given, strict=True)]
     # An empty cache: the build is a part of what is measured.
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
         mock.patch.dict(os.environ, BLYSK_CACHE=folder),
     ):
-        speed, gated = (
+        speed, chord = (
             measure(
                 unit,
                 beats_of(unit, spans),
                 write=constants.writes(),
-                expected=expected,
+                expected=pixel_beats(pixels),
                 pysim_beats=50,
                 repeats=repeats,
-                baseline=not gate,
+                baseline=not design.gate,
             )
-            for gate, unit in units.items()
+            for design, unit, (spans, constants), pixels in zip(
+                designs, map(ShadingPipelineUnit, designs), given, shaded, strict=True
+            )
         )
         wall, processor = picture_seconds()
     print(
-        f"teapot at {width}x{height}, {len(spans):,} spans: {len(pixels.x):,} pixels, {speed.cycles:,} cycles"
+        f"teapot at {width}x{height}, {len(given[0][0]):,} spans: {len(shaded[0].x):,} pixels, "
+        f"{speed.cycles:,} cycles"
     )
     print(f"{'engine':<14}{'pixels/s':>14}{'cxxrtl is faster':>20}")
     rates = {
         "cxxrtl": speed.cxxrtl_beats,
         "verilator": speed.verilator_beats,
         "pysim": speed.pysim_beats,
-        "cxxrtl, gate": gated.cxxrtl_beats,
+        "cxxrtl, chord": chord.cxxrtl_beats,
     }
     for name, rate in rates.items():
         print(f"{name:<14}{rate:>14,.0f}{speed.cxxrtl_beats / rate:>19,.2f}x")

@@ -13,13 +13,14 @@ from blysk.bench.quality.sweep import EXPONENTS, FEW_EXPONENTS, LARGEST, Frame, 
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.number.unit_vector import quantise
-from blysk.golden.presets import MODELS, preset
+from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.renderer import render
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.teapot import teapot
 
+UNITS = MODELS | LOBES | MIRROR_LOBES
 STRESS = str(Path(__file__).parents[2] / "data" / "teapot992.obj")
 
 
@@ -29,20 +30,23 @@ def test_exponents():
     assert {1, 2, 3, 10, 100, 500, 1000} <= set(FEW_EXPONENTS) <= set(EXPONENTS)
 
 
-@pytest.mark.parametrize(("model", "exponent"), [("cosquad", 1), ("blinn_product", 30), ("coscos4", 700)])
+@pytest.mark.parametrize(
+    ("model", "exponent"),
+    [("cosquad", 1), ("blinn_product", 30), ("coscos4", 700), ("blinn", 5), ("phong", 9)],
+)
 def test_reference_is_the_renderer(model, exponent):
     """Worked out once a mesh, the exact frame is that which the golden renderer draws."""
     frame = Frame(teapot(1000), 96, 72)
-    image = render(frame.scene_of(exponent), model=MODELS[model].model).image.reshape(-1, 3)
+    image = render(frame.scene_of(exponent), model=UNITS[model].model).image.reshape(-1, 3)
     shown = frame.raster.pixel[frame.raster.visible]
     assert len(shown) == frame.pixels > 1500
     np.testing.assert_allclose(frame.golden(model, exponent), 255 * image[shown], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("method", ["chord", "chord-local", "quadratic"])
+@pytest.mark.parametrize("method", ["quotient", "chord", "chord-local", "quadratic"])
 def test_spans_are_those_of_a_frame(method):
     """The raster is kept; the rest is as for a frame by itself."""
-    frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), preset(method, "cosquad")
+    frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), preset(method, accuracy.model_of(method))
     for exponent in (3, 700):
         cut, spans = frame.spans_of(design, exponent)
         expected = prepare(frame.scene_of(exponent), design)
@@ -51,16 +55,20 @@ def test_spans_are_those_of_a_frame(method):
             np.testing.assert_array_equal(getattr(spans, name), getattr(expected.spans, name))
         if design.takes_values:
             np.testing.assert_array_equal(spans.values, expected.spans.values)
+        if design.takes_vectors:
+            for own, other in zip(tuple(spans.vectors), tuple(expected.spans.vectors), strict=True):
+                np.testing.assert_array_equal(own, other)
 
 
 @pytest.mark.long
-def test_errors_are_those_of_the_simulated_frame():
-    mesh = teapot(500)
+@pytest.mark.parametrize("design", [("quotient", "phong"), ("chord", "cosquad")])
+def test_errors_are_those_of_the_simulated_frame(design):
+    mesh, (method, model) = teapot(500), design
     frame = Frame(mesh, 64, 48)
-    for exponent, _, result in accuracy.measure(mesh, preset("chord", "cosquad"), (2, 300), 64, 48):
-        (point,) = frame.points(exponent, ["cosquad"])
+    for exponent, _, result in accuracy.measure(mesh, preset(*design), (2, 300), 64, 48):
+        (point,) = frame.points(exponent, [model], method)
         assert point.max_lsb == pytest.approx(result.method_error.max_lsb, abs=1e-9)
-        assert (point.model, point.exponent, point.over) == ("cosquad", exponent, 0)
+        assert (point.model, point.exponent, point.over) == (model, exponent, 0)
         assert point.steady_lsb == point.max_lsb <= LARGEST
 
 
@@ -82,7 +90,7 @@ def test_switched_pixels_are_told_apart(side):
     product = quantise(normals) @ quantise(light)
     # The model's N·L is cut to 25 of these 34 fraction bits.
     (normal, *_) = normals[side * product < -(2**10)]
-    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"])
+    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"], "chord")
     assert point.over == point.switched == point.pixels > 20
     assert point.switched_cosine == pytest.approx(1e-9, rel=0.01)
     assert point.max_lsb > 5
@@ -98,7 +106,7 @@ def test_a_wrong_sign_is_no_excuse(monkeypatch):
     constants = FrameConstants.of(frame.scene, 1)
     behind = replace(constants, direction=-constants.direction)
     monkeypatch.setattr(sweep, "constants_of", lambda *_: [behind])
-    (point,) = frame.points(1, ["blinn_product"])
+    (point,) = frame.points(1, ["blinn_product"], "chord")
     assert point.over == point.pixels > 20
     assert point.switched == 0
     assert point.steady_lsb == point.max_lsb > 5
@@ -164,7 +172,7 @@ SMALL = [STRESS, "--width", "64", "--height", "48"]
 
 def test_table(tmp_path, capsys):
     file = tmp_path / "sweep.json"
-    chosen = ["--models", "exp", "cosquad", "--exponents", "1", "1000"]
+    chosen = ["--models", "exp", "cosquad", "--exponents", "1", "1000", "--method", "chord"]
     assert main([*SMALL, *chosen, "--json", str(file)]) == 0
     rows = [line.split(" | ") for line in capsys.readouterr().out.splitlines()[2:]]
     assert [row[:3] for row in rows] == [["| teapot992", model, "2"] for model in ("exp", "cosquad")]
@@ -187,17 +195,35 @@ def test_target(capsys):
     assert "teapot992, cosquad; at 2 exponents: 30, 100" in capsys.readouterr().err
 
 
+def test_true_phong_and_blinn_by_default(capsys):
+    """No pixel is over an LSB, none switched, and no span is cut for an exponent."""
+    assert main([*SMALL, "--exponents", "1", "100"]) == 0
+    rows = [line.split(" | ") for line in capsys.readouterr().out.splitlines()[2:]]
+    assert [row[:3] for row in rows] == [["| teapot992", model, "2"] for model in ("blinn", "phong")]
+    assert all(float(row[4]) < 0.6 and row[6] == row[9] == "0" for row in rows)
+
+
+@pytest.mark.parametrize(("method", "model"), [("quotient", "cosquad"), ("chord", "phong")])
+def test_a_model_that_the_method_is_not_swept_with(method, model, capsys):
+    assert main([STRESS, "--method", method, "--models", model]) == 2
+    served = ", ".join(sweep.models_of(method))
+    text = f"blysk.bench.quality.sweep: --models {model}: is not swept with {method}; use {served}\n"
+    assert capsys.readouterr().err == text
+
+
 def test_bad_mesh_is_one_line(capsys):
     assert main(["missing.obj"]) == 2
     assert capsys.readouterr().err.startswith("blysk.bench.quality.sweep: missing.obj: ")
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("method", ["quotient", "chord"])
 @pytest.mark.parametrize("mesh", ["teapot", STRESS], ids=["teapot", "stress"])
-def test_chord_method_is_within_an_lsb(mesh, capsys):
+def test_methods_are_within_an_lsb(mesh, method, capsys):
     """Part of what the command sweeps by itself: every model, and an exponent in thirteen."""
     exponents = map(str, sorted({*FEW_EXPONENTS[::3], *range(1, 1001, 13)}))
-    assert main([mesh, "--models", "cosquad", "--exponents", *exponents]) == 0
-    others = [name for name in MODELS if name != "cosquad"]
-    assert main([mesh, "--models", *others, "--exponents", "1", "3", "10", "100", "1000"]) == 0
+    first, *others = sorted(sweep.models_of(method), key=accuracy.model_of(method).__ne__)
+    chosen = [mesh, "--method", method]
+    assert main([*chosen, "--models", first, "--exponents", *exponents]) == 0
+    assert main([*chosen, "--models", *others, "--exponents", "1", "3", "10", "100", "1000"]) == 0
     capsys.readouterr()
