@@ -13,6 +13,8 @@ from PIL import Image
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_script(tmp_path):
     done = subprocess.run(
         [sys.executable, EXAMPLES / "render.py", tmp_path], capture_output=True, text=True, check=True

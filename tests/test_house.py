@@ -5,6 +5,7 @@ import graphlib
 import re
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -27,10 +28,16 @@ FILES = {name_of(path): path for layer in LAYERS for path in sorted((PROJECT / l
 FILES = {name: path for name, path in FILES.items() if "templates" not in name}
 
 
+@cache
+def nodes(source: str) -> tuple[ast.AST, ...]:
+    """All nodes of a source, at any depth; it is parsed once for all tests."""
+    return tuple(ast.walk(ast.parse(source)))
+
+
 def imports(source: str, package: str) -> set[str]:
     """Names of all modules that a source imports, at any depth; of `from a import b` a and a.b."""
     found = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes(source):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -150,7 +157,7 @@ LONG_FUNCTIONS: dict[str, str] = {}
 def long_functions(source: str) -> dict[str, int]:
     """Lines of functions that are over the limit, but for their docstrings and what stands in them."""
     found = {}
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes(source):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             lines = node.end_lineno - node.lineno + 1
             if ast.get_docstring(node) is not None:

@@ -26,10 +26,12 @@ FEW = 24
 SELDOM = (
     *("adaptive_normaliser", "bisection", "bisection_chain", "bisection_interpolator"),
     *("angular_interpolator", "angular_setup", "recurrence", "recurrence_interpolator", "recurrence_setup"),
-    *("middle_normal", "quadratic_evaluator", "quadratic_interpolator", "gpq", "half_chord"),
-    *("difference_setup", "linear_interpolator"),
+    *("middle_normal", "quadratic_evaluator", "quadratic_interpolator", "gpq"),
+    *("difference_setup", "linear_interpolator", "line_setup", "renormaliser", "renormalise_interpolator"),
+    *("chord_interpolator", "chord_setup", "chord_values", "local_chord_interpolator", "light_products"),
+    *("arccos", "half_chord", "highlight_cosine", "specular", "value_gate", "render", "pixel_pipelines"),
 )
-"""Units of the documents' methods, which the default design does not have."""
+"""Units of methods and models that the default design does not have, and what is put together of others."""
 
 
 CI = [pytest.mark.long, pytest.mark.ci]

@@ -298,6 +298,8 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
     assert np.all(np.diff(late_writes) == 1)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("reset_at", "materials", "method"),
     [

@@ -58,7 +58,7 @@ def test_equals_model(design):
 
 def test_a_frame_loads_its_own_tables():
     """Tables of the frame before, in every bank, are gone."""
-    design = DESIGNS["materials, lights, gate"]
+    design = preset("linear", "ggx", materials=3)
     unit = ShadingPipelineUnit(design)
     spans, constants = _sample(design)
     material = Material((0.1,) * 3, (0.5,) * 3, (0.6,) * 3, 10)

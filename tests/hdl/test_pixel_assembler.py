@@ -107,6 +107,7 @@ def test_one_pixel_a_cycle():
     assert [pixel for _, pixel in pixels] == expected
 
 
+@pytest.mark.long
 def test_longest_span_reaches_the_last_column():
     pixels, _, _, expected = drive([4095, 1])
     assert [pixel for _, pixel in pixels] == expected

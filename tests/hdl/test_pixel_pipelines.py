@@ -50,7 +50,9 @@ def wide():
     return WidePipelinesUnit(PixelPipelines(preset("linear", "cosquad", materials=2), 2), 5)
 
 
-@pytest.mark.parametrize("shares", STALLS)
+@pytest.mark.ci
+@pytest.mark.long
+@pytest.mark.parametrize("shares", STALLS[::3])
 def test_each_lane_equals_its_model_under_stalls(wide, shares):
     """Every pixel of every pipeline, in order; materials change; and the sums of the counters."""
     rng = np.random.default_rng([7, *(int(10 * share) for share in shares)])

@@ -60,22 +60,29 @@ class OneByOne(Wrapped):
         return m
 
 
-@pytest.mark.parametrize("stalled", [0.0, 0.6])
-@pytest.mark.parametrize("name", UNITS)
-def test_empty_is_empty(name, stalled):
+def _units():
+    """The smallest here; CI has the default structures, the long run all."""
+    for name in UNITS:
+        marks = [pytest.mark.long] * (name != "geometry, compact")
+        yield pytest.param(name, marks=[*marks, *[pytest.mark.ci] * (name in RECORDS)])
+
+
+@pytest.mark.parametrize("name", list(_units()))
+def test_empty_is_empty(name):
     record, make = RECORDS[UNITS[name][0]], UNITS[name][1]
     unit, rng = make(), np.random.default_rng(2026)
     case = next(iter(record.stimuli.values())).make(unit, rng, 100)
-    expected = record.expect(unit, case)
-    found = simulate(
-        OneByOne(unit),
-        case.beats,
-        count=length_of(expected),
-        **case.sent,
-        output_stalls=rng.random(1009) < stalled,
-        idle_timeout=50_000,
-        engine="auto",
-    )
-    assert_beats_equal(found.beats, expected)
-    assert found.status["taken"] == 100
-    assert found.status["wrong"] == 0
+    expected, alone = record.expect(unit, case), OneByOne(unit)
+    for stalled in (0.0, 0.6):
+        found = simulate(
+            alone,
+            case.beats,
+            count=length_of(expected),
+            **case.sent,
+            output_stalls=rng.random(1009) < stalled,
+            idle_timeout=50_000,
+            engine="auto",
+        )
+        assert_beats_equal(found.beats, expected)
+        assert found.status["taken"] == 100
+        assert found.status["wrong"] == 0

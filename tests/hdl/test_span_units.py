@@ -30,6 +30,8 @@ def case_of(module, unit, lengths):
     return module.spans_of(*of_unit, np.random.default_rng(1), np.asarray(lengths))
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("module", "variant"), mostly_long([HIGHLIGHT_COSINE, ACCUMULATOR, *RECURRENCES], *QUICK), ids=ids
 )
@@ -47,6 +49,8 @@ def test_pixels_come_without_gaps(module, variant):
     np.testing.assert_array_equal(run.cycles, run.input_cycles[span] + unit.latency + interval * index)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("module", "variant"), [HIGHLIGHT_COSINE, ACCUMULATOR, *EVALUATORS, *RECURRENCES], ids=ids
 )

@@ -97,6 +97,8 @@ def test_unit(check, name, variant):
     assert check(name, variant).products
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_unit_with_a_memory(check):
     absorbed = check(**READS)
     assert absorbed.words == absorbed.products == 1
@@ -129,7 +131,10 @@ MEMORY_FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", MEMORY_FAULTS)
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "fault", [pytest.param(of, marks=[pytest.mark.long] * (of != "wrong word bit")) for of in MEMORY_FAULTS]
+)
 def test_faults_injected_in_a_memory_are_found(check, fault):
     with pytest.raises((AssertionError, BenchError)):
         check(**READS, change=lambda cells: MEMORY_FAULTS[fault](first(cells, "DP16KD")))

@@ -74,6 +74,7 @@ def test_more_mutants_than_yosys_lists_at_once(tmp_path):
     assert len({re.sub(r"8 \d+ ", "", command) for command in commands}) == len(commands)
 
 
+@pytest.mark.long
 def test_units_of_three_gates_have_mutants(monkeypatch, tmp_path):
     """What only names a part inside is no cell: with it more were asked for than Yosys can list."""
     monkeypatch.setattr(equivalence, "YOSYS_SECONDS", 60)

@@ -143,6 +143,7 @@ def test_geometry_in_two_engines(monkeypatch):
         measure_unit("geometry", 5000, 3, 0, "any")
 
 
+@pytest.mark.long
 def test_stimuli_share_the_clocks():
     """Of large triangles there are few."""
     beats = _beats_of_runs("edge_walk")

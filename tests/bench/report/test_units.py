@@ -1,5 +1,7 @@
 """The report's table of units: the lines of ``blysk blocks``."""
 
+import pytest
+
 from blysk.bench.report.units import QUICK_SAMPLES, measure, section, tasks
 from blysk.bench.tools.blocks import ENTRIES, entry_of, row_of, sample_of
 
@@ -22,6 +24,7 @@ def test_every_unit_is_measured():
     assert ("middle_normal", "as_published") in names(quick)
 
 
+@pytest.mark.long
 def test_section():
     lines = [("dot_product", ""), ("middle_normal", "exact"), ("middle_normal", "as_published")]
     chosen = [task for task in tasks(True) if names([task])[0] in lines]

@@ -235,6 +235,7 @@ class Adds(wiring.Component):
         return m
 
 
+@pytest.mark.long
 def test_carries_that_nobody_reads(tmp_path):
     before = map_component(Adds(), tmp_path)
     after, found = absorb_registers(before)
@@ -278,6 +279,7 @@ def test_what_moves_and_that_nothing_else_changes(name, mapped, tmp_path):
         assert found.operands == 0 or same(before, after, tmp_path) == ""
 
 
+@pytest.mark.long
 def test_a_register_between_two_multipliers_goes_into_one(mapped, tmp_path):
     before = mapped("chained", Beside(chained))
     after, found = absorb_registers(before)
@@ -305,6 +307,7 @@ def test_registers_at_ports_stay(mapped, tmp_path):
     assert after == before
 
 
+@pytest.mark.long
 def test_controls_of_a_multiplier(mapped):
     """A clock, no reset, and an enable for each register; one without gets a constant."""
     (cell,) = multipliers(absorb_registers(mapped("three enables", Beside(CASES["three enables"][0])))[0])
@@ -353,6 +356,7 @@ def test_a_register_of_another_reader_that_is_removed_is_found(mapped, tmp_path)
     assert same(before, after, tmp_path) == "1 nets without a driver"
 
 
+@pytest.mark.long
 def test_an_inverter_that_does_not_invert_is_found(mapped, tmp_path):
     name = "an inverted enable"
     before = mapped(name, Beside(CASES[name][0]))

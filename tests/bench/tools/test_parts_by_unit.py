@@ -4,6 +4,7 @@
 import json
 from dataclasses import astuple, replace
 
+import pytest
 from amaranth.back import rtlil
 
 from blysk.bench.tools import parts_by_unit as by_unit
@@ -53,6 +54,8 @@ def test_cells_belong_to_the_innermost_unit_of_three_names(monkeypatch):
     }
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @tools
 def test_units_have_all_parts_of_the_design(tmp_path):
     """Of a light: its diffuse and specular units, and what is between them."""

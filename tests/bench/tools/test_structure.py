@@ -208,6 +208,7 @@ def test_submodules_are_boxes():
     assert graph.edges == dict.fromkeys(arrows, True)
 
 
+@pytest.mark.long
 def test_large_structures_are_cut_down():
     few = graph_of(BisectionUnit(), most=1)
     assert len(few.nodes) < len(structure_of(BisectionUnit).nodes)
@@ -304,6 +305,7 @@ def test_a_narrow_drawing_is_not_folded():
     assert (3, 1) in band.back
 
 
+@pytest.mark.long
 def test_drawings_have_the_width_of_a_page():
     for unit in (BisectionUnit, DifferenceSetupUnit):
         graph = structure_of(unit)

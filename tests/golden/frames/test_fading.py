@@ -38,7 +38,7 @@ def drawn(scene, exponent):
     return compare(scene, design, frame), frame
 
 
-@pytest.mark.parametrize("viewer", ["near", "distant"])
+@pytest.mark.parametrize("viewer", ["near", pytest.param("distant", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", LIGHTS)
 def test_floor(name, viewer):
     """Spans of hundreds of pixels: within an LSB in all, whatever lies between two places of a span."""

@@ -122,9 +122,9 @@ def test_stiff_normals_of_wrong_length_by_other_methods(method):
 @pytest.mark.parametrize(
     ("method", "operand", "short", "long"),
     [
-        ("bisection", None, True, False),
+        pytest.param("bisection", None, True, False, marks=pytest.mark.long),
         ("quadratic", "one_minus_cosine", True, False),
-        ("angular", None, False, True),
+        pytest.param("angular", None, False, True, marks=pytest.mark.long),
         ("recurrence", None, False, True),
     ],
 )

@@ -120,7 +120,7 @@ def test_error_of_every_argument_of_a_wide_highlight(model, exponent):
 
 @pytest.mark.parametrize(
     ("operand", "step"),
-    [("cosine", 7), ("one_minus_cosine", 13), pytest.param("cosine", 1, marks=pytest.mark.long)],
+    [("cosine", 21), ("one_minus_cosine", 39), pytest.param("cosine", 1, marks=pytest.mark.long)],
 )
 @pytest.mark.parametrize("model", MODELS)
 def test_error_and_monotony_at_every_exponent(model, operand, step):

@@ -77,6 +77,8 @@ def run(unit, frames, keep, expected):
     return found.status
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_depths_begin_anew_with_each_frame(unit):
     """Far triangles after near ones, also with a frame between that draws nothing."""
     near, far, beside = triangles(9, 100), triangles(9, 1 << 20), triangles(1, 100, right=-20)

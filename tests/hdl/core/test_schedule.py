@@ -103,7 +103,7 @@ def check(words, schedule, interval, spaced):
 @pytest.mark.parametrize("interval", INTERVALS)
 def test_guarantees_hold_of_random_graphs(interval, spaced):
     rng = np.random.default_rng(interval)
-    for _ in range(12):
+    for _ in range(6):
         words = random_operations(rng, interval)
         schedule = place(words, interval, spaced)
         check(words, schedule, interval, spaced)

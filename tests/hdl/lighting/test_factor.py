@@ -1,6 +1,8 @@
 # amaranth: UnusedElaboratable=no
 """Factor unit: what a factor costs; `tests.test_units` holds it against its model."""
 
+import pytest
+
 from blysk.golden.presets import preset
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.factor import FactorUnit
@@ -13,6 +15,7 @@ def test_a_product_or_none():
     assert cost_of(FactorUnit(has_factor=False)).multiplier_count == 0
 
 
+@pytest.mark.long
 def test_a_light_that_fades_takes_a_product_a_pixel_and_two_a_span():
     """At an interval of 3 the setup's 13 products of two lights are 15 or 17, on 5 or 6 multipliers."""
     counts = []

@@ -11,7 +11,7 @@ from blysk.sim.units.lighting.light import RECORD
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=[pytest.mark.long] * variant.long)
+        pytest.param(name, marks=[pytest.mark.long] * (variant.long or name != "cosquad, interval 3, gated"))
         for name, variant in RECORD.variants.items()
         if "interval" in name
     ],

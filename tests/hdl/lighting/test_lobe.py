@@ -45,8 +45,10 @@ def check(unit, beats, expected, **options):
     np.testing.assert_array_equal(run.beats, expected)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize("interval", [3, pytest.param(1, marks=pytest.mark.long)])
-@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize("fixed", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_banks(fixed, interval):
     """Each bank has its own table, whatever order they are written in, and one may be written again."""
     parameters = replace(LOBE, banks=5)
@@ -191,7 +193,9 @@ class TwoLights(wiring.Component):
         return m
 
 
-@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.ci
+@pytest.mark.long
+@pytest.mark.parametrize("fixed", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.parametrize("intervals", [(3, 1), pytest.param((1, 1), marks=pytest.mark.long)])
 def test_two_units_share_a_memory(intervals, fixed):
     table = replace(LOBE, model=GGX).table(0.4)

@@ -95,7 +95,9 @@ LENGTHS = {
 }
 
 
-@pytest.mark.parametrize("make", [chord, pytest.param(local, marks=CI)])
+@pytest.mark.ci
+@pytest.mark.long
+@pytest.mark.parametrize("make", [chord, local])
 @pytest.mark.parametrize("length", runs_of(LENGTHS))
 @pytest.mark.parametrize("with_gate", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_a_pixel_in_every_cycle(make, length, with_gate):
@@ -110,7 +112,9 @@ def test_a_pixel_in_every_cycle(make, length, with_gate):
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
 
 
-@pytest.mark.parametrize("make", [chord, pytest.param(local, marks=CI)])
+@pytest.mark.ci
+@pytest.mark.long
+@pytest.mark.parametrize("make", [chord, local])
 @pytest.mark.parametrize("length", [1, 2])
 def test_short_spans_come_sooner(make, length):
     """By the cycles of the setup: nothing of them goes through it."""
@@ -122,6 +126,8 @@ def test_short_spans_come_sooner(make, length):
     assert unit.latency - (run.cycles[0] - run.input_cycles[0]) >= setup.latency - setup.short_latency
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (9, 18))])
 def test_cycles_of_a_span(interval):
     """A span of k pixels takes ``min(k, 3)`` turns of the values, or its pixels, whichever is more."""
@@ -136,6 +142,8 @@ def test_cycles_of_a_span(interval):
         np.testing.assert_array_equal(np.diff(ends)[5:], cycles)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize("make", [chord, local])
 def test_waiting_output_holds_the_input(make):
     """While no pixel is taken as many spans enter as fit, then none; afterwards all leave in a row."""
@@ -159,6 +167,8 @@ def test_waiting_output_holds_the_input(make):
     np.testing.assert_array_equal(after, 530 + np.arange(len(after)))
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize("make", [chord, local])
 def test_reset_in_mid_span_leaves_nothing(make):
     """Resets at every stage of a span, also between its three normals: the spans then come as at first."""

@@ -10,7 +10,6 @@ from blysk.sim.units.normals.adaptive_normaliser import RECORD, spans_of
 from blysk.sim.units.operands import code_pairs_at, component_words
 
 from ...checks import assert_beats_equal, resets
-from ..variants import mostly_long
 
 
 def run_of(unit, angles, lengths, **stalls):
@@ -22,7 +21,8 @@ def run_of(unit, angles, lengths, **stalls):
     return run, unit.parameters.compute(*ends, lengths)[2]
 
 
-@pytest.mark.parametrize("variant", mostly_long(RECORD.variants, RECORD.default))
+@pytest.mark.long
+@pytest.mark.parametrize("variant", RECORD.variants)
 def test_one_normal_in_every_cycle_of_a_span(variant):
     unit = RECORD.variants[variant].unit()
     rng = np.random.default_rng(2)
@@ -48,6 +48,7 @@ def test_preparation_as_stated():
     assert [unit.preparation(k) for k in range(3)] == [63, 77, 142]
 
 
+@pytest.mark.long
 def test_intervals_as_stated():
     unit = AdaptiveNormaliserUnit()
     for level, angle in enumerate([3.0, 8, 16, 32, 44]):
@@ -74,6 +75,7 @@ def test_front_runs_ahead_until_the_fifo_is_full():
     assert (run.input_cycles < wait).sum() == (2 << unit.parameters.depth) + 3
 
 
+@pytest.mark.long
 def test_reset_in_every_state():
     """Two levels: bisection to 70, segments to 140, pixels to 160."""
     unit = AdaptiveNormaliserUnit()

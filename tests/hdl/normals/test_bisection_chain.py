@@ -10,10 +10,10 @@ from blysk.sim.units.operands import code_pairs_at
 from blysk.sim.units.record import Case
 
 from ...checks import resets
-from ..variants import mostly_long
 
 
-@pytest.mark.parametrize("variant", mostly_long(RECORD.variants, RECORD.default))
+@pytest.mark.long
+@pytest.mark.parametrize("variant", RECORD.variants)
 def test_latency_by_level(variant):
     """A level of 0, a counter of 4 bits that goes round, counts as 16."""
     unit = RECORD.variants[variant].unit()

@@ -25,6 +25,7 @@ def run_of(unit, lengths, seed):
     return run
 
 
+@pytest.mark.long
 def test_no_gap_between_spans(unit):
     shortest = SHORTEST[unit.parameters.form]
     rng = np.random.default_rng(1)

@@ -21,6 +21,8 @@ def shown(pause, rate, frames=4, parameters=PARAMETERS, **options):
     return show(OneClock(PatternTop(parameters, pause), Fraction(rate)), MODE, frames, **options)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("rate", "parameters"),
     [("5/7", PARAMETERS), pytest.param("1/2", BandBuffer(MODE, 2, RGB565), marks=pytest.mark.long)],
@@ -33,6 +35,8 @@ def test_lanes_decode_to_the_frames(rate, parameters):
     assert found.status["late_bands"] == 0
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_too_heavy():
     """The lanes stay whole; late bands are background, counted, and the others are right."""
     found = shown(900, "3/4", frames=8)

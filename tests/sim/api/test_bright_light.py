@@ -39,6 +39,8 @@ def test_errors_are_in_proportion(method, color):
         assert errors.method_error.max_lsb <= errors.bound_lsb
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_a_light_that_is_off_is_not_built():
     """It takes no hardware and asks for no method, wherever it is."""
     key = Light((-0.5, 0.8, 0.7))

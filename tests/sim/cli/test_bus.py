@@ -28,7 +28,8 @@ def test_files_of_a_core_on_a_bus():
     assert sorted(path.name for path in Path().iterdir()) == ["core.h", "core.md", "core.svd", "core.v"]
 
 
-@pytest.mark.parametrize("method", ["linear", "renormalise"])
+@pytest.mark.long
+@pytest.mark.parametrize("method", [pytest.param("linear", marks=pytest.mark.ci), "renormalise"])
 def test_ports_of_geometry_alone(method):
     """Its own ports, each with a description, and what the limit of spans is."""
     assert main(["verilog", "--top", "geometry", "--method", method, "-o", "core.v"]) == 0

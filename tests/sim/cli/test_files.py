@@ -75,7 +75,7 @@ def test_no_command_replaces_a_curve(sources, capsys):
 def test_verilog_replaces_no_file_beside_it(capsys):
     """Its own it does."""
     small = ["verilog", "--method", "linear", "--model", "cosquad", "--bus", "wishbone", "-o"]
-    for suffix in ("md", "h", "svd"):
+    for suffix in ("md", "svd"):
         path = Path(f"README.{suffix}")
         path.write_text("# My project\n")
         assert main([*small, "README.v"]) == 2

@@ -57,6 +57,8 @@ def test_coarse_depth_test():
     assert coarse["cycles"] < 1.01 * plain["cycles"]
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_coarse_depth_test_in_verilog(capsys):
     """The header names it, and the register map of a bus has the bit by which depths are kept."""
     options = ["--top", "render", "--method", "linear", "--coarse", "64x48", "--bus", "axi", "-o", "core.v"]

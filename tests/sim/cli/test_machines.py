@@ -32,7 +32,7 @@ def blysk(*arguments, folder, launcher=(), **places):
     ("places", "command"),
     [
         ({"HOME": "/proc"}, [*RENDER, "-o", "a.png"]),
-        ({"HOME": "/nowhere/at/all"}, ["render", "--help"]),
+        pytest.param({"HOME": "/nowhere/at/all"}, ["render", "--help"], marks=pytest.mark.long),
         ({"HOME": "{0}", "XDG_CACHE_HOME": "/proc/cache"}, ["render", "--help"]),
     ],
     ids=["home", "no home", "cache"],

@@ -51,6 +51,8 @@ def test_version(capsys):
     assert re.fullmatch(r"blysk \d+\.\d+\.\d+\n", capsys.readouterr().out)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_verilog(capsys):
     command = ["verilog", "--method", "linear", "--model", "cosquad7"]
     assert main([*command, "-o", "core.v"]) == 0

@@ -193,6 +193,8 @@ def test_no_pixel_shows_the_surface(capsys):
     assert figures["nmse"] is None
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_waveforms(capsys):
     assert main(["render", *TINY, "--vcd", "a.vcd", "--json", "a.json"]) == 0
     assert capsys.readouterr().err == ""
@@ -222,7 +224,7 @@ def broken(folder, monkeypatch):
     monkeypatch.setenv("CXX", script(folder, "compiler", text))
 
 
-@pytest.mark.parametrize("obstacle", ["hidden", "broken"])
+@pytest.mark.parametrize("obstacle", [pytest.param("hidden", marks=pytest.mark.long), "broken"])
 def test_without_compiler(capsys, request, obstacle):
     request.getfixturevalue(obstacle)
     before = files()
@@ -234,6 +236,8 @@ def test_without_compiler(capsys, request, obstacle):
     assert files() == before
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_fallback_without_compiler(hidden, capsys, monkeypatch):
     """One line and a smaller picture; the line of a cache that others can write is one of its own."""
     Path("shared").mkdir()

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pytest
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, stream
 from amaranth.lib.wiring import Component, In, Out
@@ -115,6 +116,8 @@ class Counted(Component):
         return m
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_the_status_is_put_together_without_an_edge(monkeypatch):
     text = read_parts(generated(Counted(), monkeypatch))
     _, _, late = text.partition("\tif (!posedge_p_clk) {\n")

@@ -78,6 +78,7 @@ def rows_of(component, spans, constants, cycles):
     return unpack(component.status.shape(), np.frombuffer(raw, "<u4").reshape(cycles, -1).astype(np.uint32))
 
 
+@pytest.mark.long
 def test_beats_are_those_without_probes(observed):
     spans, constants = spans_near(np.random.default_rng(4), 6), constants_of()
     options = {"count": int(spans.length.sum()), "write": writes_of([constants]), "engine": "pysim"}

@@ -115,6 +115,8 @@ def status_of(browser, ports):
     return browser.read(browser.call("status"), ports["status"]["words"], "<u4")[np.newaxis]
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_same_beats_on_the_same_cycles(component, browser):
     ports = wasm.ports_of(component)
     rng = np.random.default_rng(1)

@@ -264,6 +264,8 @@ def test_nobody_at_the_address(animation, monkeypatch):
         pass
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_an_error_on_a_cluster_is_that_of_the_frame(animation, scheduler):
     with (
         pytest.raises(AttributeError, match="viewer"),

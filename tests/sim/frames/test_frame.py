@@ -136,6 +136,7 @@ def test_no_light_leaves_the_ambient(simulator):
     assert (frame.image.reshape(-1, 3)[shown] == expected).all()
 
 
+@pytest.mark.long
 def test_unused_lights_are_black(simulator):
     # One light of three, against a simulator that has one only.
     scene = scene_of("240", (24, 18), lights=LIGHTS[:1])

@@ -233,7 +233,7 @@ def test_textures_and_vertex_colours_are_told(tmp_path):
         assert load(tmp_path / name, content).ignored == (told,)
 
 
-@pytest.mark.parametrize("suffix", [".obj", ".glb"])
+@pytest.mark.parametrize("suffix", [".obj", pytest.param(".glb", marks=pytest.mark.long)])
 def test_most_materials(tmp_path, suffix):
     """`MAX_MATERIALS` load, one more is refused; equal ones count as one, and unused ones not at all."""
     count, path = MAX_MATERIALS + 1, tmp_path / f"a{suffix}"
