@@ -89,8 +89,9 @@ def command(
     lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or if the
     frames are too heavy for 60 Hz.
 
-    What is known of the board's bitstream is printed first: on a 25F the last try gave none. There the
-    default model is cosquad: with blinn no placement of its design has been routed so far.
+    What is known of the board's bitstream is printed first.
+
+    Triangles give the method quotient vectors for one light: several lights need --method chord.
 
     The buttons of the board stop the motion, turn it round, and change the material and the light.
 

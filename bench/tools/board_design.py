@@ -14,8 +14,10 @@ from blysk.bench.tools.board_build import Board
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID
 from blysk.golden.gpu import Gpu
 from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.pipeline import Design
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
 from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
 from blysk.golden.video.clock_plan import ClockPlan
 from blysk.golden.video.controls import Controls
@@ -23,12 +25,13 @@ from blysk.golden.video.display_timing import VGA
 from blysk.golden.video.draw_unit import Drawing
 from blysk.golden.video.mesh_memory import MeshMemory, block_rams
 from blysk.golden.video.serialiser import LANES
+from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.video.clocks import ClockUnit
 from blysk.hdl.video.output_cells import OutputCells
 from blysk.sim.api.design import design_of
 from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.scene import load, scenes_of
-from blysk.sim.api.settings import read_settings
+from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.errors import InputError
 
 __all__ = ["COLOURS", "OPTIONS", "BoardTop", "gpu_of", "least_cycles"]
@@ -36,15 +39,15 @@ __all__ = ["COLOURS", "OPTIONS", "BoardTop", "gpu_of", "least_cycles"]
 COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 """Pixel formats of the band buffer."""
 
-_LEFT_OUT = ("size", "projection", "viewer", "target", "method", "operand", "gate", "setup_interval", "style")
+_LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
 
-_DEFAULTS = {"triangles": 1000, "back_faces": "cull", "method": "chord"}
+_DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
 
-_TOLD = _DEFAULTS | {"model": "blinn, on a 25F cosquad"}
+_METHOD = "Interpolation along a span.  [default: quotient; chord with a model that is from no table]"
 
 OPTIONS = {
-    name: option._replace(default=_TOLD.get(name, option.default))
-    for name, option in {**SCENE, **DESIGN}.items()
+    name: option._replace(default=_DEFAULTS.get(name, option.default))
+    for name, option in {**SCENE, **DESIGN, "method": DESIGN["method"]._replace(help=_METHOD)}.items()
     if name not in _LEFT_OUT
 }
 """Options of the command, with the defaults that its help tells.
@@ -52,8 +55,8 @@ OPTIONS = {
 The size is that of the display, and the camera a perspective one.
 """
 
-_COMPACT = {"setup_interval": 9, "model": "cosquad"}
-"""Defaults on a small device: setup interval, and a model whose design has been routed."""
+_COMPACT_INTERVAL = 9
+"""Setup interval on a small device, of methods that have it: 5 multipliers fewer than at 3, of ``chord``."""
 
 MAX_LIGHTS = 4
 """Largest number of lights of a board's scene."""
@@ -89,20 +92,15 @@ def gpu_of(
     InputError
         If the mesh cannot be read, or does not fit, or an option is not accepted.
     """
-    defaults = _DEFAULTS | (_COMPACT if board.compact else {})
     colours = colours or ("rgb565" if board.compact else "rgb888")
-    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **defaults)
-    if settings["size"] != VGA.size:
-        raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
-    loaded = load(settings)
-    (scene,) = scenes_of(loaded, settings)
+    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **_DEFAULTS)
+    with settings.located():
+        if settings["size"] != VGA.size:
+            raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
+        loaded = load(settings)
+        (scene,) = scenes_of(loaded, settings)
+        design = _design(settings, scene, board)
     scenes = _presets(scene, settings["up"])
-    if len(scene.lights) > MAX_LIGHTS:
-        raise settings.refuse("lights", f"{len(scene.lights)} lights", f"give at most {MAX_LIGHTS}", "")
-    design = design_of(settings, len(scene.lights), len(scene.materials))
-    if design.takes_vectors:
-        reason = "the vertex unit turns normals to no light's frame"
-        raise settings.refuse("method", reason, "use method chord", design.method)
     background = tuple(round(255 * channel) for channel in scene.background)
     buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=background)
     _check_memory(board, mesh, scene, buffer)
@@ -111,8 +109,29 @@ def gpu_of(
             scenes, design, lines=buffer.lines, axis=settings["up"], controls=Controls(materials=2, lights=2)
         )
     except ValueError as error:
-        raise InputError(f"--mesh {mesh}", str(error), "use another mesh, camera or material") from error
+        reason, _, remedy = str(error).partition("; ")
+        remedy = remedy or "use another mesh, camera or material"
+        raise InputError(f"--mesh {mesh}", reason, remedy) from error
     return Gpu(drawing, buffer), scenes
+
+
+def _design(settings: Settings, scene: Scene, board: Board) -> Design:
+    """The shading pipeline of the settings, for the lights and materials of a scene."""
+    if scene.local:
+        reason = "a board has lights and a viewer at infinity alone"
+        raise settings.refuse("lights", reason, "give directions of lights, and a distant viewer", "")
+    if len(scene.lights) > MAX_LIGHTS:
+        raise settings.refuse("lights", f"{len(scene.lights)} lights", f"give at most {MAX_LIGHTS}", "")
+    made = design_of(settings, max(1, len(scene.lights)), len(scene.materials))
+    try:
+        Renderer(made)
+    except ValueError as error:
+        reason, _, remedy = str(error).partition("; ")
+        raise settings.refuse("method", reason, remedy) from None
+    intervals = unit_of(made.interpolator).setup_intervals(made.interpolator)
+    if board.compact and settings["setup_interval"] is None and _COMPACT_INTERVAL in intervals:
+        return made.built(setup_interval=_COMPACT_INTERVAL)
+    return made
 
 
 def _presets(scene: Scene, up: Any) -> list[Scene]:

@@ -86,7 +86,11 @@ class DrawCommands:
 
     @classmethod
     def of(
-        cls, mesh: MeshMemory, presets: Sequence[Sequence[FrameConstants]], cull: Sequence[int] = ()
+        cls,
+        mesh: MeshMemory,
+        presets: Sequence[Sequence[FrameConstants]],
+        cull: Sequence[int] = (),
+        sets: Sequence[int] | None = None,
     ) -> "DrawCommands":
         """A list for each preset: its constants, a transform of each part by its own slot, and the draws.
 
@@ -98,16 +102,21 @@ class DrawCommands:
             For each preset, the constants of every material.
         cull : sequence of int
             Indices of parts that are left out.
+        sets : sequence of int, optional
+            For each preset, the index of its set of slots, see `Motion.of`; by default all have the first.
         """
         rows, starts = [], []
-        for constants in presets:
+        for constants, of_preset in zip(presets, sets or [0] * len(presets), strict=True):
+            first_slot = of_preset * len(mesh.parts)
             starts.append(len(rows))
             writes = writes_of(constants)
             data = np.asarray(writes["data"])
             kind = np.full(len(data), KINDS.index("frame_constant"))
             rows += np.stack([kind, writes["address"], data & 0xFFF, data >> 12], axis=1).tolist()
-            kept = [(slot, part) for slot, part in enumerate(mesh.parts) if slot not in cull]
-            rows += [[KINDS.index("transform"), slot, part.first, part.count] for slot, part in kept]
+            kept = [(index, part) for index, part in enumerate(mesh.parts) if index not in cull]
+            rows += [
+                [KINDS.index("transform"), first_slot + index, part.first, part.count] for index, part in kept
+            ]
             rows += [
                 [KINDS.index("draw"), material, first, count]
                 for _, part in kept

@@ -8,6 +8,7 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.triangle_frame import span_angle
+from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import preset
@@ -60,7 +61,7 @@ class Drawing:
     mesh : MeshMemory
         Vertices and triangles.
     motion : Motion
-        A slot for each part of the memory.
+        A slot for each part of the memory, for each set of axes of normals.
     commands : DrawCommands
         Lists, one for each preset of ``controls``.
     presets : tuple of tuple of FrameConstants
@@ -82,8 +83,7 @@ class Drawing:
     ------
     ValueError
         If the design is made for another size, the numbers of lists, presets and frames are not that of the
-        controls, the numbers of slots and parts differ, or a command goes past the end of the slots, the
-        materials, the vertices or the triangles.
+        controls, or a command goes past the end of the slots, the materials, the vertices or the triangles.
 
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
@@ -109,8 +109,6 @@ class Drawing:
         wanted = self.controls.materials * self.controls.lights
         if {len(self.commands.starts), len(self.presets), len(self.frames)} != {wanted}:
             raise ValueError(f"the controls choose from {wanted} lists, there are {len(self.presets)}")
-        if self.motion.slots != len(self.mesh.parts):
-            raise ValueError(f"{len(self.mesh.parts)} meshes need as many slots, not {self.motion.slots}")
         self.commands.check("transform", index=self.motion.slots, range=self.mesh.vertices)
         self.commands.check("draw", index=design.materials, range=self.mesh.triangles)
 
@@ -133,6 +131,9 @@ class Drawing:
     ) -> "Drawing":
         """Drawing of a scene's mesh, which turns around its own middle.
 
+        For a method that takes vectors the matrices turn normals into the frame of the scene's light. Scenes
+        with the same frame share their matrices.
+
         Parameters
         ----------
         scenes : sequence of Scene
@@ -154,27 +155,28 @@ class Drawing:
         Raises
         ------
         ValueError
-            If a scene does not fit the design, the mesh the memory, or the camera the matrix; or the method
-            takes vectors.
+            If a scene does not fit the design, the mesh the memory, or the camera the matrix; or triangles
+            do not serve the design, see `Renderer`.
         """
         scene, transform = scenes[0], transform or VertexTransform()
         design = design or board_design(max(len(each.lights) for each in scenes), len(scene.materials))
         size = scene.width, scene.height
         x_bits, y_bits = cls.place_bits(size, lines)
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
-        if design.takes_vectors:
-            raise ValueError(
-                f"the vertex unit turns normals to no light's frame, which {design.method} takes"
-            )
-        mesh = MeshMemory.of([scene.mesh])
+        renderer, mesh = Renderer(design), MeshMemory.of([scene.mesh])
+        turned_to = [
+            vector_axes(each, design) if design.takes_vectors and design.lights else np.eye(3)
+            for each in scenes
+        ]
+        axes, sets = np.unique(np.stack(turned_to), axis=0, return_inverse=True)
         presets = tuple(tuple(constants_of(each, design)) for each in scenes)
         widest = [span_angle(each, design) if angle is None else angle for each in scenes]
         return cls(
             mesh=mesh,
-            motion=Motion.of(mesh, scene.camera, size, axis, transform),
-            commands=DrawCommands.of(mesh, presets),
+            motion=Motion.of(mesh, scene.camera, size, axis, transform, axes),
+            commands=DrawCommands.of(mesh, presets, sets=sets.ravel().tolist()),
             presets=presets,
-            renderer=Renderer(design),
+            renderer=renderer,
             size=size,
             frames=tuple(
                 Frame.centred(*size, back_faces=scene.back_faces, limit=Frame.limit_of(each))
@@ -201,15 +203,19 @@ class Drawing:
         top = frame.top + band * self.lines
         return replace(frame, top=top, bottom=min(top + self.lines, frame.bottom))
 
-    def vertices(self, angle: int) -> ScreenVertices:
-        """All vertices on the screen, at the code of an angle."""
+    def vertices(self, angle: int, preset: int = 0) -> ScreenVertices:
+        """All vertices on the screen, at the code of an angle, by the matrices of a list."""
+        words = self.commands.compute(self.commands.starts[preset], True)
+        transforms = words[words[:, 0] == KINDS.index("transform")]
+        # A part that the list does not transform is not drawn.
+        slots = dict(zip(transforms[:, 2].tolist(), transforms[:, 1].tolist(), strict=True))
         made = [
             self.transform.compute(
                 self.mesh.position[part.first : part.first + part.count],
                 self.mesh.normal[part.first : part.first + part.count],
-                self.motion.matrix(slot, angle),
+                self.motion.matrix(slots.get(part.first, 0), angle),
             )
-            for slot, part in enumerate(self.mesh.parts)
+            for part in self.mesh.parts
         ]
         names = ("x", "y", "depth", "normal", "outside")
         return ScreenVertices(*(np.concatenate([getattr(part, name) for part in made]) for name in names))
@@ -219,7 +225,7 @@ class Drawing:
         words = self.commands.compute(self.commands.starts[preset], True)
         draws = words[words[:, 0] == KINDS.index("draw")]
         return self.assembly.compute(
-            self.vertices(angle), draws[:, 2], draws[:, 3], draws[:, 1], rows.top, rows.bottom
+            self.vertices(angle, preset), draws[:, 2], draws[:, 3], draws[:, 1], rows.top, rows.bottom
         )
 
     def band(self, band: int, angle: int, preset: int = 0) -> BandPixels:
@@ -258,17 +264,14 @@ class Drawing:
 
 
 def board_design(lights: int = 1, materials: int = 1) -> Design:
-    """The shading pipeline for a small device: chord, cosquad, a span every 9 cycles.
-
-    It has 13 multipliers with one light, where a span every 3 cycles would take 18. With 10 for geometry, and
-    one each for vertices and motion, these are 25 of the 28 multipliers of an ECP5-25F.
+    """The shading pipeline of the boards: quotient, blinn.
 
     Parameters
     ----------
     lights, materials : int
         As for `Design`.
     """
-    return preset("chord", "cosquad", lights, materials=materials, setup_interval=9)
+    return preset("quotient", "blinn", lights, materials=materials)
 
 
 def turned(scene: Scene, angle: int, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> Scene:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -39,7 +40,8 @@ def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 class Motion:
     """Entries ``c0 + c1 cos a + c2 sin a`` of the matrices of turning meshes.
 
-    With any axis and camera, every entry of camera times rotation has this form. The sines of
+    With any axis and camera, every entry of camera times rotation has this form, and so has every entry of
+    axes for normals times rotation. The sines of
     ``(k + 1/2) 2 pi / 2^12`` are in a table of a quarter turn, 1024 words, in ``SQ(2, 16)``; due to the half
     step the other quarters are its mirror images. An entry takes two products; their sum with c0 is rounded
     to 20 fraction bits for offsets, to 16 for the other entries.
@@ -77,8 +79,11 @@ class Motion:
         size: tuple[int, int],
         axis: Sequence[float] = (0.0, 1.0, 0.0),
         unit: VertexTransform | None = None,
+        normal_axes: Sequence[np.ndarray] = (np.eye(3),),
     ) -> "Motion":
-        """Motion with a slot for each part of a memory: it turns around an axis through its own middle.
+        """Motion of a memory's parts: each turns around an axis through its own middle.
+
+        Each set of axes for normals has a slot for each part; the slots of the first set come first.
 
         Parameters
         ----------
@@ -92,6 +97,8 @@ class Motion:
             Axis of the rotation.
         unit : VertexTransform, optional
             Vertex unit; only its ``scale_bits`` matter.
+        normal_axes : sequence of float64 arrays, shape (3, 3)
+            Sets of axes, by rows: normals come out in the frame of these. By default the world's.
 
         Raises
         ------
@@ -110,10 +117,11 @@ class Motion:
         offset, linear = rows[0], (rows[1:] - rows[0]).T
         turns = _turns(axis)
         made = [[], [], []]
-        for part in mesh.parts:
+        for axes, part in product(normal_axes, mesh.parts):
             for k, turn in enumerate(turns):
+                position = (linear @ turn * part.scale).ravel()
                 moved = linear @ part.centre + offset if k == 0 else np.zeros(3)
-                made[k].append(np.concatenate([(linear @ turn * part.scale).ravel(), moved, turn.ravel()]))
+                made[k].append(np.concatenate([position, moved, (axes @ turn).ravel()]))
         try:
             return cls(
                 Fixed.round(OFFSET, made[0]).codes,

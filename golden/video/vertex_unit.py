@@ -30,7 +30,7 @@ class Matrix:
     offset : int64 array, shape (3,)
         Offsets of these rows, codes of `OFFSET`.
     normal : int64 array, shape (3, 3)
-        A rotation, codes of `ENTRY`.
+        A rotation, codes of `ENTRY`: of the mesh alone, or into the frame of a light after that.
     """
 
     position: np.ndarray

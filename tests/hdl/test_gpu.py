@@ -12,7 +12,6 @@ from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
 from blysk.golden.video.display_timing import Axis, DisplayMode
 from blysk.golden.video.draw_unit import Drawing, turned
 from blysk.hdl.gpu import GpuUnit
-from blysk.sim.api.design import design
 from blysk.sim.api.scene import scene
 from blysk.sim.frames.display import OneClock, show
 
@@ -25,7 +24,7 @@ def gpu(blank, bits=RGB888):
     """A small teapot on a display whose lines have so many blank pixels: time to draw."""
     mode = DisplayMode(Axis(64, 4, 8, blank), Axis(48, 2, 2, 8))
     given = scene("teapot", triangles=200, size=mode.size, back_faces="cull")
-    drawing = Drawing.of([given], design(setup_interval=9), lines=8)
+    drawing = Drawing.of([given], lines=8)
     return Gpu(drawing, BandBuffer(mode, 8, bits, BACKGROUND)), given
 
 

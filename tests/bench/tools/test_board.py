@@ -54,6 +54,21 @@ def pattern_on(board):
             "heavy by a factor of 3.90; use fewer triangles, or a faster --clock",
         ),
         (
+            ["ulx3s-25f", "--light", "0,0,1", "--light", "1,0,0", "--simulate", "1", "-o", "x"],
+            "--method quotient: triangles give vectors for one light, not 2; give one light, or use method "
+            "chord",
+        ),
+        (
+            ["ulx3s-25f", "--point-light", "1,2,3", "--simulate", "1", "-o", "x"],
+            "--light: a board has lights and a viewer at infinity alone; give directions of lights, and a "
+            "distant viewer",
+        ),
+        (
+            ["ulx3s-25f", "--method", "quotient", "--model", "cosquad", "--exponent", "1", "-o", "x.bit"],
+            "--mesh teapot: cosquad with exponent 1 is 0.25 beyond a right angle of N and H, where the "
+            "method quotient has no highlight; take another method or model",
+        ),
+        (
             ["ulx3s-25f", "--toggles", "-o", "x"],
             "--toggles: counts bits of a simulation; give --simulate N with it",
         ),
@@ -103,7 +118,7 @@ def test_pins_of_the_board(name):
 def test_lights_of_the_presets():
     """The other presets' are turned by a quarter round the upright; one along it stays."""
     lights = [Light(direction) for direction in ((0, 0, 1), (0, 2, 0), (3, 4, 0))]
-    _, scenes = gpu_of(BOARDS["ulx3s-85f"], "teapot", {"lights": lights})
+    _, scenes = gpu_of(BOARDS["ulx3s-85f"], "teapot", {"lights": lights, "method": "chord"})
     given, turned = (np.array([light.direction for light in scenes[k].lights]) for k in (0, 2))
     expected = [[1, 0, 0], [0, 1, 0], [0, 0.8, -0.6]]
     np.testing.assert_allclose(turned / np.linalg.norm(turned, axis=1)[:, None], expected, rtol=0, atol=1e-15)

@@ -48,6 +48,19 @@ def test_entries_are_within_their_bound(memory, camera):
     assert 2.0**-17 < error <= Motion.ENTRY_ERROR
 
 
+def test_normals_come_out_in_the_frames_of_their_slots(memory, camera):
+    """Slots of a set of axes behind those of the other; positions are the same."""
+    frame = rotation((0.3, -0.4, 1), 0.7)
+    motion = Motion.of(memory, camera, SIZE, AXIS, normal_axes=[np.eye(3), frame])
+    for angle in (0, 700, 3000):
+        matrices = [motion.matrix(slot, angle) for slot in (0, 1)]
+        turn = rotation(AXIS, Motion.radians(angle))
+        for axes, matrix in zip((np.eye(3), frame), matrices, strict=True):
+            assert np.abs(matrix.normal * 2.0**-16 - axes @ turn).max() <= Motion.ENTRY_ERROR
+        np.testing.assert_array_equal(matrices[0].position, matrices[1].position)
+        np.testing.assert_array_equal(matrices[0].offset, matrices[1].offset)
+
+
 def test_the_axis_turns_anticlockwise():
     np.testing.assert_allclose(rotation((0, 0, 1), np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
 

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.golden.video.controls import BUTTONS, Controls
-from blysk.golden.video.draw_unit import Drawing
+from blysk.golden.video.draw_unit import Drawing, board_design
 from blysk.hdl.video.draw_unit import COUNTERS, RENDERED
 from blysk.sim.frames.drawing import DrawingSimulator
 from blysk.sim.meshes.teapot import teapot
@@ -38,8 +37,7 @@ def drawing_of(triangles, size, design, **options):
 
 @pytest.fixture(scope="module")
 def simulator():
-    design = preset("linear", "cosquad", materials=2)
-    return DrawingSimulator(drawing_of(120, (96, 64), design))
+    return DrawingSimulator(drawing_of(120, (96, 64), board_design(materials=2)))
 
 
 def expected(drawing, bands, buttons=None):
@@ -126,7 +124,7 @@ def test_buttons_count_from_the_next_frame_on(simulator):
 @pytest.mark.long
 def test_a_teapot_of_1000_triangles_at_640_by_480():
     """Whole frames as the board shows them, and their cycles: 60 frames a second at 75 MHz twice over."""
-    drawing = drawing_of(1000, (640, 480), preset(model="cosquad"))
+    drawing = drawing_of(1000, (640, 480), board_design())
     drawing = replace(drawing, controls=replace(drawing.controls, step=1))
     bands = [*range(drawing.bands)] * 2
     simulator = DrawingSimulator(drawing)
