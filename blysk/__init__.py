@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from blysk.sim.api.design import design, verilog
     from blysk.sim.api.render import RenderedFrame, render
     from blysk.sim.api.scene import scene
-    from blysk.sim.engines.engine import CompilerMissing, SimulationError
-    from blysk.sim.errors import InputError
+    from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 
 __all__ = [
     "Camera",
@@ -45,7 +44,7 @@ __all__ = [
 # Imported at first use: importing the simulators takes a second.
 _MODULES = {
     "Camera": "golden.reference.camera",
-    "CompilerMissing": "sim.engines.engine",
+    "CompilerMissing": "sim.errors",
     "Design": "golden.pipeline",
     "InputError": "sim.errors",
     "Light": "golden.reference.lighting",
@@ -53,7 +52,7 @@ _MODULES = {
     "Mesh": "golden.reference.geometry",
     "RenderedFrame": "sim.api.render",
     "Scene": "golden.reference.scene",
-    "SimulationError": "sim.engines.engine",
+    "SimulationError": "sim.errors",
     "design": "sim.api.design",
     "render": "sim.api.render",
     "scene": "sim.api.scene",

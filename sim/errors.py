@@ -1,6 +1,6 @@
-"""Exceptions for bad input: a thing, a reason, a remedy."""
+"""Exceptions: for bad input a thing, a reason, a remedy; for simulations a line."""
 
-__all__ = ["InputError", "OptionError", "one_line"]
+__all__ = ["CompilerMissing", "InputError", "OptionError", "SimulationError", "one_line"]
 
 
 def one_line(text: str, most: int = 1000) -> str:
@@ -71,3 +71,14 @@ class OptionError(InputError):
     def at(self, place: str) -> InputError:
         """The same reason and remedy as an `InputError` whose thing is ``place``."""
         return InputError(place, self.reason, self.remedy)
+
+
+class SimulationError(Exception):
+    """A simulation failed: the component broke the rules of streams or got stuck, or an engine cannot run it.
+
+    The message is one line.
+    """
+
+
+class CompilerMissing(SimulationError):
+    """No C++ compiler works; the message says what was tried and what to do."""

@@ -329,7 +329,7 @@ class _Name(click.ParamType):
         return value
 
 
-@click.command(short_help="Report: error against run time, all measured.")
+@click.command()
 @click.argument("folder", type=click.Path(path_type=Path), default="report")
 @click.option("--quick", is_flag=True, help="Small pictures, few samples: minutes.")
 @click.option(

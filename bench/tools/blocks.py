@@ -291,7 +291,7 @@ def table(lines: Sequence[Row]) -> str:
     )
 
 
-@click.command(short_help="Table of the units: errors, times, parts.")
+@click.command()
 @click.option(
     "--samples", type=Whole(1000, 10_000_000), default=SAMPLES, show_default=True, help="Of each unit."
 )

@@ -48,7 +48,7 @@ __all__ = ["built_lines", "command", "missed", "shown_lines", "too_heavy"]
 MOST_FRAMES = 60
 
 
-@click.command(short_help="A turning mesh on a monitor: bitstream for a board, or its lanes simulated.")
+@click.command()
 @click.argument("board_name", metavar="BOARD")
 @click.option(
     "--mesh", default="teapot", show_default=True, help="File (OBJ, PLY, ...), scene file, or teapot."

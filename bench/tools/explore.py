@@ -284,7 +284,7 @@ def _option(name: str, values: Sequence[str | int], default: Sequence[str | int]
 _USUAL = Sweep()
 
 
-@click.command(short_help="Sweep the design space: the cheapest designs under an error.")
+@click.command()
 @click.option("--mesh", default="teapot", show_default=True, help="File, or teapot.")
 @click.option(
     "--exponent", type=Whole(1, MAX_EXPONENT), default=EXPONENT, show_default=True, help="Of the highlight."

@@ -142,7 +142,7 @@ def _pipelines(
             yield ", ".join(name), partial(TOPS[top].unit, renderer_of(made, "top", top), setups=setups)
 
 
-@click.command(short_help="Place and route for an FPGA: parts, clock rate.")
+@click.command()
 @options_of(DESIGN)
 @options_of(PIPES)
 @options_of({"top": PORTS["top"]})

@@ -468,7 +468,7 @@ def write_pages(
                 path.unlink()
 
 
-@click.command(short_help="Pages of the units, with drawings.")
+@click.command()
 @click.argument("folder", type=click.Path(path_type=Path), default="docs/blocks")
 @click.option(
     "--unit", "units", type=Choice("unit", RECORDS), multiple=True, help="This page alone; repeat for more."

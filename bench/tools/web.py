@@ -329,7 +329,7 @@ class _Design(click.ParamType):
         return method, model
 
 
-@click.command(short_help="A site in which a browser simulates the pipeline.")
+@click.command()
 @click.option(
     "-o",
     "--output",

@@ -7,7 +7,10 @@ import numpy as np
 
 from blysk.golden.bus.byte_layout import ByteLayout
 
-__all__ = ["PACKETS", "Framing"]
+__all__ = ["BUSES", "PACKETS", "Framing"]
+
+BUSES = ("axi", "wishbone")
+"""Buses by which a core and its registers can be accessed."""
 
 PACKETS = {"shader": "span", "geometry": "frame", "render": "run"}
 """What ends with TLAST, by core: a span, a frame, or a run of pixels, each one right of the one before."""

@@ -24,7 +24,6 @@ from blysk.golden.reference.scene import BACK_FACES
 
 __all__ = [
     "ADDRESS_BITS",
-    "BUSES",
     "CONSTANTS",
     "ERRORS",
     "IDENTITY",
@@ -36,9 +35,6 @@ __all__ = [
     "constant_registers",
     "frame_registers",
 ]
-
-BUSES = ("axi", "wishbone")
-"""Buses by which the registers can be accessed."""
 
 ADDRESS_BITS = 12
 """Number of bits of a byte address."""

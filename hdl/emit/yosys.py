@@ -5,9 +5,10 @@ import sys
 
 from amaranth._toolchain.yosys import _BuiltinYosys
 
+from blysk.hdl.emit.errors import NetlistError
 from blysk.hdl.emit.processes import run_program
 
-__all__ = ["AmaranthYosys", "NetlistError", "cells_and_ports", "run_yosys"]
+__all__ = ["AmaranthYosys", "cells_and_ports", "run_yosys"]
 
 _SCRIPT = """\
 read_rtlil <<rtlil
@@ -21,10 +22,6 @@ opt_clean
 memory_collect
 write_json
 """
-
-
-class NetlistError(RuntimeError):
-    """Yosys could not read or write a netlist."""
 
 
 class AmaranthYosys(_BuiltinYosys):

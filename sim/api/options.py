@@ -6,8 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypedDict, get_args
 
-from blysk.golden.bus.framing import PACKETS
-from blysk.golden.bus.registers import BUSES
+from blysk.golden.bus.framing import BUSES, PACKETS
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -20,8 +19,8 @@ from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Triple
 from blysk.golden.reference.lobes import TabulatedModel
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
-from blysk.sim.meshes.mesh import DEFAULT_CREASE, DEFAULT_TRIANGLES
-from blysk.sim.meshes.teapot import MAX_TRIANGLES, MIN_TRIANGLES
+from blysk.sim.meshes.normals import DEFAULT_CREASE
+from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, MAX_TRIANGLES, MIN_TRIANGLES
 from blysk.sim.run_files import reads
 from blysk.sim.value_types import Choice, Color, Few, Number, Size, Truth, Value, Vector, Whole, shown
 
@@ -41,6 +40,7 @@ __all__ = [
     "VIEW_WORDS",
     "ColorLike",
     "DesignOptions",
+    "Engine",
     "Lights",
     "Option",
     "PartError",
@@ -61,6 +61,9 @@ ColorLike = str | float | Triple
 Source = str | os.PathLike[str] | Mesh
 """``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
 
+
+Engine = Literal["auto", "cxxrtl", "pysim"]
+"""Names of engines; ``"auto"``: ``"cxxrtl"``, or ``"pysim"`` where no C++ compiler works."""
 
 GEOMETRIES = ("software", "hardware")
 """Choices of the part that turns triangles into spans."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, Unpack, cast
+from typing import Any, Unpack, cast
 
 import numpy as np
 from PIL import Image
@@ -23,11 +23,10 @@ from blysk.golden.reference.metrics import ErrorFigures
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import design_of, refused_counts
-from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, RenderOptions, Source
+from blysk.sim.api.options import DESIGN, SLOW_SIZE, Engine, RenderOptions, Source
 from blysk.sim.api.scene import load, scenes_of
-from blysk.sim.api.settings import Settings, read_settings
-from blysk.sim.engines.engine import CompilerMissing
-from blysk.sim.errors import OptionError
+from blysk.sim.api.settings import Settings, rendering_settings
+from blysk.sim.errors import CompilerMissing, OptionError
 from blysk.sim.frames.figures import difference_figures, frame_figures, saving_figures, triangle_figures
 from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 from blysk.sim.frames.picture import write_comparison, write_image
@@ -41,21 +40,16 @@ from blysk.sim.run_files import RunFiles
 __all__ = [
     "BUILDING",
     "SPECIALISING",
-    "Engine",
     "RenderedFrame",
     "Rendering",
     "prepare_rendering",
     "render",
-    "rendering_settings",
 ]
 
 SPECIALISING = "finding out what the scene needs"
 """Stage of `prepare_rendering` in which a specialisation is found."""
 BUILDING = "building the model"
 """Stage of `prepare_rendering` in which the hardware is compiled; the cause of a long time is appended."""
-
-Engine = Literal["auto", "cxxrtl", "pysim"]
-"""Names of engines; ``"auto"``: ``"cxxrtl"``, or ``"pysim"`` where no C++ compiler works."""
 
 Progress = Callable[[int, int], object]
 
@@ -278,18 +272,6 @@ class Rendering:
                 details["specialisation"] |= difference_figures(cast(SimulatedFrame, frame), whole)
         files = RunFiles.current()
         return RenderedFrame(self.scenes[0], self.design, frame, self.loaded.name, details, files)
-
-
-def rendering_settings(
-    source: Source | Scene, options: dict[str, Any], vcd: str | os.PathLike[str] | None = None
-) -> Settings:
-    """All options of a rendering; see `read_settings`."""
-    slow = {"size": SLOW_SIZE} if vcd else {}
-    settings = read_settings(source, options, {**SCENE, **DESIGN, **RENDERING}, **slow)
-    with settings.located():
-        if settings["short_words"] and not settings["specialise"]:
-            raise settings.refuse("short_words", "nothing is specialised", "leave it out, or specialise", "")
-    return settings
 
 
 def prepare_rendering(

@@ -16,11 +16,9 @@ from blysk.golden.reference.lighting import Light, Material, Triple
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
 from blysk.sim.api.settings import Settings, read_settings
-from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import equal_distance, turned, turntable
 from blysk.sim.meshes.materials import surfaces
 from blysk.sim.meshes.mesh import LoadedMesh, load_mesh
-from blysk.sim.run_files import OutputIsInput
 
 __all__ = ["load", "scene", "scenes_of"]
 
@@ -98,18 +96,13 @@ def load(settings: Settings) -> LoadedMesh:
     if isinstance(source, Mesh | Scene):
         mesh = source if isinstance(source, Mesh) else source.mesh
         return LoadedMesh(mesh, type(source).__name__.lower(), 0, 0)
-    try:
+    with settings.mesh_located():
         return load_mesh(
             os.fspath(source),
             triangles=settings["triangles"],
             crease_angle=settings["crease"],
             materials=settings["materials"] == "file",
         )
-    except InputError as error:
-        if "mesh" not in settings.origins or isinstance(error, OutputIsInput):
-            raise
-        reason = f"{error.thing}, {error.reason}"
-        raise InputError(settings.origins["mesh"], reason, error.remedy) from error
 
 
 def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:

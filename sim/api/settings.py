@@ -1,5 +1,6 @@
 """Values of options: a caller's replace a scene file's, which replace the defaults."""
 
+import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,12 +13,15 @@ from blysk.golden.presets import default_method
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Triple
 from blysk.golden.reference.scene import Scene
-from blysk.sim.api.options import SCENE, Option, PartError, Source
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, Option, PartError, Source
 from blysk.sim.api.scene_file import read_scene_file
-from blysk.sim.errors import OptionError
+from blysk.sim.errors import InputError, OptionError
+from blysk.sim.meshes.mesh_path import check_mesh_path
+from blysk.sim.meshes.refusal import Refused
+from blysk.sim.run_files import OutputIsInput
 from blysk.sim.value_types import shown
 
-__all__ = ["Settings", "checked", "read_settings"]
+__all__ = ["Settings", "check_mesh", "checked", "read_settings", "rendering_settings"]
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,16 @@ class Settings:
             if error.option in self.origins:
                 raise error.at(self.origins[error.option]) from None
             raise
+
+    @contextmanager
+    def mesh_located(self) -> Iterator[None]:
+        """Within the block, the error of a mesh that a scene file names has that file and key, too."""
+        try:
+            yield
+        except InputError as error:
+            if "mesh" not in self.origins or isinstance(error, OutputIsInput):
+                raise
+            raise InputError(self.origins["mesh"], f"{error.thing}, {error.reason}", error.remedy) from error
 
 
 def checked(options: Mapping[str, Any], table: Mapping[str, Option]) -> dict[str, Any]:
@@ -137,6 +151,39 @@ def read_settings(
     with settings.located():
         _check_pairs(settings)
     return settings
+
+
+def rendering_settings(
+    source: Source | Scene, options: dict[str, Any], vcd: str | os.PathLike[str] | None = None
+) -> Settings:
+    """All options of a rendering; see `read_settings`."""
+    slow = {"size": SLOW_SIZE} if vcd else {}
+    settings = read_settings(source, options, {**SCENE, **DESIGN, **RENDERING}, **slow)
+    with settings.located():
+        if settings["short_words"] and not settings["specialise"]:
+            raise settings.refuse("short_words", "nothing is specialised", "leave it out, or specialise", "")
+    return settings
+
+
+def check_mesh(settings: Settings) -> None:
+    """Refuse a mesh file that is not there, or of an unknown type; it is not opened.
+
+    Raises
+    ------
+    InputError
+        As `load_mesh`.
+    """
+    source = settings.source
+    if isinstance(source, Mesh | Scene) or source == "teapot":
+        return
+    with settings.mesh_located():
+        try:
+            check_mesh_path(Path(source))
+        except Refused as refusal:
+            raise InputError(os.fspath(source), refusal.reason, refusal.remedy) from None
+        except (OSError, ValueError):
+            # `load_mesh` says why the system refuses the name.
+            return
 
 
 def _turn_view(values: dict[str, Any], given: Collection[str]) -> None:

@@ -8,46 +8,73 @@ import threading
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
-from importlib.metadata import entry_points, version
+from functools import cache
+from typing import TYPE_CHECKING
 
 import click
 from tqdm import tqdm
 
-from blysk.hdl.emit.yosys import NetlistError
-from blysk.sim.cli.options import option_error
+from blysk.hdl.emit.errors import NetlistError
+from blysk.sim.cli.lazy_command import LazyCommand
 from blysk.sim.engines.cache import provide_caches
-from blysk.sim.engines.engine import CompilerMissing, SimulationError
-from blysk.sim.errors import InputError, OptionError, one_line
+from blysk.sim.errors import CompilerMissing, InputError, OptionError, SimulationError, one_line
 from blysk.sim.run_files import RunFiles
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 __all__ = ["cli", "main"]
 
-_COMMANDS = ("render", "verilog")
-"""Commands of this folder, each in a file of its name, which is imported when it is asked for."""
+_COMMANDS = {
+    "render": LazyCommand(
+        "Render a mesh or a scene file through the simulated pipeline.", "blysk.sim.cli.render"
+    ),
+    "verilog": LazyCommand("Emit the pipeline as Verilog.", "blysk.sim.cli.verilog"),
+}
+"""Commands of this folder."""
 
 
 class _Group(click.Group):
     """Group of this folder's commands and those that installed packages register under ``blysk.commands``.
 
-    Layers above this one add their commands in this way; a command is imported when it is called.
+    Layers above this one add their commands in this way.
     """
 
     def list_commands(self, ctx):
-        return sorted({*_COMMANDS, *entry_points(group="blysk.commands").names})
+        return sorted({*_COMMANDS, *_installed()})
 
     def get_command(self, ctx, cmd_name):
         # Before the import, as Matplotlib looks for its folder when it is imported.
         provide_caches()
-        if cmd_name in _COMMANDS:
-            return import_module(f"blysk.sim.cli.{cmd_name}").command
-        for entry in entry_points(group="blysk.commands", name=cmd_name):
-            return entry.load()
-        return None
+        found = _command(cmd_name)
+        return found.load() if isinstance(found, LazyCommand) else found
+
+    def format_commands(self, ctx, formatter):
+        """The list of commands, by their lines: no command is loaded."""
+        found = {name: _command(name) for name in self.list_commands(ctx)}
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, one.get_short_help_str(80)) for name, one in found.items() if one])
+
+
+@cache
+def _installed() -> dict[str, "EntryPoint"]:
+    """Commands of installed packages by name; to find them reads the metadata of every package."""
+    from importlib.metadata import entry_points
+
+    return {entry.name: entry for entry in entry_points(group="blysk.commands")}
+
+
+def _command(name: str) -> click.Command | None:
+    """A command of this folder or of an installed package, or its place; ``None`` if there is none."""
+    if name in _COMMANDS:
+        return _COMMANDS[name]
+    return _installed()[name].load() if name in _installed() else None
 
 
 @click.group(cls=_Group, no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(version("blysk"), "--version", prog_name="blysk", message="%(prog)s %(version)s")
+@click.version_option(
+    None, "--version", package_name="blysk", prog_name="blysk", message="%(prog)s %(version)s"
+)
 def cli():
     """Phong and Blinn shading by simulated hardware.
 
@@ -106,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("blysk: interrupted", file=sys.stderr)
         return 130
     except OptionError as error:
-        print(f"blysk: {option_error(error)}", file=sys.stderr)
+        print(f"blysk: {_option_error(error)}", file=sys.stderr)
         return 2
     except InputError as error:
         print(f"blysk: {error}", file=sys.stderr)
@@ -131,6 +158,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"blysk: {text}; free some space or send it elsewhere", file=sys.stderr)
         _give_up_output()
         return 2
+
+
+def _option_error(error: OptionError) -> InputError:
+    """The error of an option in the words of the command line."""
+    flag = "light" if error.option == "lights" else error.option.replace("_", "-")
+    return error.at(f"--{flag} {error.value}".strip())
 
 
 @contextmanager

@@ -8,10 +8,10 @@ from click.core import ParameterSource
 
 from blysk.golden.reference.lighting import Light
 from blysk.sim.api.options import Option
-from blysk.sim.errors import InputError, OptionError
+from blysk.sim.errors import InputError
 from blysk.sim.value_types import Truth, Vector
 
-__all__ = ["given_options", "lights_of", "option_error", "options_of"]
+__all__ = ["given_options", "lights_of", "options_of"]
 
 _LIGHTS = {
     "--light": ("lights", Vector("a light", (3, 6), "X,Y,Z or X,Y,Z,R,G,B"), ("direction", "color")),
@@ -118,9 +118,3 @@ def lights_of(options: Mapping[str, Any]) -> list[Light]:
                 thing = f"{flag} {','.join(f'{number:g}' for number in numbers)}"
                 raise InputError(thing, str(error), _REMEDIES[flag]) from None
     return lights
-
-
-def option_error(error: OptionError) -> InputError:
-    """The error of an option in the words of the command line."""
-    flag = "light" if error.option == "lights" else error.option.replace("_", "-")
-    return error.at(f"--{flag} {error.value}".strip())

@@ -1,36 +1,17 @@
 """``blysk render``: a mesh or a scene file through the simulated pipeline."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
-from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any, get_args
+from typing import get_args
 
 import click
-from tqdm import tqdm
 
 from blysk.golden.presets import METHOD_LINES, MODEL_LINES
-from blysk.sim.api.options import DESIGN, RENDERING, SCENE
-from blysk.sim.api.render import (
-    BUILDING,
-    SPECIALISING,
-    Engine,
-    RenderedFrame,
-    Rendering,
-    prepare_rendering,
-    rendering_settings,
-)
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE, Engine
 from blysk.sim.api.scene_file import key_lines
+from blysk.sim.api.settings import check_mesh, rendering_settings
 from blysk.sim.cli.options import given_options, lights_of, options_of
-from blysk.sim.cli.outputs import animation_paths, check_outputs
 from blysk.sim.errors import InputError
-from blysk.sim.frames.animation import Animation, dask_executor, process_executor, render_frames, write_gif
-from blysk.sim.frames.figures import animation_figures
-from blysk.sim.frames.picture import write_image
-from blysk.sim.frames.summary import animation_lines, short_lines, specialisation_lines
-from blysk.sim.frames.workers import check_address, processors
-from blysk.sim.output import all_or_none, atomic_writer, write_json
 from blysk.sim.run_files import check_beside
 from blysk.sim.value_types import Choice, OutputFile, Whole
 
@@ -38,11 +19,6 @@ __all__ = ["command"]
 
 MAX_FRAMES = 9999
 """Most frames of a turntable: four digits in their names."""
-
-_SPECIALISE = (
-    f"{'specialise':<12}builds the full pipeline and the smaller one and counts what each part takes: "
-    "about half a minute the first time"
-)
 
 
 def _described(lines: dict[str, str]) -> str:
@@ -80,7 +56,7 @@ Keys of a scene file, all but mesh.file optional:
 """
 
 
-@click.command(help=_HELP, short_help="Render a mesh or a scene file through the simulated pipeline.")
+@click.command(help=_HELP)
 @click.argument("mesh")
 @options_of(DESIGN)
 @options_of(SCENE)
@@ -125,6 +101,10 @@ def command(
     if vcd and engine == "cxxrtl":
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
     settings = rendering_settings(mesh, given, vcd)
+    # After the checks of options: what draws takes long to import.
+    from blysk.sim.cli.outputs import animation_paths, check_outputs
+    from blysk.sim.frames.workers import check_address
+
     if not (output or comparison):
         output = f"{Path(mesh).stem}-blysk.{'gif' if frames else 'png'}"
     inputs = [mesh, str(settings.source)]
@@ -142,121 +122,15 @@ def command(
     else:
         check_outputs(inputs, pictures=[output, comparison], others=[figures, vcd])
         written = {"frame": output, "comparison": comparison}
-    # The frames of an animation are written as they are done.
-    drawn: list[str] = []
-    together = _removed_on_failure(drawn) if frames else all_or_none()
-    with together, tqdm(bar_format="{desc}", leave=False, disable=None) as stage:
-        ready = prepare_rendering(
-            settings,
-            engine="pysim" if vcd else engine,
-            frames=frames or 0,
-            remote=bool(address),
-            stage=partial(_told, stage),
-        )
-        stage.set_description_str("rasterising and simulating")
-        if frames:
-            report = _animation(ready, pictures, jobs, address, drawn)
-            stage.set_description_str("writing the animation")
-            write_gif(gif, pictures)
-            drawn.append(gif)
-            report["seconds"]["animation"] = perf_counter() - start - sum(report["seconds"].values())
-        else:
-            frame = _frame(ready, vcd)
-            stage.set_description_str("comparing with the golden renderer")
-            report = frame.figures
-            stage.set_description_str("writing")
-            if output:
-                frame.save(output)
-            if comparison:
-                frame.save_comparison(comparison)
-        report["seconds"]["total"] = perf_counter() - start
-        if figures:
-            write_json(figures, report)
+    check_mesh(settings)
+    from blysk.sim.cli.draw import draw_frame, draw_turntable
+
     if frames:
-        lines = animation_lines(report)
-    elif verbose:
-        lines = frame.lines()
+        lines = draw_turntable(settings, engine, pictures, gif, figures, jobs, address, start)
     else:
-        lines = short_lines(report)
-        if "specialisation" in report:
-            lines = [*lines, *specialisation_lines(report["specialisation"])]
+        lines = draw_frame(settings, engine, output, comparison, figures, vcd, verbose, start)
     for line in lines:
         print(line)
     for name, path in {**written, "figures": figures, "waves": vcd}.items():
         if path:
             print(f"{name:<12}{path}")
-
-
-@contextmanager
-def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
-    """Remove files if another output of the block cannot be written; an interrupt leaves them."""
-    try:
-        yield
-    except InputError:
-        for path in files:
-            Path(path).unlink(missing_ok=True)
-        raise
-
-
-def _told(bar: tqdm, text: str) -> None:
-    """Show a stage of the work; for a stage that may take long, print its time, also without a terminal."""
-    bar.set_description_str(text)
-    if text == SPECIALISING:
-        print(_SPECIALISE, flush=True)
-    elif text.startswith(BUILDING) and text != BUILDING:
-        print(f"{'building':<12}{text.removeprefix('building ')}", flush=True)
-
-
-def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
-    """Render the frame, with a progress bar."""
-    with (
-        atomic_writer(vcd) if vcd else nullcontext() as waves,
-        tqdm(unit=" pixels", unit_scale=True, delay=1, leave=False, disable=None) as bar,
-    ):
-
-        def show(done: int, count: int) -> None:
-            bar.total = count
-            bar.update(done - bar.n)
-
-        return ready.render(show, vcd=waves and str(waves))
-
-
-def _animation(
-    ready: Rendering, pictures: Sequence[str], jobs: int | None, address: str | None, drawn: list[str]
-) -> dict[str, Any]:
-    """Render and write the frames of a turntable, append their names to ``drawn``; figures of all."""
-    start = perf_counter()
-    smallest = ready.specialisation
-    animation = Animation(
-        smallest.scenes[0],
-        smallest.design,
-        ready.engine,
-        ready.design,
-        ready.pipes,
-        ready.setups,
-        ready.coarse,
-    )
-    cameras = [scene.camera for scene in ready.scenes]
-    if address:
-        workers = dask_executor(animation, address)
-    else:
-        workers = process_executor(animation, min(jobs or processors(), len(cameras)))
-    done = {}
-    mesh = {"mesh": ready.loaded.name}
-    with workers as executor, tqdm(total=len(cameras), unit=" frames", leave=False, disable=None) as bar:
-        for index, frame in render_frames(executor, cameras):
-            write_image(pictures[index], frame.image)
-            drawn.append(pictures[index])
-            counts = {**ready.counts, **frame.figures["counts"]}
-            done[index] = {"picture": pictures[index], **mesh, **frame.figures, "counts": counts}
-            bar.update()
-        name = executor.name
-    figures = animation_figures([done[index] for index in range(len(cameras))])
-    figures["counts"] |= ready.counts
-    return {
-        **mesh,
-        **figures,
-        "ignored": list(ready.loaded.ignored),
-        "workers": name,
-        "seconds": {**ready.seconds, "frames": perf_counter() - start},
-    }

@@ -5,13 +5,10 @@ from pathlib import Path
 
 import click
 
-from blysk.sim.api.bus_documents import DOCUMENTS, documents_of
-from blysk.sim.api.design import design, header_of, verilog_and_unit
 from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
-from blysk.sim.frames.testbench import check_folder, write_testbench
 from blysk.sim.output import all_or_none, write_text
 from blysk.sim.run_files import check_beside
 from blysk.sim.value_types import OutputFile
@@ -19,7 +16,7 @@ from blysk.sim.value_types import OutputFile
 __all__ = ["command"]
 
 
-@click.command(short_help="Emit the pipeline as Verilog.")
+@click.command()
 @options_of(DESIGN)
 @options_of(COUNTS)
 @options_of(GEOMETRY)
@@ -67,6 +64,11 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
         raise InputError(
             "--testbench", "its bench sends spans, and hardware geometry takes triangles", "leave one out"
         )
+    # After the checks of options: the hardware's description takes a second to import.
+    from blysk.sim.api.bus_documents import DOCUMENTS, documents_of
+    from blysk.sim.api.design import design, header_of, verilog_and_unit
+    from blysk.sim.frames.testbench import check_folder, write_testbench
+
     made = design(**given_options(context, [*DESIGN, *COUNTS]))
     beside = [f"{output[:-2]}{suffix}" for suffix in DOCUMENTS] if output and bus != "native" else []
     check_outputs([], pictures=[], others=[output, *beside])

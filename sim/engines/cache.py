@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 import warnings
-from importlib import import_module, metadata
+from importlib import import_module
 from pathlib import Path
 
 import platformdirs
@@ -138,6 +138,8 @@ def warn_of_cache(folder: Path, reason: str) -> None:
 
 def version_of(package: str) -> str | None:
     """Version of a package, ``None`` if it is not installed; the package is not imported."""
+    from importlib import metadata
+
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:

@@ -28,19 +28,9 @@ from amaranth.lib import stream
 from amaranth.lib.wiring import Component, Flow
 
 from blysk.sim.engines.beats import word_count
+from blysk.sim.errors import CompilerMissing, SimulationError
 
 __all__ = ["CompilerMissing", "Model", "Ports", "SimulationError", "Stimulus", "StopReason", "Trace"]
-
-
-class SimulationError(Exception):
-    """A simulation failed: the component broke the rules of streams or got stuck, or an engine cannot run it.
-
-    The message is one line.
-    """
-
-
-class CompilerMissing(SimulationError):
-    """No C++ compiler works; the message says what was tried and what to do."""
 
 
 class Ports:

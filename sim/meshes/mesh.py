@@ -25,26 +25,25 @@ from blysk.sim.meshes.gltf import (
 )
 from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.materials import FileMaterial, Found
-from blysk.sim.meshes.normals import crease_normals, face_directions, repaired_normals, transformed
+from blysk.sim.meshes.mesh_path import check_mesh_path
+from blysk.sim.meshes.normals import (
+    DEFAULT_CREASE,
+    crease_normals,
+    face_directions,
+    repaired_normals,
+    transformed,
+)
 from blysk.sim.meshes.obj import find_obj_materials, split_obj, tidy_obj
 from blysk.sim.meshes.ply import read_ply
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused, refers
 from blysk.sim.meshes.stl import read_stl
-from blysk.sim.meshes.teapot import teapot
+from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, teapot
 from blysk.sim.run_files import OutputIsInput, reads
 
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["DEFAULT_CREASE", "DEFAULT_TRIANGLES", "SUFFIXES", "LoadedMesh", "load_mesh"]
-
-SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
-
-DEFAULT_TRIANGLES = 10_000
-"""Triangles of the teapot, about."""
-
-DEFAULT_CREASE = 40.0
-"""Angle between faces, in degrees, over which an edge is sharp; for meshes without normals."""
+__all__ = ["LoadedMesh", "load_mesh"]
 
 
 @dataclass(frozen=True)
@@ -205,17 +204,7 @@ def _quiet_trimesh():
 def _read(path: Path) -> bytes:
     """The file's bytes, after a check of its path, suffix and size."""
     try:
-        if not path.exists():
-            raise Refused("there is no such file", "check the path, or use the name teapot")
-        if path.is_dir():
-            raise Refused("is a folder", "name a file in it")
-        if not path.is_file():
-            raise Refused("is not a regular file", "name a mesh file")
-        if path.suffix.lower() not in SUFFIXES:
-            raise Refused(
-                f"unknown mesh type {path.suffix!r}" if path.suffix else "the name has no suffix",
-                f"use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}",
-            )
+        check_mesh_path(path)
         reads(path)
         data = path.read_bytes()
     except OSError as error:

@@ -5,12 +5,16 @@ import numpy as np
 from blysk.golden.reference.geometry import normalise
 
 __all__ = [
+    "DEFAULT_CREASE",
     "crease_normals",
     "face_directions",
     "repaired_normals",
     "transformed",
     "weighted_normals",
 ]
+
+DEFAULT_CREASE = 40.0
+"""Angle between faces, in degrees, over which an edge is sharp; for meshes without normals."""
 
 # The largest error of a stored normal's length that counts as rounding, itself stored in float32.
 _LENGTH_TOLERANCE = 1 / 256 + 1e-6

@@ -9,7 +9,10 @@ import numpy as np
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.sim.errors import InputError
 
-__all__ = ["MAX_TRIANGLES", "MIN_TRIANGLES", "control_points", "teapot"]
+__all__ = ["DEFAULT_TRIANGLES", "MAX_TRIANGLES", "MIN_TRIANGLES", "control_points", "teapot"]
+
+DEFAULT_TRIANGLES = 10_000
+"""Triangles of the teapot, about."""
 
 MIN_TRIANGLES = 64
 MAX_TRIANGLES = 4_000_000

@@ -6,7 +6,8 @@ import blysk
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.reference.lighting import Light
-from blysk.sim.api.render import prepare_rendering, rendering_settings
+from blysk.sim.api.render import prepare_rendering
+from blysk.sim.api.settings import rendering_settings
 
 LIGHTS = ((-0.5, 0.8, 0.7), (0.9, 0.2, 0.5))
 

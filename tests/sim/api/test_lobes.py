@@ -10,8 +10,8 @@ import blysk
 from blysk.golden.reference.lobes import GGX
 from blysk.sim.api.design import design_of, verilog
 from blysk.sim.api.options import DESIGN, SCENE
-from blysk.sim.api.render import prepare_rendering, rendering_settings
-from blysk.sim.api.settings import read_settings
+from blysk.sim.api.render import prepare_rendering
+from blysk.sim.api.settings import read_settings, rendering_settings
 from blysk.sim.errors import InputError
 
 SMALL = {"size": (48, 36), "triangles": 300}

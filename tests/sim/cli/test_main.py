@@ -36,6 +36,39 @@ def test_help_has_an_example(capsys, arguments):
     assert re.search(r"Examples?:\n +blysk (render|verilog) ", output)
 
 
+QUICK = """
+import contextlib, io, sys
+import blysk
+blysk.__all__, dir(blysk)
+from blysk.sim.cli.main import main
+def loaded(*heavy):
+    return [name for name in heavy if name in sys.modules]
+with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as errors:
+    listed = main(["--help"]), main(["--version"]), main(["nothing"])
+    early = loaded("numpy", "tomllib", "blysk.golden.presets")
+    helped = [main([command, "--help"]) for command in ("render", "verilog")]
+    refused = [main(words.split()) for words in sys.argv[1:]]
+print(listed, early, helped, set(refused), loaded("amaranth", "matplotlib", "scipy", "trimesh"))
+print(errors.getvalue().count("blysk: "))
+"""
+
+
+def test_help_and_refused_options_are_quick():
+    """They load nothing that takes long to import."""
+    refused = [
+        "render teapot --size 3",
+        "render missing.obj",
+        "render teapot --position 0,0,1 --view front",
+        "render teapot --short-words",
+        "render teapot -o picture.txt",
+        "render teapot --light 0,0,0",
+        "verilog --pipes 3",
+        "verilog --testbench a --pipes 2",
+    ]
+    done = subprocess.run([sys.executable, "-c", QUICK, *refused], capture_output=True, text=True, check=True)
+    assert done.stdout == f"(0, 0, 2) [] [0, 0] {{2}} []\n{1 + len(refused)}\n", done.stdout
+
+
 def test_help_names_every_key_of_a_scene_file(capsys):
     assert main(["render", "--help"]) == 0
     (keys,) = re.findall(r"Keys of a scene file.*?\n\n", capsys.readouterr().out, re.DOTALL)

@@ -12,7 +12,8 @@ import blysk.sim.meshes.mesh
 from blysk.golden.reference.geometry import normalise
 from blysk.sim.errors import InputError
 from blysk.sim.meshes.materials import FileMaterial
-from blysk.sim.meshes.mesh import SUFFIXES, LoadedMesh, load_mesh
+from blysk.sim.meshes.mesh import LoadedMesh, load_mesh
+from blysk.sim.meshes.mesh_path import SUFFIXES
 
 from .files import (
     CORNERS,

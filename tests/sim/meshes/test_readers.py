@@ -10,7 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from blysk.sim.installation import install_extra
-from blysk.sim.meshes.mesh import SUFFIXES, load_mesh
+from blysk.sim.meshes.mesh import load_mesh
+from blysk.sim.meshes.mesh_path import SUFFIXES
 
 from .files import (
     CORNERS,

@@ -1,0 +1,7 @@
+"""Exceptions of this room."""
+
+__all__ = ["NetlistError"]
+
+
+class NetlistError(RuntimeError):
+    """Yosys could not read or write a netlist."""

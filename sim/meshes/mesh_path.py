@@ -1,0 +1,32 @@
+"""Names of mesh files: which suffixes are read."""
+
+from pathlib import Path
+
+from blysk.sim.meshes.refusal import Refused
+
+__all__ = ["SUFFIXES", "check_mesh_path"]
+
+SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
+
+
+def check_mesh_path(path: Path) -> None:
+    """Check that a path leads to a file of a known suffix; it is not opened.
+
+    Raises
+    ------
+    Refused
+        If it does not.
+    OSError
+        If the system refuses the path.
+    """
+    if not path.exists():
+        raise Refused("there is no such file", "check the path, or use the name teapot")
+    if path.is_dir():
+        raise Refused("is a folder", "name a file in it")
+    if not path.is_file():
+        raise Refused("is not a regular file", "name a mesh file")
+    if path.suffix.lower() not in SUFFIXES:
+        raise Refused(
+            f"unknown mesh type {path.suffix!r}" if path.suffix else "the name has no suffix",
+            f"use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}",
+        )
