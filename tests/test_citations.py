@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import pytest
 
+from .sources import statements
+
 PROJECT = Path(__file__).parents[1]
 THEORY = PROJECT / "docs" / "theory"
 
@@ -62,7 +64,7 @@ def files(suffix: str) -> list[Path]:
 
 def prose_of(path: Path, source: str, comments: bool = True) -> Iterator[Text]:
     """Docstrings and comments of a Python source; strings that are values are not among them."""
-    for node in ast.walk(ast.parse(source)):
+    for node in statements(source):
         if isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
             yield Text(path, node.lineno, node.value.value)
     if comments:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from .sources import statements
+
 PROJECT = Path(__file__).parents[1]
 LAYERS = ("golden", "hdl", "sim", "bench")
 # What a layer may import apart from the standard library and the layers below; None is anything.
@@ -157,7 +159,7 @@ LONG_FUNCTIONS: dict[str, str] = {}
 def long_functions(source: str) -> dict[str, int]:
     """Lines of functions that are over the limit, but for their docstrings and what stands in them."""
     found = {}
-    for node in nodes(source):
+    for node in statements(source):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             lines = node.end_lineno - node.lineno + 1
             if ast.get_docstring(node) is not None:

@@ -1,9 +1,10 @@
 # amaranth: UnusedElaboratable=no
 """Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets.
 
-The quick run has all stimuli of the default variants but `SELDOM`'s, compiled: the engine itself compares the
-first beats with Amaranth's simulator. CI has every default variant. The long run has all variants, whose
-models are compared so, too, and of default variants both simulators under every pattern of stalls.
+The quick run has all stimuli of the default variants but those of `SELDOM` and `SELDOM_STIMULI`, compiled:
+the engine itself compares the first beats with Amaranth's simulator. CI has every default variant. The long
+run has all variants, whose models are compared so, too, and of default variants both simulators under every
+pattern of stalls.
 """
 
 import inspect
@@ -29,16 +30,21 @@ SELDOM = (
     *("middle_normal", "quadratic_evaluator", "quadratic_interpolator", "gpq"),
     *("difference_setup", "linear_interpolator", "line_setup", "renormaliser", "renormalise_interpolator"),
     *("chord_interpolator", "chord_setup", "chord_values", "local_chord_interpolator", "light_products"),
-    *("arccos", "half_chord", "highlight_cosine", "specular", "value_gate", "render", "pixel_pipelines"),
+    *("arccos", "half_chord", "highlight_cosine", "highlight_gate", "power", "specular", "value_gate"),
+    *("difference_accumulator", "render", "pixel_pipelines", "framing", "motion", "draw_commands"),
+    *("mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )
-"""Units of methods and models that the default design does not have, and what is put together of others."""
+"""Units that the default design does not have: of other methods and models, of renderer, buses and boards."""
+
+SELDOM_STIMULI = ("ties", "terminator")
+"""Stimuli whose expected beats take the longest: integers of any size, and many spans."""
 
 
 CI = [pytest.mark.long, pytest.mark.ci]
 
 
-def marks_of(name, quick=True):
-    return CI[:1] if not quick else CI if name in SELDOM else []
+def marks_of(name, stimulus, quick):
+    return CI[:1] if not quick else CI if name in SELDOM or stimulus in SELDOM_STIMULI else []
 
 
 @lru_cache(maxsize=1)
@@ -68,7 +74,7 @@ def _runs():
                         name,
                         variant,
                         stimulus,
-                        marks=marks_of(name, quick),
+                        marks=marks_of(name, stimulus, quick),
                         id=f"{name}-{variant}-{stimulus}",
                     )
 

@@ -262,7 +262,7 @@ METHOD_SWEEPS = {"quadratic": (sweep, check), "chord": (chord_sweep, check_chord
 
 
 @pytest.mark.parametrize("method", METHOD_SWEEPS)
-@pytest.mark.parametrize("model", ["cosquad", "cosquad_lin"])
+@pytest.mark.parametrize("model", ["cosquad", pytest.param("cosquad_lin", marks=pytest.mark.long)])
 @pytest.mark.parametrize("exponent", MEASURED)
 def test_arithmetic_error(exponent, model, method):
     """Spans to 20 degrees, or the widest of the chord method, 1 to 64 pixels, 4e5 pixels a case."""

@@ -249,6 +249,8 @@ def pixels_of(design, spans, constants):
     return list(zip(*(column.astype(int).tolist() for column in columns), strict=True))
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("late_cycle", "materials", "method"),
     [

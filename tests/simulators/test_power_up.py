@@ -36,7 +36,7 @@ PICTURE = (32 * 24,)
 @pytest.mark.skipif(missing_tool("icarus") is not None, reason=str(missing_tool("icarus")))
 @pytest.mark.parametrize(
     ("name", "variant"),
-    [case if case == QUICK else pytest.param(*case, marks=pytest.mark.long) for case in CASES],
+    [pytest.param(*case, marks=[pytest.mark.long] + [pytest.mark.ci] * (case == QUICK)) for case in CASES],
 )
 def test_one_cycle_of_reset_is_enough(name, variant, tmp_path):
     record, rng = RECORDS[name], np.random.default_rng(2026)

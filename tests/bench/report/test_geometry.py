@@ -24,6 +24,7 @@ def cases():
     return {method: measure_cases(method, True) for method in ("chord", "renormalise")}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["chord", "renormalise"])
 def test_cases(cases, method):
     """Coverage is exact; only slivers are off, and only opposite normals come to 0."""

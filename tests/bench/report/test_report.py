@@ -195,6 +195,8 @@ def run(monkeypatch, plain_section):
     return lambda *arguments: CliRunner().invoke(command, [str(argument) for argument in arguments])
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_command(run, tmp_path):
     folder = tmp_path / "report"
     result = run(folder, "--jobs", 1, "--quick")

@@ -41,7 +41,7 @@ from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
 
-QUICK = ("quotient", "chord", "chord-local")
+QUICK = ("quotient", "chord-local")
 NAMES = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in METHODS]
 FROM_SPANS = [group for group in GROUPS if group != STREAM_GROUP]
 

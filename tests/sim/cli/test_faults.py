@@ -118,7 +118,13 @@ def test_full_temporary_folder(cache, small_disk, monkeypatch):
     assert left_in(cache, small_disk) == before
 
 
-@pytest.mark.parametrize(("at", "value"), [(4, b"\1"), (18, b"\xf7\0")], ids=["32 bits", "other processor"])
+@pytest.mark.parametrize(
+    ("at", "value"),
+    [
+        pytest.param(4, b"\1", marks=pytest.mark.long, id="32 bits"),
+        pytest.param(18, b"\xf7\0", id="other processor"),
+    ],
+)
 def test_model_of_another_machine(cache, at, value):
     """A library with a true checksum that is for another kind of processor is built again."""
     assert scaled() == THREE

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("folder")
 def turned(tmp_path_factory):
     """One turntable with its figures: its folder and what it printed."""
     folder = tmp_path_factory.mktemp("turned")
-    arguments = ["render", *TINY, "--frames", "5", "--jobs", "2", "--method", "linear"]
+    arguments = ["render", *TINY, "--frames", "5", "--jobs", "1", "--method", "linear"]
     with contextlib.redirect_stdout(io.StringIO()) as output:
         assert main([*arguments, "-o", str(folder / "a.gif"), "--json", str(folder / "a.json")]) == 0
     return folder, output.getvalue()

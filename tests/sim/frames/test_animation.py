@@ -229,7 +229,7 @@ def scheduler():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("who", ["processes", "cluster"])
+@pytest.mark.parametrize("who", [pytest.param("processes", marks=pytest.mark.ci), "cluster"])
 def test_frames_are_those_drawn_singly(animation, cameras, singly, request, who):
     """By two workers, in an order of its own; no process is left."""
     order = [3, 0, 4, 2, 1]

@@ -98,6 +98,8 @@ def test_without_dask(monkeypatch):
         check_address("tcp://127.0.0.1:8786")
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_a_cluster_works():
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     with (

@@ -1,0 +1,22 @@
+"""Python sources, parsed: what tests of the text share."""
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+
+__all__ = ["statements"]
+
+_BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
+
+
+@cache
+def statements(source: str) -> tuple[ast.AST, ...]:
+    """The module and its statements at any depth, without their expressions, which are most of the nodes."""
+
+    def walk(node: ast.AST) -> Iterator[ast.AST]:
+        yield node
+        for block in _BLOCKS:
+            for inner in getattr(node, block, ()):
+                yield from walk(inner)
+
+    return tuple(walk(ast.parse(source)))
