@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 
 from markdown import table
-from scipy.optimize import brentq
 
 from blysk.bench.report import phong_blinn
 from blysk.bench.report.cosine_quadratic import PUBLISHED, coefficients, errors, slopes
@@ -99,27 +98,13 @@ def _phong_blinn() -> str:
     return table(["L and V are", "way", "operations", "fewer than the first"], rows, 2)
 
 
-def _half_angle(axis: int, degrees: float, exponent: float) -> float:
-    """Angle from H, along x or y of the light's frame, at which ``(R·V)^n`` is 1/2; L and V are 2 a apart."""
-    sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-
-    def excess(gamma: float) -> float:
-        normal = [0.0, 0.0, math.cos(gamma)]
-        normal[axis] = math.sin(gamma)
-        to_light, to_viewer = (normal[0] * s + normal[2] * cosine for s in (sine, -sine))
-        mirrored = 2 * to_light * to_viewer - (cosine**2 - sine**2)
-        return max(mirrored, 0.0) ** exponent - 0.5
-
-    return brentq(excess, 0, math.pi / 2)
-
-
 def _phong_widths() -> str:
     rows = []
     for degrees in (0, 15, 30, 45, 60, 75):
         rows.append([f"{2 * degrees}", f"{4 * math.cos(math.radians(degrees)) ** 2:.3f}"])
-        for axis in (0, 1):
+        for way in ((1, 0), (0, 1)):
             for exponent in (10, 100, 1000):
-                gamma = _half_angle(axis, degrees, exponent)
+                gamma = phong_blinn.half_angle(way, degrees, exponent)
                 rows[-1].append(f"{math.log(0.5) / math.log(math.cos(gamma)) / exponent:.3f}")
     ways = [f"{way}, n = {n}" for way in ("along", "across") for n in (10, 100, 1000)]
     return table(["L to V, degrees", "4 cos^2 a", *ways], rows, 0)

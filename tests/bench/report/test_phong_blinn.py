@@ -1,10 +1,13 @@
 """Ways of Phong and Blinn against each other, counts by hand, and the section against its results."""
 
+import base64
+import io
 import json
 import math
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from blysk.bench.accuracy import scene_for
 from blysk.bench.report import phong_blinn
@@ -14,11 +17,15 @@ from blysk.bench.report.phong_blinn import (
     WAYS,
     exponents,
     frame_times,
-    hardware_cycles,
+    half_angle,
+    hardware_cost,
+    hardware_frames,
     operations,
+    picture,
     section,
     shading_times,
     tasks,
+    widths,
 )
 from blysk.bench.store import Task
 from blysk.golden.reference.lighting import Light, Material, intensity
@@ -92,12 +99,45 @@ def test_times():
     assert min(frame["raster"], frame["phong"], frame["blinn"]) > 0
 
 
-@pytest.mark.long
-def test_hardware_cycles():
-    """A pixel a cycle at most."""
-    found = hardware_cycles("cosquad", 200, 64, 48)
-    assert found["cycles"] > found["pixels"] >= render(scene_for(teapot(200), 50, 64, 48)).mask.sum()
+def test_half_angles_are_those_of_the_formulas():
+    """From R·V itself, against sin^2 (psi/2) = sin^2 gamma times 1 along and cos^2 a across."""
+    for degrees in (0, 20, 50, 70):
+        for n in (10, 1000):
+            sine = math.sin(math.acos(0.5 ** (1 / n)) / 2)
+            assert half_angle((1, 0), degrees, n) == pytest.approx(math.asin(sine), abs=1e-9)
+            across = math.asin(sine / math.cos(math.radians(degrees)))
+            assert half_angle((0, 1), degrees, n) == pytest.approx(across, abs=1e-9)
+    # R·V is over half everywhere across.
+    assert math.isnan(half_angle((0, 1), 85, 10))
 
+
+def test_widths():
+    found = json.loads(json.dumps(widths((10, 1000))))
+    assert np.allclose(found["along"]["1000"], 4, atol=1e-3)
+    expected = 4 * np.cos(np.radians(found["degrees"])) ** 2
+    assert np.allclose(found["across"]["1000"], expected, atol=1e-3)
+    assert found["across"]["10"][-1] is None
+    assert found["outline"][0] < found["outline"][18] / 1.9
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_hardware_frames(model):
+    """Every pixel of the simulated frames, a pixel a cycle at most."""
+    (found,) = hardware_frames(model, 200, 64, 48, (50,))
+    shown = render(scene_for(teapot(200), 50, 64, 48)).mask.sum()
+    assert found["cycles"] > found["pixels"] >= shown
+    assert found["lsb"] <= found["bound_lsb"] < 0.65
+    assert found["rounded"] > 0.99
+    drawn = picture(model, 25, 48)
+    image = np.asarray(Image.open(io.BytesIO(base64.b64decode(drawn["png"]))))
+    assert image.shape == (48, 48)
+    assert image.max() > 150
+    assert drawn["lsb"] < 0.6
+    assert hardware_cost(model)["multipliers"] == {"blinn": 16, "phong": 17}[model]
+
+
+MODELS = (("blinn", 0), ("phong", 2000))
 
 FRAMES = [
     # Triangles, pixels, seconds of geometry, of Phong and of Blinn, cycles.
@@ -109,7 +149,7 @@ FRAMES = [
 @pytest.fixture(scope="module")
 def made():
     """The section from counts that are real and times that are not."""
-    chosen, found = [Task(exponents)], [exponents()]
+    chosen, found = [Task(exponents), Task(widths)], [exponents(), widths((10, 1000))]
     for local in (False, True):
         for way in WAYS:
             chosen.append(Task(operations, {"way": way, "local": local}))
@@ -122,14 +162,43 @@ def made():
         found.append(
             {"triangles": triangles, "pixels": pixels, "raster": raster, "phong": phong, "blinn": blinn}
         )
-        for model, more in (("cosquad", 0), ("blinn_product", 50)):
-            chosen.append(Task(hardware_cycles, {"model": model, **settings}))
-            found.append({"triangles": triangles, "pixels": pixels, "cycles": cycles + more})
+        for model, more in MODELS:
+            chosen.append(Task(hardware_frames, {"model": model, **settings, "exponents": [10, 50]}))
+            run = {"triangles": triangles, "pixels": pixels, "cycles": cycles + more, "engine": "cxxrtl"}
+            run |= {"lsb": 0.52, "bound_lsb": 0.58, "border_lsb": 0.6, "rounded": 0.998}
+            found.append([run | {"cycles": 1}, run])
+    names = ("multipliers", "cells", "register_bits", "memory_bits", "latency")
+    for model, more in MODELS:
+        chosen.append(Task(hardware_cost, {"model": model}))
+        found.append(dict.fromkeys(names, 16 + more // 2000))
+    buffer = io.BytesIO()
+    Image.new("L", (4, 4)).save(buffer, "png")
+    for _ in range(3):
+        chosen.append(Task(picture, {}))
+        found.append({"png": base64.b64encode(buffer.getvalue()).decode(), "lsb": 0.51})
     return section(chosen, json.loads(json.dumps(found)))
 
 
+def part(made, name):
+    (found,) = (of for of in made.parts if of.name == name)
+    return found
+
+
+def test_hardware_table(made):
+    rows = part(made, "phong-blinn-hardware").records()
+    assert [row["model"] for row in rows] == ["blinn", "blinn", "phong", "phong"] * 2
+    assert {row["multipliers"] for row in rows if row["model"] == "phong"} == {17}
+    said = made.text[2]
+    assert "`phong` takes 17 multipliers and 4.080 cycles a pixel at 1,000,500 triangles" in said
+    assert "0.52 LSB, within a bound of 0.58" in said
+    assert "from `4 cos^2 a` by up to 0.0" in made.text[1]
+    for name in ("phong-blinn-widths", "phong-blinn-pictures"):
+        assert part(made, name).svg.startswith("<?xml")
+    assert part(made, "phong-blinn-pictures").svg.count("data:image/png;base64") == 3
+
+
 def test_operations_table(made):
-    rows = {(row["L and V are"], row["way"]): row for row in made.parts[1].records()}
+    rows = {(row["L and V are"], row["way"]): row for row in part(made, "phong-blinn-operations").records()}
     assert len(rows) == 6
     row = rows["the frame's", "Blinn"]
     assert row["fewer operations than Phong, vector R"] == pytest.approx(1 - 17 / 24, abs=1e-3)
@@ -137,13 +206,13 @@ def test_operations_table(made):
     near = rows["each pixel's", "Blinn"]
     assert near["fewer operations than Phong, vector R"] == pytest.approx(1 - 29 / 24)
     assert rows["each pixel's", "Phong, vector R"]["fewer operations than Phong, vector R"] is None
-    grades = [grade for line in made.parts[1].grades for grade in line if grade]
+    grades = [grade for line in part(made, "phong-blinn-operations").grades for grade in line if grade]
     assert grades == ["good", "bad"]
     assert FEWER_OPERATIONS[0] < 1 - 17 / 24 < FEWER_OPERATIONS[1]
 
 
 def test_frames_table(made):
-    first, last = made.parts[2].records()
+    first, last = part(made, "phong-blinn-frames").records()
     assert first["less time with Blinn, frame"] == pytest.approx(1 - 16 / 18)
     assert first["less time with Blinn, shading"] == pytest.approx(0.25)
     assert first["share of geometry"] == pytest.approx(10 / 16)
@@ -155,9 +224,10 @@ def test_frames_table(made):
 
 
 def test_tasks():
-    for quick, largest, models in ((True, 10_000, 1), (False, 1_000_000, 2)):
+    for quick, largest in ((True, 10_000), (False, 1_000_000)):
         chosen = tasks(quick)
         assert {task.function for task in chosen if task.timed} == {shading_times, frame_times}
-        frames = [task.settings for task in chosen if task.function is hardware_cycles]
+        frames = [task.settings for task in chosen if task.function is hardware_frames]
         assert max(settings["triangles"] for settings in frames) == largest
-        assert len({settings["model"] for settings in frames}) == models
+        assert [settings["model"] for settings in frames[:2]] == ["blinn", "phong"]
+        assert sum(task.function is picture for task in chosen) == 3
