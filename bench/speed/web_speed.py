@@ -122,7 +122,7 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
         known = page.evaluate("() => blysk.site.designs")
         meshes = page.evaluate("() => Object.keys(blysk.site.meshes)")
         for name in designs or known:
-            for mesh in meshes if name == "chord-cosquad" else meshes[:1]:
+            for mesh in meshes if name == "quotient-blinn" else meshes[:1]:
                 settings = {"design": known[name], "mesh": mesh, "frames": frames}
                 before = _browser_seconds()
                 row = page.evaluate(_SCRIPT, settings)

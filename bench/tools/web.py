@@ -42,7 +42,7 @@ from blysk.bench.tools.web_data import (
     tables,
 )
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.presets import LOBES, MODELS
+from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS
 from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
@@ -60,8 +60,8 @@ __all__ = [
 ]
 
 
-TABLES = {name: LOBES[name] for name in ("blinn", "ggx")}
-"""Models with a table that the page's script can make."""
+TABLES = ("blinn", "ggx")
+"""Models of N·H with a table that the page's script can make."""
 
 _MARK = "site.json"
 
@@ -205,7 +205,11 @@ def write_site(
         .get_template("web/index.html")
         .render(
             site=_site(designs, meshes),
-            models=[model for model in LOBES | MODELS if any(d["model"] == model for d in designs.values())],
+            models=[
+                model
+                for model in LOBES | MIRROR_LOBES | MODELS
+                if any(d["model"] == model for d in designs.values())
+            ],
             version=version_of("blysk"),
             documents={name: DOCUMENTS[name] for name in folders or {}},
             has_report=report is not None,
@@ -266,6 +270,7 @@ def _site(designs: Mapping[str, Mapping[str, Any]], meshes: Mapping[str, Any]) -
         "rivalModel": rivals[0] if rivals else None,
         "mostExponent": MAX_EXPONENT,
         "rough": ["ggx"],
+        "mirrored": [*MIRROR_LOBES],
     }
 
 
@@ -324,8 +329,9 @@ class _Design(click.ParamType):
         method, _, model = value.partition("/")
         if method not in SERVED:
             raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(SERVED)}")
-        if model not in MODELS | TABLES:
-            raise InputError(f"--design {value}", "unknown model", f"use one of {', '.join(MODELS | TABLES)}")
+        served = (*TABLES, *MIRROR_LOBES) if METHODS[method].TAKES_VECTORS else (*MODELS, *TABLES)
+        if model not in served:
+            raise InputError(f"--design {value}", "unknown model", f"use one of {', '.join(served)}")
         return method, model
 
 

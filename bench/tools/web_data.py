@@ -12,6 +12,7 @@ import numpy as np
 
 from blysk.bench import accuracy
 from blysk.bench.report.cosine_quadratic_figures import sphere
+from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import (
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
@@ -21,13 +22,17 @@ from blysk.golden.frame_constants import (
     FrameConstants,
 )
 from blysk.golden.frames.cut import cut_by_angle, cut_spans
-from blysk.golden.frames.prepare import spans_for, with_tables
+from blysk.golden.frames.local import line_ends
+from blysk.golden.frames.prepare import quantise_spans, spans_for, with_tables
+from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import Design, Spans
-from blysk.golden.presets import LOBES, METHODS, MODELS, preset
+from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
@@ -69,6 +74,7 @@ __all__ = [
     "spans_of",
     "streams_of",
     "tables",
+    "with_vectors",
 ]
 
 
@@ -78,10 +84,14 @@ WIDTH, HEIGHT = 320, 240
 BANDS = (100, MAX_EXPONENT)
 """Exponents for which spans are cut; a frame uses the smallest that is at least its own exponent."""
 
-SERVED = tuple(name for name, of in METHODS.items() if not (of.TAKES_VALUES or of.TAKES_VECTORS))
-"""Methods of modules. Methods whose spans depend on the light are left out: the light moves."""
+SERVED = tuple(name for name, of in METHODS.items() if not of.TAKES_VALUES)
+"""Methods of modules. Those whose spans bring values of each light are left out: the light moves. Vectors are
+turned into its frame by the page."""
 
-DESIGNS = (*(pair for pair in accuracy.DESIGNS if pair[0] in SERVED), ("chord", "ggx"))
+DESIGNS = (
+    *(pair for pair in accuracy.DESIGNS if pair[0] in SERVED),
+    *(("quotient", "ggx"), ("chord", "ggx")),
+)
 """Method and model of each module."""
 
 ROUGHNESSES = tuple(round(step / 100, 2) for step in range(10, 101))
@@ -92,7 +102,7 @@ BACKGROUND = "#1a1c20"
 START = {
     "mesh": "teapot",
     "view": 0,
-    "method": "chord",
+    "method": "quotient",
     "model": "blinn",
     "reference": "method",
     "compare": "exact",
@@ -128,7 +138,7 @@ REFERENCES = {
     "total": {
         "title": "exact normals, exact model",
         "text": "The exact normal of every pixel, with the model that the design stands for: Blinn's power, "
-        "or ggx for ggx.",
+        "or its own for phong and ggx.",
         "curve": "exact",
         "model": "blinn",
     },
@@ -276,7 +286,8 @@ def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raste
     """Spans of a view, before and after the rounding of their normals, for a light that moves.
 
     They are cut for the light of `START`. For a method with a span limit they are cut to the widest angle of
-    a lit span, as the highlight may be anywhere.
+    a lit span, as the highlight may be anywhere. Spans of a method that takes vectors have the ends of the
+    true line, in the scene's frame; see `with_vectors`.
 
     Parameters
     ----------
@@ -292,7 +303,25 @@ def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raste
     if design.span_limit is not None:
         raster, _ = cut_by_angle(raster, design.span_limit.angle(exponent))
     cut, _ = cut_spans(scene, raster, design)
-    return cut, spans_for(scene, cut, design)
+    if not design.takes_vectors:
+        return cut, spans_for(scene, cut, design)
+    left, right = quantise_line(*line_ends(cut))
+    return cut, replace(quantise_spans(cut, scene.mesh.material), normal_left=left, normal_right=right)
+
+
+def with_vectors(spans: Spans, scene: Scene, design: Design) -> Spans:
+    """Spans of `spans_of` for the light of a scene: of a method that takes vectors with these.
+
+    The page's script computes the same, a product and a sum at a time.
+    """
+    if not design.takes_vectors:
+        return spans
+    axes = vector_axes(scene, design)
+    ends = []
+    for codes in (spans.normal_left, spans.normal_right):
+        x, y, z = (component[:, np.newaxis] for component in codes.astype(np.float64).T)
+        ends.append(x * axes[:, 0] + y * axes[:, 1] + z * axes[:, 2])
+    return replace(spans, vectors=SpanVectors.quantise(*ends, spans.length))
 
 
 def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
@@ -317,7 +346,7 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     found: list[str] = []
     streams: dict[str, list[int]] = {}
     for method in methods:
-        design = preset(method, "cosquad")
+        design = preset(method, accuracy.model_of(method))
         streams[method] = []
         for exponent in BANDS:
             cut, spans = spans_of(mesh, view, exponent, design)
@@ -346,7 +375,8 @@ def module_of(method: str, model: str) -> dict[str, Any]:
     dict
         ``wasm``, compressed by zlib, in base 64, and its ``bytes``; ``ports``: see `ports_of`;
         ``probes``: those of `probes_of`; ``stages``: names, titles and ages at which a pixel comes
-        and goes; ``lobe``: see `lobe_of`.
+        and goes; ``lobe``: see `lobe_of`; ``vectors``: components of the vectors that spans bring, or
+        ``None``.
     """
     design = design_of(method, model)
     component = ObservedPipeline(design)
@@ -369,6 +399,7 @@ def module_of(method: str, model: str) -> dict[str, Any]:
         ],
         "stages": [dict(zip(("name", "title", "from", "to"), stage, strict=True)) for stage in stages],
         "lobe": lobe_of(design),
+        "vectors": list(design.vector_spans.components) if design.takes_vectors else None,
     }
 
 
@@ -378,8 +409,9 @@ def lobe_of(design: Design) -> dict[str, Any] | None:
     Returns
     -------
     dict
-        ``model``: see `model_table`; ``knots``: arguments of the entries; ``parameter``: name of the model's
-        parameter, and ``parameters``, its possible values; ``exponents`` and ``thresholds`` of
+        ``model``: see `model_table`; ``entries`` and ``middles``: cosines at the entries and in the middle of
+        steps; ``border``: entry at which the second part of a table begins, or ``None``; ``parameter``: name
+        of the model's parameter, and ``parameters``, its possible values; ``exponents`` and ``thresholds`` of
         `FrameConstants` for each of them.
     """
     if not design.loads_tables:
@@ -392,9 +424,13 @@ def lobe_of(design: Design) -> dict[str, Any] | None:
     (material,) = scene.materials
     plain = FrameConstants.of(scene)
     found = [with_tables([plain], [replace(material, **{name: of})], design)[0] for of in parameters]
+    entries, middles = (cosines.tolist() for cosines in lobe.cosines)
+    two = isinstance(lobe, QuotientLobe) and lobe.parts == 2
     return {
         "model": model_table(design.model or ""),
-        "knots": np.minimum(lobe.knots, 1 - 2.0**-40).tolist(),
+        "entries": entries,
+        "middles": middles,
+        "border": len(lobe.knots) - 1 if two else None,
         "parameter": name,
         "parameters": list(parameters),
         "exponents": [of.exponent for of in found],
@@ -404,12 +440,15 @@ def lobe_of(design: Design) -> dict[str, Any] | None:
 
 @cache
 def model_table(model: str) -> dict[str, Any]:
-    """Values of a reflection model in float64: its ``kind``, and slopes or scales for exponents 1 to 1000."""
+    """Values of a reflection model in float64: its ``kind``, and slopes or scales for exponents 1 to 1000.
+
+    A power has ``mirror``: whether it is one of R·V.
+    """
     exponents = range(1, MAX_EXPONENT + 1)
-    unit = (MODELS | LOBES)[model]
+    unit = (MODELS | LOBES | MIRROR_LOBES)[model]
     reflection = unit.model
     if isinstance(reflection, PowerModel):
-        return {"kind": "power"}
+        return {"kind": "power", "mirror": reflection.MIRROR}
     if reflection is GGX:
         return {"kind": "ggx", "parameter": "roughness"}
     if isinstance(reflection, PolynomialModel):
@@ -434,6 +473,11 @@ def tables() -> dict[str, Any]:
         "lobe": LOBE_ADDRESS,
         "threshold": THRESHOLD_ADDRESS,
         "done": int(StopReason.DONE),
+        "vector": {
+            "fraction": QuotientSpans.COMPONENT_FORMAT.fraction_bits,
+            "margin": MARGIN,
+            "one": QuotientSpans.ONE,
+        },
     }
 
 

@@ -46,7 +46,8 @@ class Probe:
         ``cosine`` (N·L), ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H); ``product`` (the
         specular unit's slope k times 1 - N·H), ``base``, ``base_2``, ``base_4``, ``base_8`` (powers of the
         base); ``diffuse``, ``specular``; ``red_diffuse``, ``red_specular``, ``red`` in LSB, not limited;
-        ``r``, ``g``, ``b`` in LSB, limited. Empty for flags, columns and the increments of a sum.
+        ``r``, ``g``, ``b`` in LSB, limited. Empty for flags, columns, the increments of a sum, and a place in
+        a lobe's table.
     unit : float
         Value of the word that stands for 1 of the exact quantity.
     """
@@ -208,8 +209,11 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
     interpolator, light = _unit(fragment, "interpolator"), _unit(fragment, "light_0")
     operands = interpolator.o.payload[0]
     yield number("cosine", "N·L", "interpolator", operands.cosine, 0, "cosine", one_squared)
-    is_cosine = design.interpolator.operand == "cosine"
-    title, exact = ("N·H", "highlight_cosine") if is_cosine else ("1 − N·H", "one_minus_cosine")
+    title, exact = {
+        "cosine": ("N·H", "highlight_cosine"),
+        "one_minus_cosine": ("1 − N·H", "one_minus_cosine"),
+        "place": ("place in the table", ""),
+    }[design.interpolator.operand]
     yield number("highlight", title, "interpolator", operands.highlight, 0, exact, one_squared)
     if design.gate:
         gated = light.i.payload.gated

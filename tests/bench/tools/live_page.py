@@ -22,7 +22,8 @@ def has_compiler():
 
 WIDTHS = {"desktop": (1280, 800), "phone": (375, 740)}
 
-DESIGNS = [("chord", "cosquad"), ("chord", "exp"), ("linear", "cosquad"), ("chord", "ggx")]
+DESIGNS = [("quotient", "blinn"), ("quotient", "phong"), ("chord", "cosquad"), ("chord", "exp")]
+DESIGNS += [("linear", "cosquad"), ("chord", "ggx")]
 
 VIEWS = {"teapot": 2, "square": 1}
 
@@ -44,6 +45,12 @@ def change(page, control, value):
             str(value),
         )
     settle(page)
+
+
+def use(page, method, model):
+    """Choose a design of the page."""
+    change(page, "method", method)
+    change(page, "model", model)
 
 
 def state_of(page):
@@ -77,7 +84,8 @@ def prepared(state):
     exponent = web_data.BANDS[-1] if state["model"] == "ggx" else state["exponent"]
     band = next(most for most in web_data.BANDS if exponent <= most)
     cut, spans = web_data.spans_of(state["mesh"], state["view"], band, design)
-    return web_data.scene_of(state), design, PreparedFrame(cut, cut, 0, spans)
+    scene = web_data.scene_of(state)
+    return scene, design, PreparedFrame(cut, cut, 0, web_data.with_vectors(spans, scene, design))
 
 
 UNITS = {}

@@ -4,6 +4,8 @@ import base64
 import json
 import os
 import re
+import shutil
+import subprocess
 import zlib
 from importlib import resources
 from pathlib import Path
@@ -15,9 +17,12 @@ from click.testing import CliRunner
 
 from blysk.bench.tools import web, web_data
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import intensity
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.probes import probes_of
 from blysk.sim.errors import InputError
@@ -27,7 +32,7 @@ from ..reader import Reader
 
 pytest.importorskip("ziglang", reason="ziglang is not installed")
 
-DESIGNS = [("chord", "cosquad"), ("linear", "exp")]
+DESIGNS = [("quotient", "blinn"), ("chord", "cosquad"), ("linear", "exp")]
 
 
 def unpacked(data):
@@ -83,7 +88,7 @@ def test_extreme_codes_are_kept():
 
 
 def test_streams_of_a_view():
-    methods = ["chord", "linear", "quadratic", "angular"]
+    methods = ["chord", "linear", "quadratic", "angular", "quotient"]
     found = web_data.streams_of("teapot", 0, methods)
     assert json.loads(json.dumps(found)) == found
     axes = np.array(found["axes"])
@@ -94,6 +99,15 @@ def test_streams_of_a_view():
         method: [len(unpacked(base64.b64decode(found["data"][k]))[0]["x"]) for k in numbers]
         for method, numbers in found["streams"].items()
     }
+    # No span of quotient is cut for an exponent; their ends are those of the true line, the longer one as 1.
+    first, second = found["streams"]["quotient"]
+    assert first == second
+    codes, _ = unpacked(base64.b64decode(found["data"][first]))
+    lengths = [
+        np.linalg.norm([codes[f"normal_{side}.{c}"] for c in range(3)], axis=0) for side in ("left", "right")
+    ]
+    np.testing.assert_allclose(np.maximum(*lengths), (1 << 22) - 1, atol=2)
+    assert np.minimum(*lengths).min() < 0.999 * (1 << 22)
     for k, exponent in enumerate(web_data.BANDS):
         design = preset("chord", "cosquad")
         frame = prepare(web_data.scene_of(web_data.START | {"exponent": exponent}), design)
@@ -116,6 +130,121 @@ def test_addresses_are_those_of_the_write_port():
             beats += [(base + first + k, code & 0x3FFFF) for k, code in enumerate(codes)]
     writes = constants.writes()
     assert beats == list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))
+
+
+# The arithmetic of the page's script, without a browser.
+
+
+def by_script(call, **given):
+    """Value of an expression by the script's core, in which ``given`` has these names."""
+    folder = resources.files("blysk.bench.tools").joinpath("templates", "web")
+    script = folder.joinpath("core.js").read_text(encoding="utf-8")
+    names = f"const {{{', '.join(given)}}} = JSON.parse(require('fs').readFileSync(0, 'utf8'));"
+    text = f"{script}\nconst core = blyskCore();\n{names}\nconsole.log(JSON.stringify({call}));"
+    found = subprocess.run(
+        ["node", "-e", text], input=json.dumps(given), capture_output=True, text=True, check=True
+    )
+    return json.loads(found.stdout)
+
+
+def lights():
+    """Directions: any, at the viewer, behind, at right angles, and along axes."""
+    rng = np.random.default_rng(5)
+    viewer = web_data.scene_of(web_data.START).camera.viewer
+    across = np.cross(viewer, [0, 1, 0])
+    return [
+        *rng.normal(size=(12, 3)),
+        viewer,
+        -viewer,
+        across,
+        -viewer + 1e-7 * across,
+        *np.eye(3),
+        *-np.eye(3),
+    ]
+
+
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
+
+
+@needs_node
+@pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_vectors_and_constants_of_quotient_are_those_of_python(model, monkeypatch):
+    """To the bit, in the frame of every light: spans of a pixel and long ones, directions of L, tables."""
+    monkeypatch.setattr(web_data, "MAX_EXPONENT", 30)
+    design = web_data.design_of("quotient", model)
+    _, spans = web_data.spans_of("square", 3, 100, design)
+    some = spans[:: max(len(spans) // 150, 1)]
+    some.length[::7] = 1
+    codes = {
+        f"normal_{side}.{c}": getattr(some, f"normal_{side}")[:, c].tolist()
+        for side in ("left", "right")
+        for c in range(3)
+    }
+    codes["length"] = some.length.tolist()
+    states = [
+        web_data.START | {"mesh": "square", "view": 3, "model": model, "direction": list(light)}
+        for light in lights()
+    ]
+    settings = [
+        {**state, "color": [1, 128 / 255, 0.2], "light": [1, 1, 1], "exponent": 1 + k}
+        for k, state in enumerate(states)
+    ]
+    scenes = [
+        web_data.scene_of(state | {"color": "#ff8033", "exponent": own["exponent"]})
+        for state, own in zip(states, settings, strict=True)
+    ]
+    found, tables = by_script(
+        """[settings.map((own) => {
+            const frame = core.lightFrame(core.normalised(own.direction), viewer);
+            const vectors = core.vectorsOf(codes, 0, codes.length.length, components, frame, tables.vector);
+            const constants = core.constantsOf(own, viewer, tables, lobe, components);
+            return {...constants, vectors: vectors.map((words) => [...words])};
+        }), exponents.map((exponent) => core.tableOf(lobe, exponent))]""",
+        settings=settings,
+        codes=codes,
+        viewer=scenes[0].camera.viewer.tolist(),
+        components=list(design.vector_spans.components),
+        tables=web_data.tables(),
+        lobe=web_data.lobe_of(design),
+        exponents=[1, 2, 100, 999, 1000],
+    )
+    for scene, of_script in zip(scenes, found, strict=True):
+        start, step, exponent = tuple(web_data.with_vectors(some, scene, design).vectors)
+        np.testing.assert_array_equal(of_script["vectors"], [*start.T, *step.T, exponent])
+        (constants,) = constants_of(scene, design)
+        for name in ("direction", "halfway", "diffuse", "specular"):
+            np.testing.assert_array_equal(of_script[name], getattr(constants, name)[0], err_msg=name)
+        np.testing.assert_array_equal(of_script["lobe"], constants.lobe.values.codes)
+    for exponent, codes in zip((1, 2, 100, 999, 1000), tables, strict=True):
+        np.testing.assert_array_equal(codes, design.specular.table(exponent).values.codes)
+
+
+@needs_node
+def test_phong_in_float64_is_that_of_golden():
+    rng = np.random.default_rng(6)
+    normals = normalise(rng.normal(size=(400, 3)))
+    states = [web_data.START | {"direction": list(direction), "exponent": 9} for direction in lights()]
+    color = [int(web_data.START["color"][k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    scenes = [web_data.scene_of(state) for state in states]
+    viewer = scenes[0].camera.viewer
+    found = by_script(
+        """states.map((state) => {
+            const own = {...state, color, light: [1, 1, 1]};
+            const shade = core.shader(own, viewer, model, false);
+            const all = core.reference(Float64Array.from(normals.flat()), own, viewer, model, false);
+            return [[...all], normals.flatMap((normal) => [...shade(normal).color])];
+        })""",
+        states=states,
+        color=color,
+        viewer=viewer.tolist(),
+        model=web_data.model_table("phong"),
+        normals=normals.tolist(),
+    )
+    for scene, (limited, whole) in zip(scenes, found, strict=True):
+        given = scene.materials[0], scene.lights, scene.ambient_light, viewer, REFLECTION_MODELS["phong"]
+        exact = intensity(normals, *given)
+        np.testing.assert_allclose(limited, np.clip(exact, 0, 1).ravel() * 255, atol=1e-9)
+        np.testing.assert_allclose(whole, exact.ravel(), atol=1e-12)
 
 
 # Names of words that the page's script lists by hand.
@@ -191,7 +320,8 @@ def work():
 @pytest.fixture(scope="module")
 def results(work):
     module = {"wasm": "eJw=", "bytes": 65_432, "ports": {}, "probes": [{"exact": "</script>"}], "stages": []}
-    view = {"axes": np.eye(3).tolist(), "streams": {"chord": [0, 1], "linear": [0, 0]}, "data": ["a", "b"]}
+    streams = {"quotient": [0, 0], "chord": [0, 1], "linear": [0, 0]}
+    view = {"axes": np.eye(3).tolist(), "streams": streams, "data": ["a", "b"]}
     return [module if task.function is web_data.module_of else view for task in work]
 
 
@@ -213,8 +343,9 @@ def test_files_of_the_site(site):
     *lower, highest = web_data.BANDS
     assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
     data = json.loads(page.texts["site"])
-    assert list(data["designs"]) == ["chord-cosquad", "linear-exp"]
-    assert data["start"] == {**web_data.START, "method": "chord", "model": "cosquad"}
+    assert list(data["designs"]) == ["quotient-blinn", "chord-cosquad", "linear-exp"]
+    assert data["start"] == web_data.START
+    assert data["mirrored"] == ["phong"]
     assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2]
     for mesh in data["meshes"].values():
         for view in mesh["views"]:
@@ -235,7 +366,7 @@ def test_nothing_is_remote(site):
 
 def test_an_earlier_site_is_replaced(site, work, results):
     page = (site / "index.html").read_text()
-    web.write_site(site, work[:1] + work[2:3], results[:1] + results[2:3])
+    web.write_site(site, work[1:2] + work[3:4], results[1:2] + results[3:4])
     assert (site / "index.html").read_text() != page
     assert not (site / "modules" / "linear-exp.js").exists()
     assert not (site / "spans" / "square-0-0.js").exists()
@@ -374,7 +505,8 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
     monkeypatch.setattr(web, "chosen_tasks", lambda quick: [])
     monkeypatch.setattr(web, "measured", lambda chosen, jobs, count: [plain_section])
     monkeypatch.setattr(web, "measure_all", made)
-    found = run("-o", tmp_path / "site", "--design", "chord/cosquad", "--design", "linear/exp")
+    chosen = [word for design in DESIGNS for word in ("--design", "/".join(design))]
+    found = run("-o", tmp_path / "site", *chosen)
     assert found.exit_code == 0, found.output
     report = json.loads((tmp_path / "site" / "report" / "report.json").read_text())
     assert report["quick"]
@@ -396,6 +528,10 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
         (
             ["--design", "chord/phong"],
             f"--design chord/phong: unknown model; use one of {next(iter(MODELS))}",
+        ),
+        (
+            ["--design", "quotient/cosquad"],
+            "--design quotient/cosquad: unknown model; use one of blinn, ggx, phong",
         ),
         (["--report", "nothing"], "--report nothing: is no report; make one with `blysk bench FOLDER`"),
         (["-o", "no/site"], "no/site: cannot be written, there is no folder no; make the folder first"),

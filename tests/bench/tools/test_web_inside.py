@@ -13,14 +13,26 @@ import numpy as np
 import pytest
 
 from blysk.bench.tools import web_data
-from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frame_constants import writes_of
+from blysk.golden.frames.prepare import constants_of
 from blysk.sim.engines.beats import pack, unpack
 from blysk.sim.engines.engine import Stimulus
 from blysk.sim.engines.probes import ObservedPipeline
 from blysk.sim.engines.pysim import Model
 from blysk.sim.frames.frame import beats_of
 
-from .live_page import WIDTHS, by_model, change, digest, looked_at, picture_of, prepared, settle, state_of
+from .live_page import (
+    WIDTHS,
+    by_model,
+    change,
+    digest,
+    looked_at,
+    picture_of,
+    prepared,
+    settle,
+    state_of,
+    use,
+)
 
 pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytest.importorskip("ziglang", reason="ziglang is not installed")
@@ -40,7 +52,7 @@ def traced(page, component):
     none = np.zeros(1, dtype=bool)
     stimulus = Stimulus(
         input=pack(component.i.payload.shape(), beats_of(component.unit, spans)),
-        write=pack(component.write.payload.shape(), writes_of([FrameConstants.of(scene, 1)])),
+        write=pack(component.write.payload.shape(), writes_of(constants_of(scene, component.design))),
         constants=np.zeros((0, 0), dtype=np.uint32),
         input_stalls=none,
         output_stalls=none,
@@ -56,10 +68,21 @@ def traced(page, component):
     return inside, stimulus, status
 
 
-def test_waveform_is_that_of_pysim(open_page):
+WATCHED = {
+    ("quotient", "blinn"): ("cosine", "highlight", "diffuse", "specular", "r"),
+    ("chord", "cosquad"): (
+        *("diffuse_0_sum", "highlight_0_step", "cosine", "highlight"),
+        *("gated", "base", "square", "r"),
+    ),
+}
+
+
+@pytest.mark.parametrize("design", WATCHED, ids="-".join)
+def test_waveform_is_that_of_pysim(open_page, design):
     page = open_page()
+    use(page, *design)
     x, y = looked_at(page)
-    component = ObservedPipeline(web_data.design_of("chord", "cosquad"))
+    component = ObservedPipeline(web_data.design_of(*design))
     inside, stimulus, status = traced(page, component)
     run = Model(component).run(stimulus)
     own = slice(inside["start"], inside["start"] + inside["length"])
@@ -68,10 +91,7 @@ def test_waveform_is_that_of_pysim(open_page):
     cells = "row => Object.fromEntries([...row.cells].slice(1).map(c => [c.dataset.clock, c.dataset.code]))"
     for clock in (inside["clock"], inside["clock"] + 2, inside["lastClock"]):
         row = status(clock)
-        for name in (
-            *("diffuse_0_sum", "highlight_0_step", "cosine", "highlight"),
-            *("gated", "base", "square", "r"),
-        ):
+        for name in WATCHED[design]:
             shown = page.locator(f"#wave tr[data-word={name}]").evaluate(cells)
             assert int(shown[str(clock)]) == int(row[name]), (clock, name)
     # The pixel that was clicked comes out with the colour that the picture has.
@@ -86,9 +106,9 @@ def test_waveform_is_that_of_pysim(open_page):
 def test_exact_values_are_near(open_page):
     """On every clock, each word that belongs to a pixel is what its exact value says, to some steps."""
     page = open_page()
-    for method, model in (("chord", "cosquad"), ("chord", "exp"), ("linear", "cosquad")):
-        change(page, "method", method)
-        change(page, "model", model)
+    designs = ("quotient", "blinn"), ("quotient", "phong"), ("chord", "cosquad"), ("chord", "exp")
+    for method, model in (*designs, ("linear", "cosquad")):
+        use(page, method, model)
         looked_at(page)
         script = """() => {
             const {inside} = blysk;
@@ -103,8 +123,9 @@ def test_exact_values_are_near(open_page):
         }"""
         found = page.evaluate(script)
         names = {name for name, *_ in found}
-        sums = "highlight_0_sum" if method == "chord" else "normal_2_sum"
-        lights = {"cosine", "highlight", "argument", "product", "diffuse", "specular"}
+        sums = {"chord": "highlight_0_sum", "linear": "normal_2_sum"}.get(method, "cosine")
+        lights = {"cosine", "diffuse", "specular"}
+        lights |= {"highlight", "argument", "product"} if method != "quotient" else set()
         assert lights | {"red", "r", sums} <= names
         assert ("square" in names) == (model == "cosquad")
         assert max(row[4] for row in found if row[0] == "specular") > 0.5

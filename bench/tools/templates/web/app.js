@@ -131,7 +131,7 @@ const blysk = (() => {
       reference: {
         curve: reference.curve ?? method.curve,
         chord: reference.curve ? false : method.chord,
-        model: (!rough && reference.model) || reflection,
+        model: (!rough && !site.mirrored.includes(reflection) && reference.model) || reflection,
       },
     };
   }

@@ -106,36 +106,114 @@ const blyskCore = () => {
     };
   }
 
-  function constantsOf(settings, viewer, tables, lobe = null) {
+  // The frame of a light, as `light_frame` makes it: H along z, L and V in the xz plane.
+  function lightFrame(direction, viewer) {
+    const dot = (one, other) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
+    const total = direction.map((part, k) => part + viewer[k]);
+    const difference = direction.map((part, k) => part - viewer[k]);
+    const [cosine, sine] = [total, difference].map((of) => Math.sqrt(dot(of, of)) / 2);
+    const across = (vector, axis) => {
+      const along = dot(vector, axis);
+      let found = vector.map((part, k) => part - along * axis[k]);
+      if (Math.sqrt(dot(found, found)) < 1e-12) {
+        const sizes = axis.map(Math.abs);
+        const least = sizes.indexOf(Math.min(...sizes));
+        found = axis.map((part, k) => (k === least ? 1 : 0) - axis[least] * part);
+      }
+      return normalised(found);
+    };
+    const first = normalised(cosine >= sine ? total : difference);
+    const second = cosine >= sine ? across(difference, first) : across(total, first);
+    const [x, z] = cosine >= sine ? [second, first] : [first, second];
+    const y = [z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0]];
+    return { x, y, z, sine, cosine };
+  }
+
+  // Axes of the components of vectors, by their names, as `vector_axes` has them of one light with highlights.
+  function vectorAxes(components, { x, y, z, sine, cosine }) {
+    const scaled = (factor) => y.map((part) => factor * part);
+    const mirrors = components.includes("s0");
+    const axes = { x0: x, y0: mirrors ? scaled(cosine) : y, z0: z, s0: scaled(sine) };
+    return components.map((name) => axes[name]);
+  }
+
+  // Vectors of spans in the frame of the light: codes of start, step and exponent, as `SpanVectors.quantise` rounds them.
+  function vectorsOf(codes, from, to, components, frame, { fraction, margin }) {
+    const axes = vectorAxes(components, frame);
+    const unit = 2 ** fraction;
+    const count = axes.length;
+    const found = Array.from({ length: 2 * count + 1 }, () => new Int32Array(to - from));
+    const [left, right, step] = [0, 1, 2].map(() => new Float64Array(count));
+    const [l, r] = ["left", "right"].map((side) => [0, 1, 2].map((c) => codes[`normal_${side}.${c}`]));
+    for (let span = from; span < to; span++) {
+      const steps = Math.max(codes.length[span] - 1, 1);
+      let largest = 0;
+      for (let k = 0; k < count; k++) {
+        const axis = axes[k];
+        left[k] = l[0][span] * axis[0] + l[1][span] * axis[1] + l[2][span] * axis[2];
+        right[k] = r[0][span] * axis[0] + r[1][span] * axis[1] + r[2][span] * axis[2];
+        if (codes.length[span] === 1) right[k] = left[k];
+        largest = Math.max(largest, Math.abs(left[k]), Math.abs(right[k]));
+      }
+      if (!(largest > 0)) throw new Error("a span has no vector");
+      const scale = (1 - margin / unit) / largest;
+      let longest = 2 ** -60;
+      for (let k = 0; k < count; k++) {
+        step[k] = ((right[k] - left[k]) * scale) / steps;
+        longest = Math.max(longest, Math.abs(step[k]));
+      }
+      const fits = Math.floor(-Math.log2(longest * (1 + 1 / unit)));
+      if (fits < 0) throw new Error("the step of a span does not fit");
+      const exponent = Math.min(fits, 35 - Math.clz32(steps - 1));
+      for (let k = 0; k < count; k++) {
+        found[k][span - from] = Math.floor(left[k] * scale * unit + 0.5);
+        found[count + k][span - from] = Math.floor(step[k] * 2 ** exponent * unit + 0.5);
+      }
+      found[2 * count][span - from] = exponent;
+    }
+    return found;
+  }
+
+  function constantsOf(settings, viewer, tables, lobe = null, vectors = null) {
     const terms = termsOf(settings);
     const code = (intensities) => intensities.map((part) => colorCode(part, tables.color));
     const direction = normalised(settings.direction);
     const halfway = halfwayVector(direction, viewer);
-    const lit = halfway.some((part) => part);
+    const lit = halfway.some((part) => part) || (lobe?.model.mirror ?? false);
     const row = lobe ? lobe.parameters.indexOf(settings[lobe.parameter]) : -1;
     return {
       exponent: [lobe ? lobe.exponents[row] : settings.exponent],
       ambient: code(terms.ambient),
-      direction: quantised(direction, tables.one),
-      halfway: lit ? quantised(halfway, tables.one) : [0, 0, 0],
+      ...(vectors
+        ? { direction: directionCodes(lightFrame(direction, viewer), tables.vector.one), halfway: [0, 0, 0] }
+        : { direction: quantised(direction, tables.one), halfway: lit ? quantised(halfway, tables.one) : [0, 0, 0] }),
       diffuse: code(terms.diffuse),
       specular: lit ? code(terms.specular) : [0, 0, 0],
       ...(lobe && { threshold: lobe.thresholds[row], lobe: tableOf(lobe, lobe.parameters[row]) }),
     };
   }
 
-  // Entries of a lobe's table, as `blysk.golden.lighting.lobe` makes them of a curve that falls.
-  function tableOf({ model, knots }, parameter) {
+  // Codes of sin a, 0 and cos a: nearest, halves to even.
+  function directionCodes({ sine, cosine }, one) {
+    const nearest = (value) => (value % 1 === 0.5 ? 2 * Math.round(value / 2) : Math.round(value));
+    return [nearest(sine * one), 0, nearest(cosine * one)];
+  }
+
+  // Entries of a lobe's table, as `blysk.golden.lighting.lobe` makes them of a curve that falls, or of two parts.
+  function tableOf({ model, entries, middles, border }, parameter) {
     const reflect = reflection(model, parameter);
-    const value = knots.map((u) => reflect(1 - u));
-    const high = value.slice(1).map((next, k) => (next + value[k]) / 2 - reflect(1 - (knots[k + 1] + knots[k]) / 2));
+    const value = entries.map(reflect);
+    const high = middles.map((cosine, k) => (value[k + 1] + value[k]) / 2 - reflect(cosine));
+    const falls = value.every((own, k) => !k || own <= value[k - 1]);
     let least = Infinity;
     return value.map((own, k) => {
-      const [before, after] = [high[Math.max(k - 1, 0)], high[Math.min(k, high.length - 1)]];
+      const after = high[Math.min(k, high.length - 1)];
+      const before = k === border ? after : high[Math.max(k - 1, 0)];
       const [smaller, larger] = [Math.abs(before), Math.abs(after)].sort((a, b) => a - b);
       const move = before * after > 0 ? Math.sign(before) * Math.min(larger / 2, 2 * smaller) : 0;
       const limited = Math.min(Math.max(own - move, 0), 1 - 2 ** -17);
-      return (least = Math.min(least, Math.floor(limited * 2 ** 17 + 0.5)));
+      const code = Math.floor(limited * 2 ** 17 + 0.5);
+      return falls ? (least = Math.min(least, code)) : code;
     });
   }
 
@@ -149,7 +227,8 @@ const blyskCore = () => {
       for (const [name, [first, count]] of Object.entries(fields))
         for (let k = 0; k < count; k++) beats.push([base + first + k, constants[name][k]]);
     if (constants.lobe) {
-      beats.push([tables.threshold, constants.threshold], [tables.lobe, 1 << 17]);
+      if (constants.threshold !== null) beats.push([tables.threshold, constants.threshold]);
+      beats.push([tables.lobe, 1 << 17]);
       for (const value of constants.lobe) beats.push([tables.lobe, value]);
     }
     const words = new Uint32Array(beats.length * port.words);
@@ -237,18 +316,22 @@ const blyskCore = () => {
     };
   }
 
-  // What every pixel is shaded from: N·L, N·H, both terms, the intensities.
+  // What every pixel is shaded from: N·L, N·H or R·V, both terms, the intensities.
   function shader(settings, viewer, model, chord) {
     const direction = normalised(settings.direction);
     const halfway = halfwayVector(direction, viewer);
-    const lit = halfway.some((part) => part) && settings.specular > 0;
+    const lit = (model.mirror || halfway.some((part) => part)) && settings.specular > 0;
+    const between = direction.reduce((sum, part, k) => sum + part * viewer[k], 0);
     const { ambient, diffuse, specular } = termsOf(settings);
     const reflect = reflection(model, settings[model.parameter ?? "exponent"]);
     const found = { cosine: 0, highlight: 0, diffuse: 0, specular: 0, color: [0, 0, 0] };
     return (normal) => {
       found.cosine = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
       found.highlight = normal[0] * halfway[0] + normal[1] * halfway[1] + normal[2] * halfway[2];
-      if (chord) {
+      if (model.mirror) {
+        const towards = normal[0] * viewer[0] + normal[1] * viewer[1] + normal[2] * viewer[2];
+        found.highlight = 2 * found.cosine * towards - between;
+      } else if (chord) {
         const far = [0, 1, 2].reduce((sum, c) => sum + (normal[c] - halfway[c]) ** 2, 0);
         found.highlight = 1 - far / 2;
       }
@@ -287,7 +370,9 @@ const blyskCore = () => {
     const [lx, ly, lz] = normalised(settings.direction);
     const halfway = halfwayVector([lx, ly, lz], viewer);
     const [hx, hy, hz] = halfway;
-    const lit = halfway.some((part) => part) && settings.specular > 0;
+    const lit = (model.mirror || halfway.some((part) => part)) && settings.specular > 0;
+    const [vx, vy, vz] = viewer;
+    const between = lx * vx + ly * vy + lz * vz;
     const { ambient, diffuse, specular } = termsOf(settings);
     const reflect = reflection(model, settings[model.parameter ?? "exponent"]);
     for (let at = 0; at < normals.length; at += 3) {
@@ -297,9 +382,9 @@ const blyskCore = () => {
       const cosine = x * lx + y * ly + z * lz;
       let shine = 0;
       if (lit && cosine > 0) {
-        const highlight = chord
-          ? 1 - ((x - hx) * (x - hx) + (y - hy) * (y - hy) + (z - hz) * (z - hz)) / 2
-          : x * hx + y * hy + z * hz;
+        let highlight = x * hx + y * hy + z * hz;
+        if (model.mirror) highlight = 2 * cosine * (x * vx + y * vy + z * vz) - between;
+        else if (chord) highlight = 1 - ((x - hx) * (x - hx) + (y - hy) * (y - hy) + (z - hz) * (z - hz)) / 2;
         shine = reflect(highlight < 1 ? highlight : 1);
       }
       const front = cosine > 0 ? cosine : 0;
@@ -362,11 +447,28 @@ const blyskCore = () => {
       this.writes = this.reserve(4096);
       const words = this.words(this.input, this.count * port.words).fill(0);
       for (const [name, field] of Object.entries(port.fields))
-        for (let k = 0; k < this.count; k++) put(words, k * port.words, field, spans.codes[name][from + k]);
+        if (spans.codes[name])
+          for (let k = 0; k < this.count; k++) put(words, k * port.words, field, spans.codes[name][from + k]);
+      // Vectors follow the light.
+      this.plain = this.design.vectors && words.slice();
+    }
+
+    turn(settings, viewer) {
+      const port = this.design.ports.i;
+      const words = this.words(this.input, this.count * port.words);
+      words.set(this.plain);
+      const { spans, from, design, tables } = this;
+      const frame = lightFrame(normalised(settings.direction), viewer);
+      const found = vectorsOf(spans.codes, from, from + this.count, design.vectors, frame, tables.vector);
+      const names = ["start", "step"].flatMap((name) => design.vectors.map((_, k) => `${name}.${k}`));
+      [...names, "exponent"].forEach((name, n) => {
+        for (let k = 0; k < this.count; k++) put(words, k * port.words, port.fields[name], found[n][k]);
+      });
     }
 
     prepare(settings, viewer) {
-      const constants = constantsOf(settings, viewer, this.tables, this.design.lobe);
+      if (this.plain) this.turn(settings, viewer);
+      const constants = constantsOf(settings, viewer, this.tables, this.design.lobe, this.design.vectors);
       const { words, count } = writesOf(constants, this.tables, this.design.ports.write);
       this.words(this.writes, words.length).set(words);
       this.exports.prepare(
@@ -414,6 +516,6 @@ const blyskCore = () => {
 
   return {
     ...{ put, get, decoded, unpacked, spansOf, normalised, halfwayVector, quantised, termsOf, constantsOf, writesOf },
-    ...{ reflection, tableOf, curveOf, normalsOf, shader, reference, errorFigures, Simulation },
+    ...{ lightFrame, vectorsOf, reflection, tableOf, curveOf, normalsOf, shader, reference, errorFigures, Simulation },
   };
 };
