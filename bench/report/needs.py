@@ -76,15 +76,18 @@ def _lamp(width: int, height: int, triangles: int) -> Scene:
     return Scene(teapot(triangles), camera, width, height, clay, lights, viewer="near")
 
 
+_GATED = {"method": "chord", "model": "cosquad", "gate": True}
+"""A method whose spans stay the same without highlights, and can be proved to hold none."""
+
 SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]] = {
     "copper teapot": (_teapot, None),
-    "matt teapot, k_s = 0": (lambda *size: _teapot(*size, replace(_COPPER, specular=(0, 0, 0))), None),
+    "matt teapot, k_s = 0": (lambda *size: _teapot(*size, replace(_COPPER, specular=(0, 0, 0))), _GATED),
     "teapot in ambient light": (lambda *size: _teapot(*size, lights=()), None),
     "grey teapot": (_grey, None),
     "three materials alike": (_alike, None),
     # Of the methods that cut spans by the error of every light, none goes without one.
     "one of two lights is off": (_half_lit, {"method": "renormalise", "model": "cosquad"}),
-    "floor lit from behind, exponent 500": (_floor, None),
+    "floor lit from behind, exponent 500": (_floor, _GATED),
     "steel ring, two lights": (
         _ring,
         {"method": "quadratic", "model": "cosquad_lin", "operand": "one_minus_cosine", "gate": True},
@@ -92,7 +95,7 @@ SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]
     "teapot beside a lamp": (_lamp, {"method": "chord-local", "model": "cosquad_lin"}),
 }
 """Scenes, as functions of width, height and number of triangles (about), and options of the full pipeline; by
-default it is the chord method with the model cosquad and a highlight gate.
+default it is the method quotient with the model blinn.
 """
 
 QUICK_SCENES = (
@@ -110,8 +113,8 @@ def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]
     build, options = SCENES[name]
     scene = build(*size)
     counts = {"lights": max(len(scene.lights), 1), "materials": len(scene.materials)}
-    options = options or {"method": "chord", "gate": True}
-    return scene, specialise(scene, preset(**{"model": "cosquad"} | counts | options))
+    options = options or {"method": "quotient", "model": "blinn"}
+    return scene, specialise(scene, preset(**counts | options))
 
 
 def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:

@@ -13,7 +13,7 @@ QUICK_SAMPLES = 10_000
 
 _QUICK = (
     *("dot_product", "middle_normal", "gpq", "difference_accumulator", "quadratic_evaluator"),
-    *("diffuse", "specular", "power", "chord", "intensity"),
+    *("diffuse", "specular", "power", "quotient", "chord", "intensity"),
 )
 """Units of a quick report, which take least time."""
 

@@ -21,7 +21,7 @@ from blysk.golden.methods.interpolator import Operand
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.pipeline import STYLES, Design
-from blysk.golden.presets import METHODS, PUBLISHED, preset
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
@@ -104,6 +104,8 @@ class Candidate:
         """Its `Design`: the bit-accurate model of the pipeline."""
         usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
         interpolator, changes = usual.interpolator, {}
+        if usual.takes_vectors and self.model in MODELS:
+            raise ValueError(f"method {self.method} has tables of lobes, and no circuits of other models")
         if self.fraction_bits is not None and not isinstance(interpolator, ChordInterpolator):
             raise ValueError(f"method {self.method} has no choice of words")
         if self.degree not in (None, *_degrees(self.method)):
@@ -123,7 +125,7 @@ class Candidate:
     @property
     def command(self) -> str:
         """Shell command that prints it as Verilog."""
-        usual = preset(self.method, "cosquad", operand=self.operand).interpolator
+        usual = preset(self.method, self.model, operand=self.operand).interpolator
         if self.method in METHODS and self.design.interpolator == usual:
             words = ["blysk", "verilog", "--method", self.method, "--model", self.model]
             words += ["--lights", str(self.lights)] if self.lights != 1 else []
@@ -151,7 +153,7 @@ class Sweep(NamedTuple):
     """
 
     methods: Sequence[str] = tuple(METHODS)
-    models: Sequence[str] = ("blinn", "cosquad", "lyon3_refitted", "exp")
+    models: Sequence[str] = ("blinn", "phong", "cosquad", "lyon3_refitted", "exp")
     lights: Sequence[int] = (1,)
     operands: Sequence[Operand | None] = OPERANDS
     degrees: Sequence[int] = (1, 2, 3)

@@ -42,7 +42,7 @@ from blysk.bench.tools.design_space import (
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.pipeline import STYLES
-from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
+from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.errors import InputError
 from blysk.sim.frames.figures import ERRORS
@@ -63,7 +63,7 @@ _WORDS = range(36, 47, 2)
 
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
 
-SERVED = LOBES | MODELS
+SERVED = LOBES | MIRROR_LOBES | MODELS
 """Specular units by reflection model; a model with a roughness takes the roughness of the exponent."""
 
 EXPONENT = 50
@@ -83,22 +83,19 @@ def tasks(quick: bool) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        Four methods on a teapot of 992 triangles at 160x120; else the default `Sweep` on one of 10,712
+        Five methods on a teapot of 992 triangles at 160x120; else the default `Sweep` on one of 10,712
         triangles at 320x240.
     """
     if quick:
-        sweep = Sweep(
-            methods=("linear", "renormalise", "chord", "chord-local"),
-            models=("cosquad",),
-            operands=(None,),
-            degrees=(3,),
-            fraction_bits=(46,),
-            styles=("throughput",),
-        )
+        one = {"operands": (None,), "degrees": (3,), "fraction_bits": (46,), "styles": ("throughput",)}
+        sweeps = [
+            Sweep(methods=("quotient",), models=("blinn", "phong"), **one),
+            Sweep(("linear", "renormalise", "chord", "chord-local"), models=("blinn", "cosquad"), **one),
+        ]
         view = view_of("teapot", 992, 160, 120)
     else:
-        sweep, view = Sweep(), view_of("teapot", _TRIANGLES, *_SIZE)
-    return tasks_of(sweep.candidates()[0], view, EXPONENT)
+        sweeps, view = [Sweep()], view_of("teapot", _TRIANGLES, *_SIZE)
+    return tasks_of([one for sweep in sweeps for one in sweep.candidates()[0]], view, EXPONENT)
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
@@ -172,7 +169,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 svg(_drawing(designs, fronts)),
                 "Each mark is a pipeline; the line is the Pareto front of those that no other beats in both, "
                 "whose marks are edged in black. Those of chord-local are not on it: they are given values "
-                "of each light with a span, and what it takes to work these out is not counted. Above: "
+                "of each light with a span, and what it takes to work these out is not counted. To turn "
+                "vectors into "
+                "the frame of a light, for quotient, is a part of the transformation of normals. Above: "
                 "against exact normals of every pixel with the same model. Below: against exact normals "
                 "with Blinn's power, of a lobe with its own model.",
             ),
@@ -341,7 +340,7 @@ def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, fi
 
     \b
     Example:
-        blysk explore --methods chord,quadratic --models exp --largest-error 0.6 --cost multipliers
+        blysk explore --methods quotient,chord --models blinn --largest-error 0.6 --cost multipliers
     """
     if jobs and address is not None:
         raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")

@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 SMALL = [100, 75, 1000]
 
 WHY = {
-    "copper teapot": "exponent fixed at 50",
+    "copper teapot": "1 of 1 tables, fixed at build time",
     "matt teapot, k_s = 0": "no specular path: every k_s is 0",
     "teapot in ambient light": "no light path",
     "grey teapot": "one channel of three",
@@ -68,7 +68,7 @@ def test_a_frame_that_differs_is_told(monkeypatch, costs):
 
     def brighter(self, spans, constants):
         pixels = compute(self, spans, constants)
-        if self.build.exponent is not None:
+        if self.specular.fixed is not None:
             pixels.color[:, 0] ^= 1
         return pixels
 

@@ -73,11 +73,22 @@ def test_another_degree_keeps_the_operand():
         {"method": "chord", "fraction_bits": 41},
         {"method": "angular", "operand": "cosine"},
         {"method": "quadratic-published", "degree": 3},
+        {"method": "quotient", "model": "cosquad"},
+        {"method": "chord", "model": "phong"},
     ],
 )
 def test_impossible_candidates_are_refused(values):
     with pytest.raises(ValueError, match=r"method|fraction_bits"):
         Candidate(**values)
+
+
+def test_quotient_is_swept_with_its_lobes():
+    """Its operand is its own, and it has no choice of words or degrees."""
+    found, impossible = Sweep(methods=("quotient", "chord")).candidates()
+    quotients = [(one.model, one.style) for one in found if one.method == "quotient"]
+    assert quotients == [(model, style) for model in ("blinn", "phong") for style in STYLES]
+    assert impossible["quotient: has tables of lobes, and no circuits of other models"] == 3 * len(STYLES)
+    assert any(reason.startswith("chord: phong is a lobe of R·V") for reason in impossible)
 
 
 def test_sweep_has_every_design_once_and_counts_the_impossible():
@@ -93,7 +104,7 @@ def test_sweep_has_every_design_once_and_counts_the_impossible():
     found, impossible = sweep.candidates()
     assert len(set(found)) == len(found) == 4 * (2 + 1 + 3 + 2)
     assert impossible == {
-        "angular, chord: finds no normals, and gives 1 - cos gamma": 4 * (1 + 3),
+        "angular, chord: finds no normals, so it has one operand": 4 * (1 + 3),
         "quadratic: has no polynomial of degree 1": 4 * 2,
     }
     assert {one.style for one in found} == {"compact"}
@@ -112,6 +123,7 @@ def test_every_method_is_in_the_default_sweep():
     ("candidate", "is_plain"),
     [
         (Candidate("linear"), True),
+        (Candidate("quotient", "phong"), True),
         (Candidate("quadratic", "exp", 2, "one_minus_cosine", 3, style="compact"), True),
         (Candidate("chord", fraction_bits=46), True),
         (Candidate("chord", "cosquad7", 2, None, None, 40, "compact"), False),

@@ -126,7 +126,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         (["--json", "missing/folder.json"], "missing/folder.json: cannot be written"),
         (
             ["--methods", "chord", "--operands", "cosine"],
-            "the sweep: holds no possible design, 16 of chord: finds no normals",
+            "the sweep: holds no possible design, 20 of chord: finds no normals",
         ),
     ],
 )
@@ -178,7 +178,7 @@ def test_impossible_ones_are_told(monkeypatch):
     output = run("--methods", "chord,quadratic", "--models", "exp", "--styles", "compact").output
     # chord without a dot product: 2 words; quadratic without degree 1: 2 operands.
     assert output.startswith(
-        "impossible  4 combinations: 2 of chord: finds no normals, and gives 1 - cos gamma; "
+        "impossible  4 combinations: 2 of chord: finds no normals, so it has one operand; "
         "2 of quadratic: has no polynomial of degree 1\n"
     )
 
@@ -220,13 +220,18 @@ def test_processes_and_a_cluster_give_the_same(monkeypatch, tmp_path):
 def test_section_of_real_results():
     """A few designs at the size of the quick report: every row against its results."""
     todo = tasks(quick=True)
-    assert len(todo) == 8
+    assert len(todo) == 20
     results = store.results_of(todo)
     made = section(todo, results)
     drawing, table = made.parts
     assert ET.fromstring(drawing.svg).tag.endswith("svg")
     rows = table.records()
-    assert [row["method"] for row in rows] == ["linear", "renormalise", "chord", "chord-local"]
+    others = [(m, n) for m in ("linear", "renormalise", "chord", "chord-local") for n in ("blinn", "cosquad")]
+    assert [(row["method"], row["model"]) for row in rows] == [
+        *(("quotient", "blinn"), ("quotient", "phong"), *others)
+    ]
+    (own,) = (row for row in rows if (row["method"], row["model"]) == ("quotient", "blinn"))
+    assert own["front of total error and cells"]
     assert len(made.figures["designs"]) == len(rows)
     for row, design in zip(rows, made.figures["designs"], strict=True):
         assert row["largest total error, LSB"] == design["errors"]["total"]["max_lsb"]
