@@ -1,9 +1,9 @@
-"""Names of reflection models by family, for parametrised tests."""
+"""Names of reflection models by family, and of units, for parametrised tests."""
 
 from blysk.golden.presets import MODELS
 from blysk.golden.reference.reflection import REFLECTION_MODELS, AngleCosine, PolynomialModel
 
-__all__ = ["COSCOS_MODELS", "FURTHER_MODELS", "KINDS", "LINE_MODELS", "SPECULAR_MODELS"]
+__all__ = ["COSCOS_MODELS", "FURTHER_MODELS", "KINDS", "LINE_MODELS", "OF_DOCUMENTS", "SPECULAR_MODELS"]
 
 SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
 """Those of the documents' figures, all of one latency."""
@@ -24,3 +24,18 @@ COSCOS_MODELS = {
     if isinstance(model, AngleCosine)
 }
 """Power and rule of each ``cos^k(a gamma)``."""
+
+OF_DOCUMENTS = (
+    *(
+        "adaptive_normaliser",
+        "bisection",
+        "bisection_chain",
+        "bisection_interpolator",
+        "half_chord",
+        "arccos",
+    ),
+    *("angular_interpolator", "angular_setup", "recurrence", "recurrence_interpolator", "recurrence_setup"),
+    *("middle_normal", "quadratic_evaluator", "quadratic_interpolator", "gpq", "line_setup"),
+    *("half_chord", "difference_setup", "linear_interpolator"),
+)
+"""Units of the documents' methods alone, which change seldom."""

@@ -19,20 +19,18 @@ from blysk.sim.units.record import STALLS, UnitRun, first
 from blysk.sim.units.registry import RECORDS
 
 from .checks import assert_equals_model, assert_keeps_rate, known, resets
+from .lists import OF_DOCUMENTS
 
 FEW = 24
 """Beats in Amaranth's simulator; spans are as short as for 200 pixels."""
 
 
 SELDOM = (
-    *("adaptive_normaliser", "bisection", "bisection_chain", "bisection_interpolator"),
-    *("angular_interpolator", "angular_setup", "recurrence", "recurrence_interpolator", "recurrence_setup"),
-    *("middle_normal", "quadratic_evaluator", "quadratic_interpolator", "gpq"),
-    *("difference_setup", "linear_interpolator", "line_setup", "renormaliser", "renormalise_interpolator"),
+    *OF_DOCUMENTS,
+    *("difference_accumulator", "renormaliser", "renormalise_interpolator", "highlight_cosine"),
     *("chord_interpolator", "chord_setup", "chord_values", "local_chord_interpolator", "light_products"),
-    *("arccos", "half_chord", "highlight_cosine", "highlight_gate", "power", "specular", "value_gate"),
-    *("difference_accumulator", "render", "pixel_pipelines", "framing", "motion", "draw_commands"),
-    *("mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
+    *("highlight_gate", "power", "specular", "value_gate", "render", "pixel_pipelines", "framing"),
+    *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )
 """Units that the default design does not have: of other methods and models, of renderer, buses and boards."""
 
