@@ -249,8 +249,6 @@ def pixels_of(design, spans, constants):
     return list(zip(*(column.astype(int).tolist() for column in columns), strict=True))
 
 
-@pytest.mark.ci
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("late_cycle", "materials", "method"),
     [
@@ -260,7 +258,7 @@ def pixels_of(design, spans, constants):
         pytest.param(150, 3, "quadratic", marks=pytest.mark.long),
         pytest.param(220, 3, "quadratic", marks=pytest.mark.long),
         pytest.param(80, 1, "chord", marks=pytest.mark.long),
-        (150, 3, "chord"),
+        pytest.param(150, 3, "chord", marks=[pytest.mark.ci, pytest.mark.long]),
     ],
 )
 def test_constants_never_change_under_a_span(late_cycle, materials, method):
@@ -300,8 +298,6 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
     assert np.all(np.diff(late_writes) == 1)
 
 
-@pytest.mark.ci
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("reset_at", "materials", "method"),
     [
@@ -311,7 +307,7 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
         pytest.param(131, 2, "quadratic", marks=pytest.mark.long),
         pytest.param(180, 2, "quadratic", marks=pytest.mark.long),
         pytest.param(60, 1, "chord", marks=pytest.mark.long),
-        (131, 2, "chord"),
+        pytest.param(131, 2, "chord", marks=[pytest.mark.ci, pytest.mark.long]),
     ],
 )
 def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method):

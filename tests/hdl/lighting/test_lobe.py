@@ -45,7 +45,6 @@ def check(unit, beats, expected, **options):
     np.testing.assert_array_equal(run.beats, expected)
 
 
-@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.parametrize("interval", [3, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("fixed", [False, pytest.param(True, marks=pytest.mark.long)])

@@ -95,11 +95,10 @@ LENGTHS = {
 }
 
 
-@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.parametrize("make", [chord, local])
 @pytest.mark.parametrize("length", runs_of(LENGTHS))
-@pytest.mark.parametrize("with_gate", [True, pytest.param(False, marks=pytest.mark.long)])
+@pytest.mark.parametrize("with_gate", [pytest.param(True, marks=pytest.mark.ci), False])
 def test_a_pixel_in_every_cycle(make, length, with_gate):
     """Spans of any length, mixed: from the first pixel of a long span on one in every cycle."""
     unit = unit_of(make, with_gate)

@@ -21,11 +21,10 @@ def shown(pause, rate, frames=4, parameters=PARAMETERS, **options):
     return show(OneClock(PatternTop(parameters, pause), Fraction(rate)), MODE, frames, **options)
 
 
-@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("rate", "parameters"),
-    [("5/7", PARAMETERS), pytest.param("1/2", BandBuffer(MODE, 2, RGB565), marks=pytest.mark.long)],
+    [pytest.param("5/7", PARAMETERS, marks=pytest.mark.ci), ("1/2", BandBuffer(MODE, 2, RGB565))],
 )
 def test_lanes_decode_to_the_frames(rate, parameters):
     """Every frame, through the lanes."""
