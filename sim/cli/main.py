@@ -118,6 +118,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def show(message, *_):
         tqdm.write(f"blysk: warning: {one_line(str(message))}", file=sys.stderr)
 
+    # Models in the cache leave components that nothing elaborates; some live to the end of the program.
+    warnings.filterwarnings("ignore", message=r"<blysk\.")
     # A file's name may have letters that the terminal's encoding lacks, or bytes that are none.
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")

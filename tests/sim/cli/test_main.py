@@ -79,6 +79,14 @@ def test_help_names_every_key_of_a_scene_file(capsys):
         assert re.search(rf"(?<!\w){re.escape(name)}(?!\w)", keys), name
 
 
+def test_components_that_nothing_elaborates_are_not_told():
+    """Not behind the command either, when the filters of its run are gone."""
+    code = "from blysk.hdl.pipeline import ShadingPipelineUnit; from blysk.sim.cli.main import main"
+    code += "; main(['verilog', '-o', 'a.v']); ShadingPipelineUnit(); import gc; gc.collect()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_version(capsys):
     assert main(["--version"]) == 0
     assert re.fullmatch(r"blysk \d+\.\d+\.\d+\n", capsys.readouterr().out)
