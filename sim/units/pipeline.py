@@ -45,6 +45,7 @@ from blysk.sim.units.pipeline_spans import (
     operands_of,
     spans_about,
     spans_at_rounding,
+    spans_in_frame,
     spans_in_highlight,
     spans_near_terminator,
     tabled,
@@ -86,13 +87,14 @@ def _measure(rng, count, design):
             right = turned(rng, left, rng.permutation(spread_angles(rng, len(length), largest)))
             left, right, light, halfway = (quantise(v) for v in (left, right, light, halfway))
             colors = (grey[name][np.newaxis] for name in ("diffuse", "specular"))
-            constants = FrameConstants(exponent, grey["ambient"], light, halfway, *colors)
-            constants = tabled(design, constants)
             zero = np.zeros_like(length)
-            spans = ends_for(design, Spans(zero, zero, length, left, right))
-            found = design.compute(spans, constants).color[:, 0]
-            span, pixel = pixels_of(length)
-            t = pixel / np.maximum(length - 1, 1)[span]
+            spans, direction = ends_for(design, Spans(zero, zero, length, left, right)), light
+            if design.takes_vectors:
+                spans, direction = spans_in_frame(spans, light, halfway)
+            constants = FrameConstants(exponent, grey["ambient"], direction, halfway, *colors)
+            found = design.compute(spans, tabled(design, constants)).color[:, 0]
+            span, pixel = pixels_of(spans.length)
+            t = pixel / np.maximum(spans.length - 1, 1)[span]
             ends = [normalise(end / ONE)[span] for end in (left, right)]
             shades = []
             for normal, reflect, by_chord in (
@@ -348,7 +350,7 @@ def _counters(unit, rng, count):
 _CHORD = preset("chord", "cosquad")
 _FULL = preset("chord", "cosquad", lights=2, gate=True)
 _BOTH = ("chord, blinn", "quadratic, cosquad")
-"""Variants that get every stimulus: the default one and the documents' own."""
+"""Variants that get every stimulus: of `chord` and of the documents."""
 _LESS = {"x_bits": 9, "y_bits": 8, "length_bits": 5}
 
 DESIGNS: dict[str, Design] = {
@@ -399,7 +401,6 @@ LONG_DESIGNS: dict[str, Design] = {
 
 
 _OF_VECTORS = {
-    "quotient, blinn": preset("quotient", "blinn"),
     "quotient, phong": preset("quotient", "phong"),
     "quotient, 2 lights": preset("quotient", "ggx", lights=2, materials=3, banks=2),
     "quotient, compact": preset("quotient", "blinn", style="compact"),
@@ -408,7 +409,7 @@ _OF_VECTORS = {
 
 
 def _variants():
-    designs = [("chord", "blinn")]
+    designs = [("chord", "blinn"), ("quotient", "blinn")]
     designs += [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
     designs += [
         (method, "cosquad") for method in METHODS if method not in ("quadratic", "chord-local", "quotient")
@@ -431,7 +432,7 @@ def _variants():
             ),
         )
     for name, design in _OF_VECTORS.items():
-        yield name, Variant(partial(ShadingPipelineUnit, design), long=name != "quotient, blinn")
+        yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
     yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local", "cosquad")))
     for name, design in DESIGNS.items():
         yield name, Variant(partial(ShadingPipelineUnit, design))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from blysk.golden.cosines.quotient_spans import SpanVectors
+from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import (
     BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
@@ -23,6 +23,7 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.light_frame import light_frame
 from blysk.sim.units.cosines.chord_setup import any_factors, any_values
 from blysk.sim.units.cosines.quotient_spans import line_directions
 from blysk.sim.units.methods.quotient_interpolator import any_span_vectors
@@ -39,6 +40,7 @@ __all__ = [
     "operands_of",
     "spans_about",
     "spans_at_rounding",
+    "spans_in_frame",
     "spans_in_highlight",
     "spans_near_terminator",
     "tabled",
@@ -173,6 +175,27 @@ def vectors_for(rng: np.random.Generator, design: Design, length: np.ndarray) ->
     """Any vectors of spans of given lengths, for a method that takes them."""
     highlights = design.specular is not None
     return any_span_vectors(rng, design.interpolator, design.lights, highlights, length)
+
+
+def spans_in_frame(spans: Spans, light: np.ndarray, halfway: np.ndarray) -> tuple[Spans, np.ndarray]:
+    """Spans between unit normals with vectors in the frame of a light; and the light's codes in it, (1, 3).
+
+    A span of two pixels, which no source gives, gets a third.
+
+    Parameters
+    ----------
+    spans : Spans
+        With codes of unit normals.
+    light, halfway : int arrays, shape (1, 3)
+        Codes of L and H.
+    """
+    direction, peak = normalise(light[0]), normalise(halfway[0])
+    frame = light_frame(direction, 2 * (direction @ peak) * peak - direction)
+    ends = (normalise(normals) @ frame.axes.T for normals in (spans.normal_left, spans.normal_right))
+    length = np.where(spans.length == 2, 3, spans.length)
+    vectors = SpanVectors.quantise(*ends, length)
+    given = np.rint(frame.direction * QuotientSpans.ONE).astype(np.int64)
+    return replace(spans, length=length, vectors=vectors), given[np.newaxis]
 
 
 def ends_for(design: Design, spans: Spans) -> Spans:

@@ -45,7 +45,7 @@ READS = {"name": "lobe", "variant": "blinn", "beats": 1300}
 INTERVALS = {"recurrence": 46}
 """Setup intervals of methods that fit a 25F only with one that is not the default."""
 
-DESIGNS = [preset("chord", "blinn")]
+DESIGNS = [preset()]
 DESIGNS += [
     preset(method, "cosquad", **({"setup_interval": INTERVALS[method]} if method in INTERVALS else {}))
     for method in METHODS

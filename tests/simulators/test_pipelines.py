@@ -14,7 +14,7 @@ from blysk.sim.units.registry import RECORDS
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool, pauses
 
 PIPELINES = {name: given.unit for name, given in RECORDS["pipeline"].variants.items() if not given.long}
-QUICK = ("chord, blinn",)
+QUICK = ("quotient, blinn",)
 FRAMES = {"verilator": ((640, 480), 10_000), "icarus": ((160, 120), 1000)}
 """Size of the picture, and triangles, of the long run."""
 

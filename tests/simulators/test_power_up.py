@@ -18,6 +18,7 @@ from .verilog_bench import VerilogBench, assert_beats, missing_tool, pauses, wit
 CASES = {
     ("pipeline", "linear, cosquad"): 40,
     ("pipeline", "chord, blinn"): 200,
+    ("pipeline", "quotient, blinn"): 200,
     ("geometry", ""): 60,
     ("geometry", "two lanes"): 60,
     ("render", "chord"): 60,
