@@ -151,7 +151,7 @@ def animation():
         material=Material((0.1, 0.1, 0.1), (0.6, 0.5, 0.4), (0.5, 0.5, 0.5), 30),
         lights=[Light((-0.5, 0.8, 0.7))],
     )
-    return Animation(scene, preset(model="cosquad"))
+    return Animation(scene, preset())
 
 
 @pytest.fixture(scope="module")

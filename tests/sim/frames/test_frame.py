@@ -229,7 +229,7 @@ def changed(monkeypatch, field):
 def test_simulation_that_is_not_the_model(monkeypatch):
     changed(monkeypatch, "g")
     with pytest.raises(SimulationError, match="pixels are not those of its bit-accurate model"):
-        FrameSimulator(preset(model="cosquad"), "pysim")
+        FrameSimulator(preset(), "pysim")
 
 
 def test_pixels_that_were_not_asked_for(simulator, monkeypatch):
@@ -318,6 +318,6 @@ def test_point_light_and_near_viewer(exponent):
 
 @pytest.mark.parametrize("model", ["blinn", "cosquad"])
 def test_model_is_checked_with_as_many_materials_as_there_may_be(model):
-    constants = sample_constants(preset("chord", model, materials=1024))
+    constants = sample_constants(preset(model=model, materials=1024))
     assert len(constants) == 1024
     assert all(1 <= of.exponent <= 1000 for of in constants)
