@@ -89,6 +89,7 @@ def test_every_address_writes_its_constant_and_no_other(lights):
     run_bench(unit, bench)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_every_address_writes_its_materials_constant_and_no_other(lights):
     """All 512 addresses, and now and then another material, or one that there is not, in random order.

@@ -175,7 +175,7 @@ def test_quotient(model, name, projection, exponent):
     assert errors.max() <= own + 0.05
 
 
-@pytest.mark.parametrize("exponent", [20, 500])
+@pytest.mark.parametrize("exponent", [20, pytest.param(500, marks=pytest.mark.long)])
 def test_camera_inside(exponent):
     """In the tube of a torus, at a wall that crosses the near plane."""
     camera = Camera((1.0, 0.0, 0.05), (0.4, 0.1, 1.0), projection="perspective", field_of_view=80.0)

@@ -190,7 +190,7 @@ def quick(names, some):
     return [name if name in some else pytest.param(name, marks=pytest.mark.long) for name in names]
 
 
-@pytest.mark.parametrize("name", quick(READS, ("the same enable", "another enable")))
+@pytest.mark.parametrize("name", quick(READS, ("another enable",)))
 def test_registers_behind_a_memory(name, mapped, tmp_path):
     component, words = READS[name]
     before = mapped(f"read, {name}", component)
@@ -263,7 +263,7 @@ def multipliers(netlist):
     return [cell for cell in netlist["modules"]["top"]["cells"].values() if cell["type"] == "MULT18X18D"]
 
 
-@pytest.mark.parametrize("name", quick(CASES, ("three enables", "another reader of an operand")))
+@pytest.mark.parametrize("name", quick(CASES, ("three enables",)))
 def test_what_moves_and_that_nothing_else_changes(name, mapped, tmp_path):
     describe, expected = CASES[name]
     before = mapped(name, Beside(describe))

@@ -111,7 +111,7 @@ LAMPS = {
 }
 
 
-@pytest.mark.parametrize("viewer", ["near", "distant"])
+@pytest.mark.parametrize("viewer", ["near", pytest.param("distant", marks=pytest.mark.long)])
 @pytest.mark.parametrize("lamps", LAMPS)
 @pytest.mark.parametrize("exponent", [50, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 1000))])
 def test_stiff_lamps_over_a_floor(lamps, viewer, exponent):

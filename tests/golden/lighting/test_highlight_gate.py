@@ -278,6 +278,7 @@ def test_margin_covers_the_pipeline():
     assert MARGIN / 8 < worst < MARGIN
 
 
+@pytest.mark.long
 def test_thresholds_lie_under_what_the_unit_shades():
     for model in SPECULAR_MODELS + FURTHER_MODELS:
         gate = HighlightGate(Specular(REFLECTION_MODELS[model]))

@@ -149,7 +149,12 @@ def memory_of(*arguments, folder):
     ("text", "reason"),
     [
         pytest.param("a." * 40_000 + "a=1", "has over 256 dots in line 1; break the line", id="one key"),
-        pytest.param("\n".join(f"a{i}." + "b." * 250 + "a=1" for i in range(190)), "unknown key", id="keys"),
+        pytest.param(
+            "\n".join(f"a{i}." + "b." * 250 + "a=1" for i in range(190)),
+            "unknown key",
+            marks=pytest.mark.long,
+            id="keys",
+        ),
         *(
             pytest.param(
                 "\n".join(text.format(i) for i in range(count)), "unknown key", marks=pytest.mark.long

@@ -151,7 +151,7 @@ def check_shaded(loaded, away):
     assert compare_image(scene, design, image).method_error.max_lsb < 0.6
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 3))])
 def test_no_background_shows_through_a_solid(tmp_path, seed):
     outline = outline_of(seed, seed % 2 == 1) * 2
     vertices, faces = prism(outline, np.zeros(len(outline)))
