@@ -25,7 +25,7 @@ from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
 from .stubs import short
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 LENGTH_BITS = 3
 PROGRESS_CLOCKS = 25

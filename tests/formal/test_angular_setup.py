@@ -24,7 +24,7 @@ from blysk.sim.units.operands import pairs_at
 from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 from .prover import Harness
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 LONGEST = 1.01 * ONE
 """Largest length of vectors, in codes; that of unit vectors is off by under 0.001 %."""

@@ -8,7 +8,7 @@ from blysk.hdl.normals.bisection_chain import BisectionChainUnit
 from .prover import Harness
 from .rules import follows, stays
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 
 def of_spans():

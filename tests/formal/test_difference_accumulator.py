@@ -14,7 +14,7 @@ from blysk.hdl.normals.difference_accumulator import AccumulatorUnit, Difference
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 # The words of a normal's component, cut from 44 bits to 5 and from 18 to 3: as there, the sum and the
 # differences have an integer bit more than the result.

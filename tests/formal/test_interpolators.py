@@ -272,6 +272,11 @@ UNITS = {
 }
 
 
+def marks_of(name: str):
+    """Units of the documents' methods are proved seldom."""
+    return [pytest.mark.seldom] * (not name.startswith(("chord", "renormalise")))
+
+
 def in_step(harness: Harness) -> None:
     """Claim that units side by side are ready, and offer what they have, on the same cycles."""
     unit = harness.unit
@@ -352,7 +357,10 @@ JOINED = (("chord_spans", 0), ("chord_spans, gated", 0), ("chord_interpolator", 
 """The stretches with these FIFOs."""
 
 
-@pytest.mark.parametrize(("name", "place"), [(name, k) for name, n in STRETCHES.items() for k in range(n)])
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [pytest.param(name, k, marks=marks_of(name)) for name, n in STRETCHES.items() for k in range(n)],
+)
 def test_pixels(prove, name, place):
     """Spans of 0 to 3 pixels, setups of an interval of 2: what comes to a stretch leaves it, in order, each
     once, as what it is, and no more are inside than its units hold. Inductive, but of `JOINED`.
@@ -364,7 +372,7 @@ def test_pixels(prove, name, place):
     prove(of_stretch(name, place), BOUNDED[name] if (name, place) in JOINED else None)
 
 
-@pytest.mark.parametrize("name", UNITS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=marks_of(name)) for name in UNITS])
 def test_stability_and_progress(prove, name):
     """Spans of 1 to 3 pixels: what waits stays; while the output is ready, a pixel that is to come leaves,
     and a span that is offered is taken, in as many cycles as the latency and one. Inductive, but of
@@ -445,7 +453,11 @@ def test_bugs_are_found(refute, inject, bug):
 
 
 @pytest.mark.parametrize(
-    "name", ["linear", "renormalise", "quadratic", "quadratic-eval", "bisection_interpolator"]
+    "name",
+    [
+        pytest.param(name, marks=marks_of(name))
+        for name in ("linear", "renormalise", "quadratic", "quadratic-eval", "bisection_interpolator")
+    ],
 )
 def test_lost_products_are_found(refute, inject, name):
     """Products that are dropped while they wait, injected in all methods that find normals."""

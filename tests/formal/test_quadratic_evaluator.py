@@ -12,7 +12,7 @@ from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
 from .stubs import short
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 # Of each form, with the stubs: pixels inside at most, and cycles for which a span waits at most.
 FORMS = {"direct": (12, 4), "horner": (11, 7)}

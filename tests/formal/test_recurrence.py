@@ -13,7 +13,7 @@ from blysk.sim.units.operands import pairs_at
 
 from .bounds import unknown
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 LENGTH = (1 << Recurrence.LENGTH_BITS) - 1
 WIDEST_BEND = 2.02

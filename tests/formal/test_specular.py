@@ -13,12 +13,17 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.lighting.specular import SpecularUnit
 from blysk.sim.engines.simulate import simulate
 
-from ..lists import FURTHER_MODELS, SPECULAR_MODELS
+from ..lists import FURTHER_MODELS, KINDS, SPECULAR_MODELS
 from .prover import Harness
 
 pytestmark = pytest.mark.prove
 
 OPERANDS = ("cosine", "one_minus_cosine")
+MODELS = [
+    pytest.param(name, marks=[pytest.mark.seldom] * (name not in (SPECULAR_MODELS[0], *KINDS)))
+    for name in SPECULAR_MODELS + FURTHER_MODELS
+]
+"""All that the unit serves; CI proves the first, and one of each kind."""
 
 # All but those of the first model and operand: small ones, those next to a power of two, where the scale
 # jumps, and others.
@@ -131,7 +136,7 @@ def check(unit, exponent):
 
 
 @pytest.mark.parametrize("operand", OPERANDS)
-@pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
+@pytest.mark.parametrize("model", MODELS)
 def test_term_follows_from_the_argument(prove, model, operand):
     """Inductive, for every operand: ``1 - cos gamma``, cut and limited, is all that a term is made of.
 
@@ -143,7 +148,7 @@ def test_term_follows_from_the_argument(prove, model, operand):
 
 
 @pytest.mark.parametrize("operand", OPERANDS)
-@pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
+@pytest.mark.parametrize("model", MODELS)
 def test_term_never_rises(model, operand):
     """Every argument; every exponent for the first model and 1 - cos gamma, `SOME` for the others."""
     unit = SpecularUnit(Specular(REFLECTION_MODELS[model], operand))

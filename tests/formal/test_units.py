@@ -16,6 +16,7 @@ from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.sim.units.registry import RECORDS
 
+from ..lists import OF_DOCUMENTS
 from .prover import Harness
 from .rules import answers, stays, taken
 
@@ -47,6 +48,7 @@ UNITS = {
 KINDS = {name: getattr(make, "func", make) for name, make in UNITS.items()}
 SELDOM = ("geometry", "render", "pixel_pipelines", "motion")
 """Units whose proofs take minutes; their parts are proved, and they are held by runs of other tests."""
+SELDOM += OF_DOCUMENTS
 
 
 def of_units(names):

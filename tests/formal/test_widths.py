@@ -192,12 +192,14 @@ def test_a_sum_that_is_cut_is_found(inject):
     assert cut_by(DifferenceAccumulatorUnit()) == {"blysk.hdl.normals.difference_accumulator.elaborate"}
 
 
+@pytest.mark.seldom
 def test_slopes_of_the_recurrence_setup_do_not_wrap(monkeypatch, wraps):
     """By bounds, for every word of q; and the first difference of spans of two pixels."""
     of_recurrence_slopes(monkeypatch)
     assert wrapped_by(RecurrenceSetupUnit()) <= set(wraps)
 
 
+@pytest.mark.seldom
 def test_first_steps_of_the_recurrence_do_not_wrap():
     """By bounds, for every word of K to 90 degrees: the first difference, and x and D of the seven steps."""
     of_recurrence_prologue()
@@ -210,24 +212,28 @@ def test_words_of_the_recurrence_wrap_in_the_format_of_its_state(parameters):
     assert wrapped_by(RecurrenceUnit(parameters)) == {parameters.state_format}
 
 
+@pytest.mark.seldom
 @pytest.mark.parametrize(("as_published", "fits"), [(False, MIDDLE_NORMAL_FITS), (True, ("exact",))])
 def test_sums_of_normals_do_not_wrap(as_published, fits):
     """By bounds, for spans to 45 degrees: at every pixel of each length from 1 to 4095."""
     of_normals(as_published, fits)
 
 
+@pytest.mark.seldom
 def test_sums_of_straight_lines_do_not_wrap(wraps):
     """The same, for any two ends of which no component of the difference is over 1."""
     of_lines()
     assert wrapped_by(DifferenceAccumulatorUnit()) <= set(wraps)
 
 
+@pytest.mark.seldom
 def test_sums_of_lines_before_they_are_renormalised_do_not_wrap(wraps):
     """The same, for any two ends of any length."""
     of_true_lines()
     assert wrapped_by(LineAccumulatorUnit(RenormaliseInterpolator())) <= set(wraps)
 
 
+@pytest.mark.seldom
 @pytest.mark.parametrize("levels", range(AdaptiveNormaliser(2.0**-14).depth + 1))
 def test_sums_of_segments_do_not_wrap(wraps, levels):
     """The same, for any two ends of a segment, and as many segments as there can be."""
