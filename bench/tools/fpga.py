@@ -215,7 +215,7 @@ def command(
 
     \b
     Examples:
-        blysk fpga --method chord --seeds 3 --json chord.json
+        blysk fpga --seeds 3 --json quotient.json
         blysk fpga --family nexus --unit specular
         blysk fpga --pipes 4 --seeds 1
         blysk fpga --top render --style compact --target 115 --seeds 1

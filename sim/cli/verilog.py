@@ -45,7 +45,7 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
     \b
     Examples:
         blysk verilog --model cosquad_lin --lights 2 -o core.v
-        blysk verilog --method chord --testbench bench
+        blysk verilog --model phong --testbench bench
         blysk verilog --geometry hardware -o render.v
         blysk verilog --pipes 4 -o four.v
         blysk verilog --top render --bus axi -o core.v

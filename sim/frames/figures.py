@@ -9,6 +9,7 @@ import numpy as np
 
 from blysk.golden.frames.compare import BORDER, Comparison
 from blysk.golden.frames.frame import Frame
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.frame import SimulatedFrame
@@ -22,6 +23,7 @@ __all__ = [
     "frame_figures",
     "reference_of",
     "saving_figures",
+    "sharp_lobes",
     "triangle_figures",
     "worst_errors",
 ]
@@ -78,6 +80,7 @@ def frame_figures(
             "missed_spans": frame.prepared.missed_spans,
             "wide_spans": frame.wide_spans,
             "out_of_range_spans": frame.out_of_range_spans,
+            "sharp_lobes": sharp_lobes(scene, design),
         },
         "seconds": {**frame.seconds, "golden": comparison.seconds},
     }
@@ -125,9 +128,18 @@ def triangle_figures(
             "short_normals": counts["short_normals"],
             "wide_spans": counts["wide_spans"],
             "out_of_range_spans": counts["out_of_range_spans"],
+            "sharp_lobes": sharp_lobes(scene, design),
         },
         "seconds": {**frame.seconds, "golden": comparison.seconds},
     }
+
+
+def sharp_lobes(scene: Scene, design: Design) -> int:
+    """Number of lobes that the method ``quotient`` has over 0.25 LSB off between two entries of a table."""
+    if not isinstance(design.specular, QuotientLobe):
+        return 0
+    lobes = {design.highlight_parameter(material) for material in scene.materials}
+    return sum(design.specular.line_error(lobe) > 1 / 1020 for lobe in lobes)
 
 
 def _figures(
@@ -198,7 +210,11 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         **worst_errors(frames),
         "bound_lsb": None if None in bounds else max(bounds),
         "border_pixels": sum(frame["border_pixels"] for frame in frames),
-        "counts": {key: sum(frame["counts"][key] for frame in frames) for key in frames[0]["counts"]},
+        "counts": {
+            # Lobes are those of the scene, in every frame.
+            key: (max if key == "sharp_lobes" else sum)(frame["counts"][key] for frame in frames)
+            for key in frames[0]["counts"]
+        },
         "frames": list(frames),
     }
 

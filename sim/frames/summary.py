@@ -29,22 +29,24 @@ _COUNTS = {
     "short_normals": "spans with normals too short for the words, as W differs much, perhaps 0.25 LSB off",
     "wide_spans": "spans wider than the error bound of the exponent allows",
     "out_of_range_spans": "spans out of range in the pipeline",
+    "sharp_lobes": "lobes too sharp for this method's table, perhaps over 0.25 LSB off",
 }
 
 _REMEDIES = {
     "opposed_faces": "--back-faces show takes their normals as they are; if they stay dark, export them anew",
     "far_triangles": "leave out what is nearest, or use geometry software",
-    "missed_spans": "use chord or renormalise",
+    "missed_spans": "use quotient or renormalise",
     "missed_pieces": "use geometry software, or smaller triangles",
     "short_normals": "use geometry software, or divide the triangles",
     "wide_spans": "use smaller triangles",
     "out_of_range_spans": "pixels of theirs are wrong: use another method, or divide the triangles",
+    "sharp_lobes": "use method chord",
 }
 """What helps against a count; after a semicolon."""
 
 _WARNINGS = (
     *("opposed_faces", "repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals"),
-    *("wide_spans", "out_of_range_spans", "far_triangles"),
+    *("wide_spans", "out_of_range_spans", "far_triangles", "sharp_lobes"),
 )
 """Counts that may come from a fault of the mesh or the design."""
 

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 import blysk
+from blysk.golden.presets import preset
 from blysk.golden.reference.lobes import GGX
 from blysk.sim.api.design import design_of, verilog
 from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.render import prepare_rendering
 from blysk.sim.api.settings import read_settings, rendering_settings
 from blysk.sim.errors import InputError
+from blysk.sim.frames.figures import sharp_lobes
 
 SMALL = {"size": (48, 36), "triangles": 300}
 
@@ -26,8 +28,17 @@ def many(count):
     return replace(scene, mesh=mesh, material=materials)
 
 
+@pytest.mark.parametrize(("roughness", "sharp"), [(0.05, 1), (0.1, 0), (1.0, 0)])
+def test_lobes_that_are_too_sharp_are_counted(roughness, sharp):
+    """By the error of the lines between entries; `chord` has finer tables at the peak."""
+    scene = blysk.scene("teapot", roughness=roughness, **SMALL)
+    assert sharp_lobes(scene, preset(model="ggx")) == sharp
+    assert sharp_lobes(scene, preset("chord", "ggx")) == sharp_lobes(scene, preset("chord", "cosquad")) == 0
+
+
 def test_render_by_roughness():
-    frame = blysk.render("teapot", model="ggx", method="chord", roughness=0.3, engine="pysim", **SMALL)
+    frame = blysk.render("teapot", model="ggx", roughness=0.3, engine="pysim", **SMALL)
+    assert frame.figures["counts"]["sharp_lobes"] == 0
     assert frame.design.specular.model is GGX
     assert frame.scene.materials[0].roughness == 0.3
     assert frame.error.max_lsb < 0.8
