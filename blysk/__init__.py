@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from blysk.golden.pipeline import Design
+    from blysk.golden.presets import METHOD_LINES as METHODS
+    from blysk.golden.presets import MODEL_LINES as MODELS
     from blysk.golden.reference.camera import Camera
     from blysk.golden.reference.geometry import Mesh
     from blysk.golden.reference.lighting import Light, Material
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 
 __all__ = [
+    "METHODS",
+    "MODELS",
     "Camera",
     "CompilerMissing",
     "Design",
@@ -43,6 +47,8 @@ __all__ = [
 
 # Imported at first use: importing the simulators takes a second.
 _MODULES = {
+    "METHODS": "golden.presets",
+    "MODELS": "golden.presets",
     "Camera": "golden.reference.camera",
     "CompilerMissing": "sim.errors",
     "Design": "golden.pipeline",
@@ -59,11 +65,14 @@ _MODULES = {
     "verilog": "sim.api.design",
 }
 
+_LINES = {"METHODS": "METHOD_LINES", "MODELS": "MODEL_LINES"}
+"""Names of the tables with a line about each method and model, which the golden layer has under others."""
+
 
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError(f"module 'blysk' has no attribute {name!r}")
-    value = getattr(import_module(f"blysk.{_MODULES[name]}"), name)
+    value = getattr(import_module(f"blysk.{_MODULES[name]}"), _LINES.get(name, name))
     globals()[name] = value
     return value
 

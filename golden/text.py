@@ -1,8 +1,9 @@
-"""Text of files, however it was saved: byte order marks, encodings, ends of lines."""
+"""Texts: of files, however they were saved; of numbers and colours."""
 
 import codecs
+import re
 
-__all__ = ["is_wide", "plain_text"]
+__all__ = ["color_of_text", "is_wide", "numbers_of_text", "plain_text"]
 
 # UTF-32 before UTF-16, whose mark of little-endian files is the first half of the other's.
 _MARKS = {
@@ -39,3 +40,28 @@ def plain_text(data: bytes, errors: str = "strict") -> str:
     encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
     text = data.decode(encoding, errors).replace("\ufeff", "").rstrip("\0\x1a")
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def numbers_of_text(text: str) -> list[float]:
+    """Numbers with commas between them, by the rules of `float`.
+
+    Raises
+    ------
+    ValueError
+        If a part is no number.
+    """
+    return [float(part) for part in text.split(",")]
+
+
+def color_of_text(text: str) -> list[float]:
+    """Channels of ``#rrggbb``, 0 to 1 each, or of numbers with commas; one number is all three channels.
+
+    Raises
+    ------
+    ValueError
+        If the text is no colour.
+    """
+    if re.fullmatch("#[0-9a-fA-F]{6}", text):
+        return [int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    numbers = numbers_of_text(text)
+    return numbers * 3 if len(numbers) == 1 else numbers

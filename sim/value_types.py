@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from blysk.golden.reference.scene import LARGEST_SIDE
+from blysk.golden.text import color_of_text, numbers_of_text
 from blysk.sim.errors import InputError, one_line
 
 __all__ = [
@@ -16,12 +17,15 @@ __all__ = [
     "Few",
     "Number",
     "OutputFile",
+    "PartError",
     "Size",
     "Truth",
     "Value",
     "Vector",
     "Whole",
+    "plain",
     "shown",
+    "shown_key",
 ]
 
 
@@ -31,10 +35,30 @@ class Value(click.ParamType):
     Attributes
     ----------
     remedy : str
-        What to give instead of a refused value: "give a whole number from 1 to 9".
+        What to give on the command line instead of a refused value: "give a whole number from 1 to 9".
     """
 
     remedy: str
+
+    @property
+    def in_python(self) -> str:
+        """The same for Python."""
+        return self.remedy
+
+    @property
+    def in_file(self) -> str:
+        """The same for a scene file."""
+        return self.in_python
+
+    def read(self, value: Any) -> Any:
+        """The value of a text of the command line, or of what a scene file or Python gives in place of it.
+
+        Raises
+        ------
+        ValueError
+            With the reason, if it is not accepted.
+        """
+        return self.check(self.parse(value) if isinstance(value, str) else value)
 
     def parse(self, text: str) -> Any:
         """Value of a text of the command line, not yet checked; `ValueError` if the text has no such form."""
@@ -51,12 +75,29 @@ class Value(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Checked value of a text; `InputError` with the option and the text."""
         try:
-            return self.check(self.parse(value) if isinstance(value, str) else value)
+            return self.read(value)
         except ValueError as error:
             option = param.opts[0] if param else self.name
             reason = f"unknown {self.name}" if str(error) == "unknown" else str(error)
             remedy = getattr(error, "remedy", self.remedy)
             raise InputError(f"{option} {value}", reason, remedy) from None
+
+
+class PartError(ValueError):
+    """Bad part of a value, with a reason and a remedy; ``key`` names the part: ``[2].color``."""
+
+    def __init__(self, key: str, reason: str, remedy: str):
+        super().__init__(reason)
+        self.key, self.remedy = key, remedy
+
+
+def plain(value: Any) -> Any:
+    """A value with lists in place of arrays, and numbers of Python in place of NumPy's, at any depth."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if type(value) in (list, tuple):
+        return type(value)(map(plain, value))
+    return value
 
 
 def shown(value: Any) -> str:
@@ -72,6 +113,11 @@ def shown(value: Any) -> str:
     return one_line(repr(value) if isinstance(value, str) else str(value), 40)
 
 
+def shown_key(name: str) -> str:
+    """A key of a file in a message."""
+    return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
+
+
 def _finite(value: Any, least: float = -math.inf, most: float = math.inf) -> float:
     """A number between two others, both included; up to 1e300, so that squares of thousandths are finite."""
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -85,7 +131,7 @@ def _finite(value: Any, least: float = -math.inf, most: float = math.inf) -> flo
 def _floats(text: str, reason: str) -> list[float]:
     """Numbers of a text with commas between them."""
     try:
-        return [float(part) for part in text.split(",")]
+        return numbers_of_text(text)
     except ValueError:
         raise ValueError(reason) from None
 
@@ -158,6 +204,11 @@ class Vector(Value):
         self.name, self.kind, self.counts, self.direction = metavar, kind, counts, direction
         self.remedy = f"give {metavar}" + (", a vector other than 0" if direction else "")
 
+    @property
+    def in_python(self):
+        """Numbers, or the text."""
+        return self.remedy.replace(f"give {self.name}", f'give {self.kind} or "{self.name}"', 1)
+
     def parse(self, text):
         """Numbers with commas between them."""
         return _floats(text, f"not {self.kind}")
@@ -182,19 +233,22 @@ class Color(Value):
         limits = "of 0 or more" if math.isinf(most) else f"from 0 to {most:g}"
         self.remedy = f"give #rrggbb, red, green and blue, or one number, each {limits}"
 
+    @property
+    def in_python(self):
+        """A text in quotes, or numbers."""
+        return self.remedy.replace("#rrggbb", '"#rrggbb"')
+
     def parse(self, text):
-        """A number, or numbers with commas between them; ``#rrggbb`` stays."""
-        if text.startswith("#"):
-            return text
-        numbers = _floats(text, "not a colour")
-        return numbers if len(numbers) > 1 else numbers[0]
+        """The channels, see `color_of_text`."""
+        try:
+            return color_of_text(text)
+        except ValueError:
+            raise ValueError("not a colour") from None
 
     def check(self, value):
         """Three numbers of type `float`."""
-        if isinstance(value, str) and re.fullmatch("#[0-9a-fA-F]{6}", value):
-            return tuple(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))
         channels = value if isinstance(value, list | tuple) else [value] * 3
-        if isinstance(value, str) or len(channels) != 3:
+        if len(channels) != 3:
             raise ValueError("not a colour")
         return tuple(_finite(part, 0, self.most) for part in channels)
 
@@ -204,6 +258,8 @@ class Size(Value):
 
     name = "WIDTHxHEIGHT"
     remedy = f"give WIDTHxHEIGHT, 1 to {LARGEST_SIDE} each"
+    in_python = f'give (width, height) or "WIDTHxHEIGHT", 1 to {LARGEST_SIDE} each'
+    in_file = f'give [width, height] or "WIDTHxHEIGHT", 1 to {LARGEST_SIDE} each'
 
     def parse(self, text):
         """Two numbers with an x between them."""
@@ -222,7 +278,8 @@ class Truth(Value):
     """True or false: a `bool` in a file and in Python, a flag on the command line."""
 
     name = "boolean"
-    remedy = "give true or false"
+    remedy = in_file = "give true or false"
+    in_python = "give True or False"
 
     def check(self, value):
         """A `bool`."""

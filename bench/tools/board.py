@@ -30,7 +30,7 @@ from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
 from blysk.golden.video.draw_unit import turned
 from blysk.hdl.emit.processes import run_program
 from blysk.hdl.gpu import GpuUnit
-from blysk.sim.cli.options import given_options, lights_of, options_of
+from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.toggles import ToggleCounter
@@ -79,9 +79,7 @@ MOST_FRAMES = 60
 @click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
 @options_of(OPTIONS)
 @click.pass_context
-def command(
-    context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **options
-):
+def command(context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **_):
     """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
     Without --simulate a bitstream is made. Used and available parts and reached and needed clock rates are
@@ -103,9 +101,7 @@ def command(
     board = board_named(board_name)
     if output is None:
         raise InputError("board", "nothing to write", "give -o FILE.bit, or --simulate N -o FOLDER")
-    given = given_options(context, OPTIONS.keys() - {"lights"})
-    if lights := lights_of(options):
-        given["lights"] = lights
+    given = given_options(context, OPTIONS)
     loader = _loader() if load else ""
     if toggles and not simulate:
         raise InputError("--toggles", "counts bits of a simulation", "give --simulate N with it")

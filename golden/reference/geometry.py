@@ -38,7 +38,12 @@ class Mesh:
     material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
 
     def __post_init__(self):
-        for name, array in (("vertices", self.vertices), ("faces", self.faces), ("normals", self.normals)):
+        for name, kind in (("vertices", np.float64), ("faces", np.int64), ("normals", np.float64)):
+            array = np.asarray(getattr(self, name))
+            if kind == np.int64 and array.dtype.kind not in "iu" and array.size:
+                raise ValueError(f"faces must be whole numbers, not {array.dtype}")
+            array = array.astype(kind, copy=False)
+            object.__setattr__(self, name, array)
             if array.ndim != 2 or array.shape[1] != 3:
                 raise ValueError(f"{name} must have shape (count, 3), not {array.shape}")
         if self.vertices.shape != self.normals.shape:

@@ -1,26 +1,31 @@
 """Directional, point and spot lights, in float64."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.text import color_of_text, numbers_of_text
 
-__all__ = ["Light", "Triple", "triple"]
+__all__ = ["Light", "Triple", "color_triple", "triple"]
 
 Triple = tuple[float, float, float]
 
 
-def triple(name: str, value: Sequence[float], least: float = -math.inf, most: float = math.inf) -> Triple:
+def triple(
+    name: str, value: Sequence[float] | str, least: float = -math.inf, most: float = math.inf
+) -> Triple:
     """Three numbers as finite floats in [least, most]; else a `ValueError` that names them.
+
+    A text has commas between the numbers: ``"0,1,0.5"``.
 
     Parameters
     ----------
     name : str
         Name of the three numbers, for the error's text.
-    value : sequence of three numbers
+    value : sequence of three numbers, or str
         The numbers.
     least, most : float
         Ends of the range.
@@ -30,9 +35,40 @@ def triple(name: str, value: Sequence[float], least: float = -math.inf, most: fl
     ValueError
         If there are not three numbers, or one is not finite or out of range.
     """
-    array = np.asarray(value, dtype=np.float64)
+    return _triple(name, value, numbers_of_text, "three finite numbers", least, most)
+
+
+def color_triple(
+    name: str, value: Sequence[float] | float | str, least: float = 0.0, most: float = math.inf
+) -> Triple:
+    """A colour as `triple`: three numbers, one for all channels, or a text of `color_of_text`.
+
+    Parameters
+    ----------
+    name, least, most
+        As for `triple`.
+    value : sequence of three numbers, float or str
+        The colour.
+
+    Raises
+    ------
+    ValueError
+        If it is no colour, or a channel is out of range.
+    """
+    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+        value = [value] * 3
+    return _triple(name, value, color_of_text, "#rrggbb, one finite number or three", least, most)
+
+
+def _triple(
+    name: str, value: object, read: Callable[[str], list[float]], kind: str, least: float, most: float
+) -> Triple:
+    try:
+        array = np.asarray(read(value) if isinstance(value, str) else value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
     if array.shape != (3,) or not np.isfinite(array).all():
-        raise ValueError(f"{name} must be three finite numbers, not {value!r}")
+        raise ValueError(f"{name} must be {kind}, not {value!r}")
     if (array < least).any() or (array > most).any():
         limits = f"at least {least:g}" if math.isinf(most) else f"in {least:g} to {most:g}"
         raise ValueError(f"{name} must be {limits}, not {value!r}")
@@ -46,9 +82,10 @@ class Light:
     Parameters
     ----------
     direction : three floats, optional
-        Vector *to* the light, any length but 0; stored as a unit vector.
-    color : three floats
-        Intensity I_i of each channel, at least 0.
+        Vector *to* the light, any length but 0; stored as a unit vector. Three numbers may be a text, too:
+        ``"0,1,0"``.
+    color : three floats, float or str
+        Intensity I_i of each channel, at least 0; or of all, or ``"#rrggbb"``. Stored as three floats.
     position : three floats, optional
         Position of a point light, in the mesh's units, in place of ``direction``.
     attenuation : three floats
@@ -88,7 +125,7 @@ class Light:
             if not any(direction):
                 raise ValueError("a light's direction must not be 0")
             object.__setattr__(self, "direction", tuple(normalise(direction).tolist()))
-        object.__setattr__(self, "color", triple("a light's color", self.color, least=0))
+        object.__setattr__(self, "color", color_triple("a light's color", self.color))
         attenuation = triple("a light's attenuation", self.attenuation, least=0)
         if not any(attenuation):
             raise ValueError("a light's attenuation must not be 0, 0, 0")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.light import Light, Triple, triple
+from blysk.golden.reference.light import Light, Triple, color_triple, triple
 from blysk.golden.reference.lobes import (
     LEAST_ROUGHNESS,
     checked_roughness,
@@ -59,15 +59,17 @@ class Material:
 
     Parameters
     ----------
-    ambient, diffuse, specular : three floats each
-        k_a, k_d, k_s of each channel, at least 0. Their sum may exceed 1: the intensity saturates.
+    ambient, diffuse, specular : three floats, float or str, each
+        k_a, k_d, k_s of each channel, at least 0; or of all, or ``"#rrggbb"``. Stored as three floats. Their
+        sum may exceed 1: the intensity saturates.
     exponent : int
         Exponent n of the highlight, 1 to 1000.
     roughness : float, optional
         Roughness r of microfacets, greater than 0 and at most 1. By default it follows from the exponent, see
         `lobes.roughness_of_exponent`.
-    fresnel : three floats, optional
-        F_0 of each channel, 0 to 1: k_s is multiplied by `schlick`, see `reflection`. ``None``: it is not.
+    fresnel : three floats, float or str, optional
+        F_0, a colour in the same forms, 0 to 1: k_s is multiplied by `schlick`, see `reflection`. ``None``:
+        it is not.
     two_sided : bool
         Whether a scene that leaves out back faces draws those of this material, with negated normals.
 
@@ -89,14 +91,14 @@ class Material:
 
     def __post_init__(self):
         for name in ("ambient", "diffuse", "specular"):
-            object.__setattr__(self, name, triple(f"a material's {name}", getattr(self, name), least=0))
+            object.__setattr__(self, name, color_triple(f"a material's {name}", getattr(self, name)))
         object.__setattr__(self, "exponent", operator.index(self.exponent))
         if not 1 <= self.exponent <= 1000:
             raise ValueError(f"a material's exponent must be in 1 to 1000, not {self.exponent}")
         if self.roughness is not None:
             object.__setattr__(self, "roughness", checked_roughness(self.roughness))
         if self.fresnel is not None:
-            object.__setattr__(self, "fresnel", triple("a material's fresnel", self.fresnel, 0, 1))
+            object.__setattr__(self, "fresnel", color_triple("a material's fresnel", self.fresnel, 0, 1))
 
     @classmethod
     def of_metallic_roughness(

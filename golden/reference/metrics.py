@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["ErrorFigures", "error_figures", "mnse_published", "nmse"]
+__all__ = ["ErrorFigures", "error_figures", "error_map", "mnse_published", "nmse"]
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,32 @@ def error_figures(
         rmse_lsb=rmse,
         psnr_db=20 * math.log10(255 / rmse) if rmse else math.inf,
     )
+
+
+def error_map(image: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Largest absolute error of the channels of each pixel, in LSB.
+
+    Parameters
+    ----------
+    image : uint8 array, shape (height, width, channels)
+        The picture.
+    reference : float64 array, same shape
+        The exact picture, in [0, 1]; it is not rounded.
+
+    Returns
+    -------
+    float64 array, shape (height, width)
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ or there is no pixel.
+    """
+    image, reference = _pair(image, reference)
+    error = np.zeros(image.shape[:2])
+    for channel in range(image.shape[2]):  # one channel at a time: a third of the memory
+        np.maximum(error, np.abs(image[..., channel] - 255 * reference[..., channel]), out=error)
+    return error
 
 
 def _deviations(image: np.ndarray, reference: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

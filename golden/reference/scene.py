@@ -7,7 +7,7 @@ import numpy as np
 
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
-from blysk.golden.reference.light import Light, Triple, triple
+from blysk.golden.reference.light import Light, Triple, color_triple
 from blysk.golden.reference.lighting import Material
 
 __all__ = ["BACK_FACES", "LARGEST_SIDE", "VIEWERS", "Scene"]
@@ -38,10 +38,10 @@ class Scene:
         Coefficients of the surface: one material, or several, chosen by `Mesh.material`; stored as a tuple.
     lights : sequence of Light
         Any number, directional or point lights; stored as a tuple.
-    ambient_light : three floats
-        I_a of each channel, at least 0.
-    background : three floats
-        Color of the pixels that show no surface, in [0, 1].
+    ambient_light : three floats, float or str
+        I_a of each channel, at least 0; or of all, or ``"#rrggbb"``. Stored as three floats.
+    background : three floats, float or str
+        Color of the pixels that show no surface, in [0, 1], in the same forms.
     back_faces : {"flip", "show", "cull"}
         Treatment of a triangle seen from behind (its corners are clockwise). ``"flip"`` draws it with negated
         normals, so that they point to the viewer's side; ``"show"`` draws it with its own normals; ``"cull"``
@@ -88,8 +88,8 @@ class Scene:
         used = 1 + self.mesh.material.max(initial=0)
         if len(self.materials) < used:
             raise ValueError(f"the mesh has faces of {used} materials, the scene {len(self.materials)}")
-        object.__setattr__(self, "ambient_light", triple("a scene's ambient_light", self.ambient_light, 0))
-        object.__setattr__(self, "background", triple("a scene's background", self.background, 0, 1))
+        object.__setattr__(self, "ambient_light", color_triple("a scene's ambient_light", self.ambient_light))
+        object.__setattr__(self, "background", color_triple("a scene's background", self.background, 0, 1))
         if self.back_faces not in BACK_FACES:
             raise ValueError(f"back_faces must be one of {', '.join(BACK_FACES)}, not {self.back_faces!r}")
         if self.viewer not in VIEWERS:

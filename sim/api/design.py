@@ -32,6 +32,7 @@ from blysk.hdl.render import RenderUnit
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions, unit_of_top
 from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
+from blysk.sim.api.signature import with_options
 from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
 
@@ -50,10 +51,12 @@ __all__ = [
 _LIMIT = "2048 sin(a / 2), rounded down, for spans of at most the angle a"
 _FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
 
+
 ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 """A unit from spans to pixels: one pipeline or several."""
 
 
+@with_options({**COUNTS, **DESIGN})
 def design(
     *, lights: int = 1, materials: int = 1, factors: int = 0, **options: Unpack[DesignOptions]
 ) -> Design:
@@ -440,7 +443,8 @@ def verilog_and_unit(
     except ValueError as error:
         raise OptionError("name", name, str(error), "choose another name") from None
     hardware = TOPS[top].takes_triangles
-    checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
+    counts = checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
+    pipes, setups = counts["pipes"], counts["setups"]
     if setups > 1 and not hardware:
         raise OptionError("setups", str(setups), "spans need no triangle setup", "use top geometry or render")
     if hardware and pipes > 1:

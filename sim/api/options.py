@@ -1,10 +1,10 @@
 """Every option of scenes and designs: its type, default, help text and key in a scene file."""
 
-import math
 import os
-import re
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, NamedTuple, TypedDict, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
+
+from numpy.typing import ArrayLike
 
 from blysk.golden.bus.framing import BUSES, PACKETS
 from blysk.golden.frame_constants import MAX_MATERIALS
@@ -16,13 +16,29 @@ from blysk.golden.pixel_pipelines import PIPES as PIPE_COUNTS
 from blysk.golden.presets import METHODS, MODEL_LINES, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
-from blysk.golden.reference.lighting import Light, Triple
+from blysk.golden.reference.lighting import Triple
 from blysk.golden.reference.lobes import TabulatedModel
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
+from blysk.sim.api.lights import Lights, LightsLike
 from blysk.sim.meshes.normals import DEFAULT_CREASE
 from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, MAX_TRIANGLES, MIN_TRIANGLES
 from blysk.sim.run_files import reads
-from blysk.sim.value_types import Choice, Color, Few, Number, Size, Truth, Value, Vector, Whole, shown
+from blysk.sim.value_types import (
+    Choice,
+    Color,
+    Few,
+    Number,
+    PartError,
+    Size,
+    Truth,
+    Value,
+    Vector,
+    Whole,
+    shown,
+)
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = [
     "COARSE",
@@ -31,6 +47,7 @@ __all__ = [
     "DESIGN",
     "GEOMETRIES",
     "GEOMETRY",
+    "LIGHTS",
     "PIPES",
     "PORTS",
     "RENDERING",
@@ -41,9 +58,7 @@ __all__ = [
     "ColorLike",
     "DesignOptions",
     "Engine",
-    "Lights",
     "Option",
-    "PartError",
     "RenderOptions",
     "SceneOptions",
     "Source",
@@ -58,8 +73,9 @@ COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fres
 ColorLike = str | float | Triple
 """A colour: ``"#rrggbb"``, one number, or three."""
 
-Source = str | os.PathLike[str] | Mesh
-"""``"teapot"``, a mesh file, a scene file (``.toml``), or a mesh."""
+Source = Union[str, os.PathLike[str], Mesh, Sequence[ArrayLike], "trimesh.Trimesh", "trimesh.Scene"]
+"""``"teapot"``, a mesh file, a scene file (``.toml``), a mesh, also of `trimesh`, or arrays: vertices, faces
+and perhaps normals."""
 
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
@@ -88,14 +104,6 @@ class Option(NamedTuple):
     default: Any
     help: str
     key: str = ""
-
-
-class PartError(ValueError):
-    """Bad part of a value, with a reason and a remedy; ``key`` names the part: ``[2].color``."""
-
-    def __init__(self, key: str, reason: str, remedy: str):
-        super().__init__(reason)
-        self.key, self.remedy = key, remedy
 
 
 class Model(Choice):
@@ -139,57 +147,6 @@ class Roughness(Number):
         return value
 
 
-class Lights(Value):
-    """Lights: `Light` objects, or tables of direction or position, colour, attenuation, spot and cone."""
-
-    name = "lights"
-    remedy = "write [[lights]] and its direction and color below, for each light"
-    parts: Mapping[str, Value] = {
-        "direction": Vector("three numbers", direction=True),
-        "position": Vector("three numbers"),
-        "color": Color(math.inf),
-        "attenuation": Vector("three numbers", metavar="K0,K1,K2"),
-        "spot": Vector("three numbers", direction=True),
-        "cone": Vector("two angles", (2,), "INNER,OUTER"),
-    }
-
-    def check(self, value):
-        """A tuple of `Light`."""
-        if not isinstance(value, list | tuple):
-            raise ValueError("no array of tables")
-        if len(value) > MAX_LIGHTS:
-            raise PartError("", f"{len(value)} lights", f"give at most {MAX_LIGHTS}")
-        return tuple(
-            entry if isinstance(entry, Light) else self._light(entry, f"[{number}]")
-            for number, entry in enumerate(value, 1)
-        )
-
-    def _light(self, entry: object, key: str) -> Light:
-        if not isinstance(entry, Mapping):
-            raise PartError(key, f"{shown(entry)} is no table", self.remedy)
-        parts = {}
-        for name, part in entry.items():
-            if name not in self.parts:
-                raise PartError(
-                    f"{key}.{shown_key(name)}", "unknown key", f"use one of {', '.join(self.parts)}"
-                )
-            try:
-                parts[name] = self.parts[name].check(part)
-            except ValueError as error:
-                reason = f"{shown(part)} is {error}"
-                raise PartError(f"{key}.{name}", reason, self.parts[name].remedy) from None
-        if "direction" not in parts and "position" not in parts:
-            remedy = "give three numbers, from the mesh to the light, or a position"
-            raise PartError(f"{key}.direction", "is missing", remedy)
-        if "direction" in parts and "position" in parts:
-            raise PartError(key, "holds both direction and position", "leave one of them out")
-        try:
-            return Light(**parts)
-        except ValueError as error:
-            remedy = "see the keys of lights in blysk render --help"
-            raise PartError(key, str(error), remedy) from None
-
-
 class Direction(Vector):
     """A direction, or a word for one.
 
@@ -200,9 +157,19 @@ class Direction(Vector):
     """
 
     def __init__(self, words: Mapping[str, str | Triple]):
-        super().__init__("a direction", metavar=f"X,Y,Z|{'|'.join(words)}", direction=True)
+        super().__init__("a direction", direction=True)
         self.words = words
         self.remedy = f"give X,Y,Z, a vector other than 0, or one of {', '.join(words)}"
+        self.metavar = f"X,Y,Z|{'|'.join(words)}"
+
+    @property
+    def in_python(self):
+        """Numbers, the text, or a word."""
+        return self.remedy.replace("X,Y,Z", 'three numbers or "X,Y,Z"', 1)
+
+    def get_metavar(self, param, ctx=None):
+        """Placeholder in the help text: numbers, or a word."""
+        return self.metavar
 
     def parse(self, text):
         """A word as it is, or numbers with commas between them."""
@@ -215,13 +182,11 @@ class Direction(Vector):
         return super().check(value)
 
 
+LIGHTS = ("lights", "point_lights", "spot_lights")
+"""Options of lights, in the order of their lights."""
+
 VIEW_WORDS = ("front", "back", "left", "right", "top", "bottom")
 _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-def shown_key(name: str) -> str:
-    """A key of a file in a message."""
-    return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
 
 
 SCENE: dict[str, Option] = {
@@ -287,10 +252,38 @@ SCENE: dict[str, Option] = {
         "camera.viewer",
     ),
     "lights": Option(
-        Lights(),
-        (Light((-0.5, 0.8, 0.7)),),
-        "Direction to a light, and its colour, 1,1,1 if left out; repeat for more lights.",
+        Lights(
+            Vector("three or six numbers", (3, 6), "X,Y,Z or X,Y,Z,R,G,B"),
+            ("direction", "color"),
+            "give a direction other than 0 and colours of 0 or more",
+        ),
+        (-0.5, 0.8, 0.7),
+        "Direction to a light, and its colour, 1,1,1 if left out.",
         "lights",
+    ),
+    "point_lights": Option(
+        Lights(
+            Vector("three, six or nine numbers", (3, 6, 9), "X,Y,Z or X,Y,Z,R,G,B or X,Y,Z,R,G,B,K0,K1,K2"),
+            ("position", "color", "attenuation"),
+            "give colours and coefficients of 0 or more",
+        ),
+        None,
+        "Position of a light in the mesh's units, its colour, and its attenuation: at the distance d it "
+        "counts 1/(K0 + K1 d + K2 d^2), at most 1; needs --method chord-local.",
+    ),
+    "spot_lights": Option(
+        Lights(
+            Vector(
+                "eight, eleven or fourteen numbers",
+                (8, 11, 14),
+                "X,Y,Z,DX,DY,DZ,INNER,OUTER or ...,R,G,B or ...,R,G,B,K0,K1,K2",
+            ),
+            ("position", "spot", "cone", "color", "attenuation"),
+            "give an axis other than 0, a larger outer angle, colours and coefficients of 0 or more",
+        ),
+        None,
+        "The same of a light that shines along DX,DY,DZ: in full up to INNER degrees from there, and not at "
+        "all from OUTER on.",
     ),
     "ambient": Option(Color(), (0.08, 0.05, 0.03), "Reflection k_a.", "material.ambient"),
     "diffuse": Option(Color(), (0.75, 0.42, 0.2), "Reflection k_d.", "material.diffuse"),
@@ -446,7 +439,7 @@ RENDERING: dict[str, Option] = {
 class SceneOptions(TypedDict, total=False):
     """Options of a scene, by their names in Python: those of `SCENE`."""
 
-    size: tuple[int, int]
+    size: tuple[int, int] | str
     background: ColorLike
     ambient_light: ColorLike
     back_faces: Literal["flip", "show", "cull"]
@@ -454,13 +447,15 @@ class SceneOptions(TypedDict, total=False):
     crease: float
     materials: Literal["file", "one"]
     projection: Literal["perspective", "orthographic"]
-    view: Triple | Literal["front", "back", "left", "right", "top", "bottom"]
-    position: Triple
-    target: Triple
-    up: Triple | Literal["x", "y", "z"]
+    view: Triple | str
+    position: Triple | str
+    target: Triple | str
+    up: Triple | str
     field_of_view: float
     viewer: Literal["distant", "near"]
-    lights: Sequence[Light]
+    lights: LightsLike
+    point_lights: LightsLike
+    spot_lights: LightsLike
     ambient: ColorLike
     diffuse: ColorLike
     specular: ColorLike

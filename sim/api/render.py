@@ -15,17 +15,18 @@ from typing import Any, Unpack, cast
 import numpy as np
 from PIL import Image
 
-from blysk.golden.frames.compare import Comparison, compare, compare_image
+from blysk.golden.frames.compare import Comparison, FrameErrors, compare, compare_image
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.pipeline import Design
-from blysk.golden.reference.metrics import ErrorFigures
+from blysk.golden.reference.metrics import error_map
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import design_of, refused_counts
-from blysk.sim.api.options import DESIGN, SLOW_SIZE, Engine, RenderOptions, Source
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, Engine, RenderOptions, Source
 from blysk.sim.api.scene import load, scenes_of
-from blysk.sim.api.settings import Settings, rendering_settings
+from blysk.sim.api.settings import Settings, check_engine, rendering_settings
+from blysk.sim.api.signature import with_options
 from blysk.sim.errors import CompilerMissing, OptionError
 from blysk.sim.frames.figures import difference_figures, frame_figures, saving_figures, triangle_figures
 from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
@@ -87,9 +88,22 @@ class RenderedFrame:
         return self.simulated.image
 
     @property
-    def error(self) -> ErrorFigures:
+    def error(self) -> FrameErrors:
         """Errors against exact normals at every pixel with the same reflection model, in LSB and dB."""
         return self.comparison.method_error
+
+    @property
+    def total_error(self) -> FrameErrors:
+        """Errors against exact shading by the exact model: a lobe's own, else Blinn's power, see `target_of`.
+
+        That of the reflection model is in it; with a lobe it is `error`.
+        """
+        return self.comparison.total_error
+
+    @cached_property
+    def error_map(self) -> np.ndarray:
+        """Largest error of the channels of each pixel, as in `error`, LSB; float64, shape (height, width)."""
+        return error_map(self.image, self.comparison.golden)
 
     @property
     def cycles(self) -> int:
@@ -426,6 +440,7 @@ def _shrink(settings: Settings, error: CompilerMissing) -> None:
     warnings.warn(f"pysim at {width}x{height} instead of cxxrtl, {error}", RuntimeWarning, stacklevel=4)
 
 
+@with_options({**SCENE, **DESIGN, **RENDERING}, RenderOptions)
 def render(
     source: Source | Scene = "teapot",
     *,
@@ -442,8 +457,9 @@ def render(
 
     Parameters
     ----------
-    source : str or path or Mesh or Scene
-        ``"teapot"``, a mesh file, a scene file (``.toml``), a mesh, or a scene as `scene` makes it.
+    source : str or path or Mesh or Scene or trimesh.Trimesh or trimesh.Scene or arrays
+        ``"teapot"``, a mesh file, a scene file (``.toml``), a mesh, a scene as `scene` makes it, a mesh of
+        trimesh, or ``(vertices, faces)`` or ``(vertices, faces, normals)``, see `given_mesh`.
     design : Design, optional
         The pipeline, as `design` makes it; in place of options of a design.
     engine : {"auto", "cxxrtl", "pysim"}
@@ -454,11 +470,8 @@ def render(
     progress : callable, optional
         Called now and then with the number of pixels so far and in all.
     **options
-        Those of `scene` and of `design`, by the names of the command line; ``geometry``: ``"hardware"``
-        simulates triangles to pixels, ``"software"`` spans to pixels; for ``"hardware"``, ``setups``: 1 or 2
-        lanes of triangle setup, and ``coarse``: whether hidden spans are dropped before shading;
-        ``specialise``: whether to build only the parts that the scene needs; ``short_words``: with words as
-        short as the error bound allows; ``pipes``: 1, 2, 4 or 8 pipelines for different scanlines.
+        Those below, by the names of the command line. Each takes the text of the command line, too:
+        ``size="640x480"``, ``lights="0,1,1"``. ``None`` counts as not given.
 
     Raises
     ------
@@ -471,6 +484,7 @@ def render(
     if design is not None:
         for name in DESIGN.keys() & options.keys():
             raise OptionError(name, "", "the design has its own", "leave out one of them")
+    check_engine(engine)
     if vcd is not None and engine == "cxxrtl":
         raise OptionError("vcd", "", "the engine cxxrtl writes no waveforms", 'use engine="pysim"')
     with RunFiles.current().active(), refused_counts(design):

@@ -16,23 +16,27 @@ from blysk.golden.reference.lighting import Light, Material, Triple
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
 from blysk.sim.api.settings import Settings, read_settings
+from blysk.sim.api.signature import with_options
 from blysk.sim.frames.animation import equal_distance, turned, turntable
 from blysk.sim.meshes.materials import surfaces
-from blysk.sim.meshes.mesh import LoadedMesh, load_mesh
+from blysk.sim.meshes.mesh import LoadedMesh, given_mesh, load_mesh
 
 __all__ = ["load", "scene", "scenes_of"]
 
 
+@with_options(SCENE)
 def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     """A scene with the defaults of the command line.
 
     The mesh is scaled by a power of two, and camera and lights with it, so that no product of its coordinates
-    overflows; the picture is the same to the bit. Colours are ``"#rrggbb"``, one number or three.
+    overflows; the picture is the same to the bit. Colours are ``"#rrggbb"``, one number or three; each option
+    takes the text of the command line, too: ``size="640x480"``.
 
     Parameters
     ----------
-    source : str or path or Mesh
-        ``"teapot"``, a mesh file (see `load_mesh`), a scene file (``.toml``), or a mesh.
+    source : str or path or Mesh or trimesh.Trimesh or trimesh.Scene or arrays
+        ``"teapot"``, a mesh file (see `load_mesh`), a scene file (``.toml``), a mesh, also of trimesh, or
+        ``(vertices, faces)`` or ``(vertices, faces, normals)`` (see `given_mesh`).
     size : two ints
         Width and height in pixels, 1 to 4095; by default 640 and 480.
     background, ambient_light, back_faces
@@ -58,9 +62,12 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         See `Camera`; by default 30.
     viewer : {"distant", "near"}
         See `Scene`; by default distant; ``"near"`` needs the method ``chord-local``.
-    lights : sequence of Light
-        At most 16; by default one from (-0.5, 0.8, 0.7). Lights with a position need the method
+    lights : Light or dict or numbers or str, or a sequence of these
+        At most 16; by default one from (-0.5, 0.8, 0.7). A dict has fields of `Light`; numbers are a
+        direction, or direction and colour. Lights with a position need the method
         ``chord-local``; they may fade by distance or be spots. Lights of colour 0 are off, and left out.
+    point_lights, spot_lights
+        Further lights in the same forms, where numbers are those of ``--point-light`` and ``--spot-light``.
     ambient, diffuse, specular, exponent, roughness, fresnel
         See `Material`; by default the values of the mesh file's materials, else copper and exponent 50. An
         exponent given here also replaces a file's roughness.
@@ -96,6 +103,8 @@ def load(settings: Settings) -> LoadedMesh:
     if isinstance(source, Mesh | Scene):
         mesh = source if isinstance(source, Mesh) else source.mesh
         return LoadedMesh(mesh, type(source).__name__.lower(), 0, 0)
+    if not isinstance(source, str | os.PathLike):
+        return given_mesh(source, settings["crease"])
     with settings.mesh_located():
         return load_mesh(
             os.fspath(source),

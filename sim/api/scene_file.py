@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from blysk.golden.text import plain_text
-from blysk.sim.api.options import DESIGN, RENDERING, SCENE, Lights, PartError, shown_key
+from blysk.sim.api.lights import Lights
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE
 from blysk.sim.errors import InputError
 from blysk.sim.run_files import reads
-from blysk.sim.value_types import Value, shown
+from blysk.sim.value_types import PartError, Value, shown, shown_key
 
 __all__ = ["MAX_BYTES", "SceneFile", "key_lines", "read_scene_file"]
 
@@ -178,11 +179,11 @@ def _read_table(table: dict, schema: dict, prefix: str, values: dict, keys: dict
             continue
         option, kind = expected
         try:
-            values[option] = kind.check(value)
+            values[option] = kind.read(value)
         except PartError as error:
             raise PartError(key + error.key, str(error), error.remedy) from None
         except ValueError as error:
-            raise PartError(key, f"{shown(value)} is {error}", kind.remedy) from None
+            raise PartError(key, f"{shown(value)} is {error}", kind.in_file) from None
         keys[option] = key
 
 
@@ -205,7 +206,9 @@ def _schema() -> dict[str, Any]:
     """Tables of keys, nested as in a file: the option's name and type of each key."""
     schema: dict[str, Any] = {}
     options = {**SCENE, **DESIGN, **RENDERING}
-    keys = {"mesh": (_MeshFile(), "mesh.file")} | {name: (of.kind, of.key) for name, of in options.items()}
+    keys = {"mesh": (_MeshFile(), "mesh.file")} | {
+        name: (of.kind, of.key) for name, of in options.items() if of.key
+    }
     for name in sorted(keys, key=lambda name: "." in keys[name][1]):
         kind, key = keys[name]
         table, _, last = key.rpartition(".")

@@ -5,23 +5,24 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
+from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import default_method
-from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, Triple
 from blysk.golden.reference.scene import Scene
-from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, Option, PartError, Source
+from blysk.sim.api.options import DESIGN, LIGHTS, RENDERING, SCENE, SLOW_SIZE, Engine, Option, Source
 from blysk.sim.api.scene_file import read_scene_file
 from blysk.sim.errors import InputError, OptionError
 from blysk.sim.meshes.mesh_path import check_mesh_path
 from blysk.sim.meshes.refusal import Refused
 from blysk.sim.run_files import OutputIsInput
-from blysk.sim.value_types import shown
+from blysk.sim.value_types import Choice, PartError, plain, shown
 
-__all__ = ["Settings", "check_mesh", "checked", "read_settings", "rendering_settings"]
+__all__ = ["Settings", "check_engine", "check_mesh", "checked", "read_settings", "rendering_settings"]
 
 
 @dataclass(frozen=True)
@@ -98,12 +99,12 @@ def checked(options: Mapping[str, Any], table: Mapping[str, Option]) -> dict[str
             continue
         kind = table[name].kind
         try:
-            result[name] = kind.check(value.tolist() if hasattr(value, "tolist") else value)
+            result[name] = kind.read(plain(value))
         except PartError as error:
             reason = f"{error.key}, {error}" if error.key else str(error)
             raise OptionError(name, "", reason, error.remedy) from None
         except ValueError as error:
-            raise OptionError(name, shown(value), str(error), kind.remedy) from None
+            raise OptionError(name, shown(value), str(error), kind.in_python) from None
     return result
 
 
@@ -130,10 +131,10 @@ def read_settings(
     TypeError
         If there is no option of a name.
     """
-    given = checked(options, table)
+    given = _one_list_of_lights(checked(options, table))
     values: dict[str, Any] = {}
     origins: dict[str, str] = {}
-    if not isinstance(source, Mesh | Scene) and Path(source).suffix.lower() == ".toml":
+    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == ".toml":
         file = read_scene_file(source)
         dropped = set(given).union(*(_INSTEAD.get(name, ()) for name in given))
         names = ({"mesh"} | table.keys()) - dropped
@@ -165,6 +166,17 @@ def rendering_settings(
     return settings
 
 
+def check_engine(engine: str) -> None:
+    """Refuse an unknown engine.
+
+    Raises
+    ------
+    OptionError
+        If there is none of that name.
+    """
+    checked({"engine": engine}, {"engine": Option(Choice("engine", get_args(Engine)), "auto", "")})
+
+
 def check_mesh(settings: Settings) -> None:
     """Refuse a mesh file that is not there, or of an unknown type; it is not opened.
 
@@ -174,7 +186,7 @@ def check_mesh(settings: Settings) -> None:
         As `load_mesh`.
     """
     source = settings.source
-    if isinstance(source, Mesh | Scene) or source == "teapot":
+    if not isinstance(source, str | os.PathLike) or source == "teapot":
         return
     with settings.mesh_located():
         try:
@@ -184,6 +196,16 @@ def check_mesh(settings: Settings) -> None:
         except (OSError, ValueError):
             # `load_mesh` says why the system refuses the name.
             return
+
+
+def _one_list_of_lights(given: dict[str, Any]) -> dict[str, Any]:
+    """The options with ``lights`` alone, for lights of all kinds."""
+    kinds = [name for name in LIGHTS if isinstance(given.get(name), tuple)]
+    lights = tuple(light for name in kinds for light in given[name])
+    if len(lights) > MAX_LIGHTS:
+        raise OptionError("lights", "", f"{len(lights)} lights", f"give at most {MAX_LIGHTS}")
+    rest = {name: value for name, value in given.items() if name not in kinds}
+    return rest | {"lights": lights} if kinds else rest
 
 
 def _turn_view(values: dict[str, Any], given: Collection[str]) -> None:
@@ -230,7 +252,7 @@ def _check_pairs(settings: Settings) -> None:
         raise settings.refuse("view", "the camera has a position, too", "leave one of them out")
     if "target" in given and "position" not in given:
         raise settings.refuse("target", "the camera has no position", "give a position, too")
-    if "triangles" in given and settings.source != "teapot":
+    if "triangles" in given and not (isinstance(settings.source, str) and settings.source == "teapot"):
         raise settings.refuse("triangles", "only the teapot is tessellated", "leave it out for a file")
     if settings.values.get("viewer") == "near" and settings["projection"] != "perspective":
         raise settings.refuse("viewer", "an orthographic camera is distant", "use a perspective one")

@@ -164,7 +164,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _option_error(error: OptionError) -> InputError:
     """The error of an option in the words of the command line."""
-    flag = "light" if error.option == "lights" else error.option.replace("_", "-")
+    option = error.option
+    flag = (option.removesuffix("s") if option.endswith("lights") else option).replace("_", "-")
     return error.at(f"--{flag} {error.value}".strip())
 
 

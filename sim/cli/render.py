@@ -10,7 +10,7 @@ from blysk.golden.presets import METHOD_LINES, MODEL_LINES
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, Engine
 from blysk.sim.api.scene_file import key_lines
 from blysk.sim.api.settings import check_mesh, rendering_settings
-from blysk.sim.cli.options import given_options, lights_of, options_of
+from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
 from blysk.sim.run_files import check_beside
 from blysk.sim.value_types import Choice, OutputFile, Whole
@@ -88,16 +88,12 @@ Keys of a scene file, all but mesh.file optional:
 )
 @click.option("-v", "--verbose", is_flag=True, help="Every figure, not the few that most need.")
 @click.pass_context
-def command(
-    context, mesh, engine, output, comparison, figures, vcd, frames, jobs, address, verbose, **options
-):
+def command(context, mesh, engine, output, comparison, figures, vcd, frames, jobs, address, verbose, **_):
     """Render a mesh or a scene file; `_HELP` is the text that users see."""
     start = perf_counter()
     if not Path(mesh).stem:
         raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh or scene file, or teapot")
-    given = given_options(context, {**SCENE, **DESIGN, **RENDERING}.keys() - {"lights"})
-    if lights := lights_of(options):
-        given["lights"] = lights
+    given = given_options(context, {**SCENE, **DESIGN, **RENDERING})
     if vcd and engine == "cxxrtl":
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
     settings = rendering_settings(mesh, given, vcd)

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
+from blysk.golden.reference.metrics import error_map
 from blysk.sim.errors import InputError
 from blysk.sim.output import atomic_writer, check_writable
 from blysk.sim.run_files import MARK
@@ -192,12 +193,10 @@ def _panels(simulated: np.ndarray, golden: np.ndarray) -> tuple[dict[str, np.nda
     """Panels of a comparison by their labels, and the end of the error map's scale in LSB."""
     import matplotlib
 
-    error = np.zeros(simulated.shape[:2])
+    error = error_map(simulated, golden)
     rounded = np.empty_like(simulated)
-    for channel in range(3):  # one channel at a time: a third of the memory
-        exact = 255 * golden[..., channel]
-        rounded[..., channel] = np.rint(exact)
-        np.maximum(error, np.abs(simulated[..., channel] - exact), out=error)
+    for channel in range(3):
+        rounded[..., channel] = np.rint(255 * golden[..., channel])
     largest = max(1.0, error.max())
     colors = (matplotlib.colormaps[_COLOR_MAP](np.arange(256))[:, :3] * 255).round().astype(np.uint8)
     return {

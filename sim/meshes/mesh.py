@@ -4,6 +4,7 @@ import io
 import logging
 import re
 import warnings
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.geometry import Mesh
@@ -43,7 +45,14 @@ from blysk.sim.run_files import OutputIsInput, reads
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["LoadedMesh", "load_mesh"]
+__all__ = ["LoadedMesh", "given_mesh", "load_mesh"]
+
+
+GIVE_ARRAYS = "give (vertices, faces) or (vertices, faces, normals)"
+GIVE_A_MESH = (
+    'give "teapot", the name of a mesh or scene file, a blysk.Mesh, a trimesh.Trimesh or trimesh.Scene, or '
+    "(vertices, faces) or (vertices, faces, normals)"
+)
 
 
 @dataclass(frozen=True)
@@ -167,6 +176,81 @@ def load_mesh(
     # The loaders raise whatever a damaged file makes them trip over.
     except Exception as error:
         raise InputError(source, _fault(error), REEXPORT) from error
+
+
+def given_mesh(source: object, crease_angle: float = DEFAULT_CREASE) -> LoadedMesh:
+    """A mesh of another library, or of arrays, with its flaws mended as those of a file.
+
+    Parameters
+    ----------
+    source : trimesh.Trimesh or trimesh.Scene or sequence of arrays
+        Arrays are vertices, shape (V, 3), faces, shape (F, 3), from 0 and anticlockwise seen from outside,
+        and perhaps normals, one a vertex. Of trimesh's objects normals are kept if they are stored; all
+        faces have one material.
+    crease_angle : float
+        As for `load_mesh`, where there are no normals.
+
+    Raises
+    ------
+    InputError
+        If it is no mesh, has no faces or too many, an index out of range or a vertex that is not finite.
+    """
+    if any(base.__module__.partition(".")[0] == "trimesh" for base in type(source).__mro__):
+        import trimesh
+
+        name = f"trimesh.{type(source).__name__}"
+        scene = trimesh.Scene(source) if isinstance(source, trimesh.Trimesh) else source
+        if isinstance(scene, trimesh.Scene):
+            found = Found()
+            if any(_is_painted(geometry) for geometry in scene.geometry.values()):
+                found.tell("materials and colours of trimesh")
+            return _given(name, lambda: _assemble(scene, found, Path("trimesh"), b"", crease_angle))
+    elif isinstance(source, list | tuple) and len(source) in (2, 3):
+        return _given("the arrays of a mesh", lambda: _of_arrays(source, crease_angle))
+    raise InputError(f"a mesh of type {type(source).__name__}", "is none that can be drawn", GIVE_A_MESH)
+
+
+def _given(name: str, load: Callable[[], LoadedMesh]) -> LoadedMesh:
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return load()
+    except Refused as refusal:
+        remedy = "mend the mesh" if refusal.remedy == REEXPORT else refusal.remedy
+        raise InputError(name, refusal.reason, remedy) from None
+
+
+def _is_painted(geometry: object) -> bool:
+    """Whether trimesh has a material or colours for a geometry."""
+    visual = getattr(geometry, "visual", None)
+    return visual is not None and bool(visual.defined)
+
+
+def _of_arrays(source: Sequence[ArrayLike], crease_angle: float) -> LoadedMesh:
+    """The mesh of vertices, faces and perhaps normals."""
+    names = ("vertices", "faces", "normals")[: len(source)]
+    arrays = {}
+    for name, given in zip(names, source, strict=True):
+        try:
+            array = np.asarray(given)
+        except ValueError:
+            array = np.empty(0, dtype=object)
+        kinds, what = ("iu", "whole numbers") if name == "faces" else ("iuf", "numbers")
+        if array.ndim != 2 or array.shape[1] != 3 or not len(array) or array.dtype.kind not in kinds:
+            found = f"{array.dtype} of shape {array.shape}" if array.dtype != object else "not"
+            raise Refused(f"{name} must be {what} of shape (count, 3), and are {found}", GIVE_ARRAYS)
+        arrays[name] = array.astype(np.int64 if name == "faces" else np.float64)
+    vertices, faces = arrays["vertices"], arrays["faces"]
+    if len(faces) > MAX_FACES:
+        raise Refused(f"it has {len(faces)} triangles; the limit is {MAX_FACES}", "simplify it")
+    if not 0 <= faces.min() <= faces.max() < len(vertices):
+        wrong = faces.min() if faces.min() < 0 else faces.max()
+        raise Refused(f"a face refers to vertex {wrong} (from 0), there are {len(vertices)}")
+    normals = arrays.get("normals", np.full(vertices.shape, np.nan))
+    if normals.shape != vertices.shape:
+        raise Refused(f"there are {len(normals)} normals for {len(vertices)} vertices", GIVE_ARRAYS)
+    flags = np.full(len(vertices), "normals" in arrays)
+    material = np.zeros(len(faces), dtype=np.int64)
+    return _finish(vertices, faces, material, normals, flags, "arrays", 0, crease_angle)
 
 
 def _fault(error: Exception) -> str:

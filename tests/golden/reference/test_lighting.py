@@ -293,6 +293,16 @@ def test_sums_over_one_and_sixteen_lights():
     )
 
 
+def test_texts_and_numbers_are_colours():
+    assert Light("0,0,2", "#ff8000") == Light((0, 0, 1), (1, 128 / 255, 0))
+    assert Light((0, 0, 1), 0.5) == Light((0, 0, 1), grey(0.5)) == Light((0, 0, 1), "0.5,0.5,0.5")
+    lamp = Light(position="1,2,3", attenuation="1,0,2", spot="0,-1,0")
+    assert lamp == Light(position=(1, 2, 3), attenuation=(1, 0, 2), spot=(0, -1, 0))
+    assert Material("0.1", 1, "#000000", 9, fresnel=0.5) == Material(
+        grey(0.1), grey(1), grey(0), 9, fresnel=grey(0.5)
+    )
+
+
 def test_refusals():
     with pytest.raises(ValueError, match="a light's direction must not be 0"):
         Light((0, 0, 0))
@@ -308,8 +318,14 @@ def test_refusals():
         intensity(V, material, [lamp], grey(0), V, REFLECTION_MODELS["blinn"])
     with pytest.raises(ValueError, match="a light's color must be at least 0"):
         Light((0, 0, 1), (1, -1, 1))
-    with pytest.raises(ValueError, match=r"a material's diffuse must be three finite numbers, not 0.5"):
-        Material(grey(0), 0.5, grey(0), 10)
+    for bad in ("red", "#12345", (1, 2), True, None, "1,2", math.nan):
+        with pytest.raises(
+            ValueError, match=r"a material's diffuse must be #rrggbb, one finite number or three"
+        ):
+            Material(grey(0), bad, grey(0), 10)
+    for bad in ("up", "1,2", 5, (0, 1)):
+        with pytest.raises(ValueError, match="a light's direction must be three finite numbers"):
+            Light(bad)
     for exponent in (0, 1001):
         with pytest.raises(ValueError, match=f"exponent must be in 1 to 1000, not {exponent}"):
             Material(grey(0), grey(0), grey(0), exponent)

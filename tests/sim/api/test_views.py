@@ -78,5 +78,7 @@ def test_scene_file(tmp_path):
 
 @pytest.mark.parametrize(("name", "value"), [("view", "above"), ("up", "w"), ("up", "front"), ("view", "x")])
 def test_unknown_words(name, value):
-    with pytest.raises(OptionError, match="not a direction; give X,Y,Z, a vector other than 0, or one of"):
+    with pytest.raises(
+        OptionError, match='not a direction; give three numbers or "X,Y,Z", a vector other than 0, or one of'
+    ):
         scene("teapot", **{name: value})
