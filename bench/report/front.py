@@ -139,11 +139,13 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
         )
     mirrors = _cheapest_first(of for of in timed if of["is_mirror"])
     if mirrors:
+        of = mirrors[0]
         sentence += (
-            f". True Phong highlights, (R·V)^n by `{mirrors[0]['label']}`, take {_says(mirrors[0])} against "
-            f"exact Phong shading, with {_costs(mirrors[0])}"
+            f". True Phong highlights, (R·V)^n by `{of['label']}`, take {of['cycles'][1]:.2f} cycles and "
+            "err by "
+            f"{of['total_error'][1]:.2f} LSB against exact Phong shading, with {_costs(of)}"
         )
-    return Conclusion("What does a pixel cost, and how exact is it?", f"{sentence}.", _drawing(timed))
+    return Conclusion("What does a pixel cost, and how exact is it?", f"{sentence}.", _drawing(timed, best))
 
 
 def _is_compared(of: Mapping[str, Any]) -> bool:
@@ -195,13 +197,13 @@ def _costs(of: Mapping[str, Any]) -> str:
     return ", ".join(parts) or "not counted"
 
 
-def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
-    """Drawing of both errors against nanoseconds, if most designs have been placed, else against cycles."""
+def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Drawing:
+    """Drawing of both errors against nanoseconds, if most designs and the best are placed, else cycles."""
     # Where there are several scenes, a design of one is not comparable.
     several = [of for of in found if of["samples"] > 1]
     found = several if len(several) > 2 else found
     placed = [of for of in found if of["ns"]]
-    in_ns = 2 * len(placed) > len(found)
+    in_ns = 2 * len(placed) > len(found) and best["ns"] is not None
     key, drawn = ("ns", placed) if in_ns else ("cycles", found)
     figure, axes = panels(9.2, 4.4, 2, sharex=True, sharey=True)
     kinds = (
@@ -270,7 +272,7 @@ def _drawing(found: Sequence[Mapping[str, Any]]) -> Drawing:
     elif not in_ns:
         note += (
             f" {len(placed)} of {len(found)} designs have committed clock rates; "
-            "the others await `blysk fpga`."
+            "the others await `blysk fpga`, and nanoseconds are drawn once most have one, and the best."
         )
     return Drawing(
         "front", f"Error against {'nanoseconds' if in_ns else 'cycles'} a pixel", svg(figure), note

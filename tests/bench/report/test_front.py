@@ -48,6 +48,11 @@ def test_cycles_where_most_are_not_placed():
     drawing = conclusion([found()[0], *few]).drawing
     assert drawing.title == "Error against cycles a pixel"
     assert "1 of 4 designs have committed clock rates" in drawing.note
+    # Nor where the best would be left out.
+    best = found()[0] | {"ns": None, "luts": None, "fmax_mhz": None}
+    drawing = conclusion([best, *found(angular=100)[1:]]).drawing
+    assert drawing.title == "Error against cycles a pixel"
+    assert "quotient, blinn" in drawing.svg
 
 
 @pytest.mark.parametrize(("mhz", "is_on"), [(250, True), (100, False)])
@@ -78,4 +83,4 @@ def test_phong_is_told_and_on_no_front():
     made = conclusion([phong, *found()[:2]])
     assert made.sentence.startswith("**`quotient, blinn`**")
     assert "None of 1 others" in made.sentence
-    assert "by `quotient, phong`, take 0.90 cycles, 0.51 LSB against exact Phong" in made.sentence
+    assert "by `quotient, phong`, take 0.90 cycles and err by 0.51 LSB against exact Phong" in made.sentence

@@ -35,6 +35,7 @@ from blysk.bench.report.stability_streams import measure_stream
 from blysk.bench.store import Task
 from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.cut import split_pairs
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset
@@ -73,6 +74,22 @@ def test_keeps_what_is_promised(group, method):
             method == "chord" and not case.name.startswith("terminator")
         ):
             assert prepared["error"] <= GOOD, case.name
+
+
+def test_quotient_is_given_pairs_as_two():
+    """The step of a span of two pixels may not fit; longer spans and single pixels stay."""
+    [case] = [case for case in cases(1) if case.name == "exponent 100"]
+    raster = case.raster
+    split = split_pairs(raster)
+    pairs = int(np.count_nonzero(raster.length == 2))
+    assert pairs > 0
+    assert len(split.length) == len(raster.length) + pairs == measure_case(case, "quotient")["spans"]
+    assert measure_case(case, "chord")["spans"] == len(raster.length)
+    assert not np.any(split.length == 2)
+    np.testing.assert_array_equal(
+        np.sort(split.length[split.length > 2]), np.sort(raster.length[raster.length > 2])
+    )
+    np.testing.assert_array_equal(split.pixel, raster.pixel)
 
 
 @pytest.mark.long
