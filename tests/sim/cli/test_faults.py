@@ -209,9 +209,7 @@ def test_yosys_that_cannot_work(unmeasured, cache):
     """What it runs in ends with a traceback, of which the last line tells."""
     run = start(LIMITED + "simulate(Triple(), np.arange(5), count=5, engine='cxxrtl')")
     _, errors = run.communicate(timeout=60)
-    assert re.search(
-        r"\nblysk\.sim\.engines\.engine\.SimulationError: Yosys: \S.*File too large.*\n\Z", errors
-    )
+    assert re.search(r"\nblysk\.sim\.errors\.SimulationError: Yosys: \S.*File too large.*\n\Z", errors)
     assert left_in(cache) == []
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from blysk.sim.cli import render
+from blysk.sim.cli import draw
 from blysk.sim.cli.main import main
 from blysk.sim.errors import InputError
 
@@ -119,7 +119,7 @@ def test_picture_waits_for_the_figures(tmp_path, monkeypatch, capsys):
     def full(path, value):
         raise InputError(path, "cannot be written, the disk is full", "free some space")
 
-    monkeypatch.setattr(render, "write_json", full)
+    monkeypatch.setattr(draw, "write_json", full)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
     assert main([*RENDER, "-o", "a.png", "--compare", "b.png", "--json", "c.json"]) == 2
