@@ -15,7 +15,7 @@ from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool,
 
 PIPELINES = {name: given.unit for name, given in RECORDS["pipeline"].variants.items() if not given.long}
 QUICK = ("quotient, blinn",)
-FRAMES = {"verilator": ((640, 480), 10_000), "icarus": ((160, 120), 1000)}
+FRAMES = {"verilator": ((320, 240), 5000), "icarus": ((64, 48), 200)}
 """Size of the picture, and triangles, of the long run."""
 
 
