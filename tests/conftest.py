@@ -27,6 +27,7 @@ LONGEST = (
     *(f"tests/test_units.py[{unit}" for unit in ("geometry", "pipeline", "pixel_pipelines", "render")),
     *(f"tests/sim/engines/test_{name}.py" for name in ("cache", "compilers")),
     *("tests/sim/frames/test_animation.py", "tests/sim/frames/test_frame.py", "tests/sim/api/test_api.py"),
+    *(f"tests/simulators/test_{name}.py" for name in ("mapped", "pipelines", "units")),
 )
 """Beginnings of the groups that take the longest: workers begin with them."""
 
