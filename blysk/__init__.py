@@ -14,16 +14,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from blysk.golden.pipeline import Design
     from blysk.golden.presets import METHOD_LINES as METHODS
     from blysk.golden.presets import MODEL_LINES as MODELS
     from blysk.golden.reference.camera import Camera
     from blysk.golden.reference.geometry import Mesh
     from blysk.golden.reference.lighting import Light, Material
     from blysk.golden.reference.scene import Scene
+    from blysk.sim.api.costed_design import Design
     from blysk.sim.api.design import design, verilog
-    from blysk.sim.api.render import RenderedFrame, render
+    from blysk.sim.api.render import render
+    from blysk.sim.api.rendered_frame import RenderedFrame
     from blysk.sim.api.scene import scene
+    from blysk.sim.api.turntable import Turntable, turntable
     from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 
 __all__ = [
@@ -39,9 +41,11 @@ __all__ = [
     "RenderedFrame",
     "Scene",
     "SimulationError",
+    "Turntable",
     "design",
     "render",
     "scene",
+    "turntable",
     "verilog",
 ]
 
@@ -51,17 +55,19 @@ _MODULES = {
     "MODELS": "golden.presets",
     "Camera": "golden.reference.camera",
     "CompilerMissing": "sim.errors",
-    "Design": "golden.pipeline",
+    "Design": "sim.api.costed_design",
     "InputError": "sim.errors",
     "Light": "golden.reference.lighting",
     "Material": "golden.reference.lighting",
     "Mesh": "golden.reference.geometry",
-    "RenderedFrame": "sim.api.render",
+    "RenderedFrame": "sim.api.rendered_frame",
     "Scene": "golden.reference.scene",
     "SimulationError": "sim.errors",
+    "Turntable": "sim.api.turntable",
     "design": "sim.api.design",
     "render": "sim.api.render",
     "scene": "sim.api.scene",
+    "turntable": "sim.api.turntable",
     "verilog": "sim.api.design",
 }
 

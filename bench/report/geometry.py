@@ -11,7 +11,6 @@ from typing import Any
 
 from blysk.bench.colors import style_of
 from blysk.bench.report.geometry_cases import TERMINATOR, frame_figures, measure_cases
-from blysk.bench.report.placed import read_store
 from blysk.bench.report.section import Cell, Drawing, Mark, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
@@ -22,6 +21,7 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.render import RenderUnit
+from blysk.sim.api.placed import read_store
 from blysk.sim.api.scene import scene
 from blysk.sim.frames.triangles import TriangleSimulator
 

@@ -5,7 +5,6 @@ from statistics import median
 from typing import Any
 
 from blysk.bench.accuracy import model_of
-from blysk.bench.report.placed import read_store
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.tools.families import ECP5, FAMILIES
@@ -13,6 +12,7 @@ from blysk.bench.tools.place_and_route import SEEDS, lay_out, tool_versions
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.api.placed import read_store
 from blysk.sim.installation import install_extra
 
 __all__ = ["measure", "section", "task", "tasks"]

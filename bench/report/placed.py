@@ -5,7 +5,6 @@ and ``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files int
 """
 
 import json
-import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
@@ -16,26 +15,13 @@ from typing import Any
 import click
 
 from blysk.bench.command import run
+from blysk.sim.api.placed import STORE, design_of, read_store
 from blysk.sim.errors import InputError
 from blysk.sim.output import write_json
 
-__all__ = ["STORE", "design_of", "merged", "placed", "read_store"]
-
-STORE = Path(__file__).with_name("placed.json")
-"""The committed store: a list of entries of `merged`."""
-
-_NAME = re.compile(r"pipeline ([\w-]+), ([\w-]+), 1 light(?:, (cosine|one_minus_cosine))?")
+__all__ = ["merged", "placed"]
 
 _PARTS = ("luts", "flip_flops", "multipliers", "block_rams", "distributed_rams")
-
-
-def design_of(name: str) -> tuple[str, ...] | None:
-    """Method, model and perhaps operand of a pipeline, from its name in ``blysk fpga``.
-
-    ``None`` for more than one light, another style, and names that are no pipeline's.
-    """
-    found = _NAME.fullmatch(name)
-    return tuple(word for word in found.groups() if word) if found else None
 
 
 def merged(
@@ -72,11 +58,6 @@ def merged(
             "command": command,
         }
     return [found[key] for key in sorted(found)]
-
-
-def read_store(path: Path = STORE) -> list[dict[str, Any]]:
-    """Entries of the store."""
-    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def placed(device: str, path: Path = STORE) -> dict[tuple[str, ...], dict[str, Any]]:

@@ -29,6 +29,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
 from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
+from blysk.sim.api import costed_design
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions, unit_of_top
 from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
@@ -59,7 +60,7 @@ ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 @with_options({**COUNTS, **DESIGN})
 def design(
     *, lights: int = 1, materials: int = 1, factors: int = 0, **options: Unpack[DesignOptions]
-) -> Design:
+) -> costed_design.Design:
     """A pipeline with the defaults of the command line.
 
     Parameters
@@ -96,7 +97,7 @@ def design(
         raise settings.refuse("factors", str(error), remedy) from None
 
 
-def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
+def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_design.Design:
     """The pipeline that the design options describe.
 
     Parameters
@@ -122,7 +123,7 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> Design:
         raise settings.refuse("gate", f"{method} has no error bound for one", "leave it out", "")
     options: dict[str, Any] = {name: settings[name] for name in DESIGN if name not in ("method", "model")}
     try:
-        made = preset(method, settings["model"], lights, **options)
+        made = costed_design.Design.of(preset(method, settings["model"], lights, **options))
     except ValueError as error:
         raise settings.refuse("operand", str(error), "leave it out") from None
     intervals = unit_of(made.interpolator).setup_intervals(made.interpolator)

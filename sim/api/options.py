@@ -48,6 +48,7 @@ __all__ = [
     "GEOMETRIES",
     "GEOMETRY",
     "LIGHTS",
+    "MAX_FRAMES",
     "PIPES",
     "PORTS",
     "RENDERING",
@@ -66,6 +67,9 @@ __all__ = [
 
 SLOW_SIZE = (160, 120)
 """Largest picture of the engine pysim if it replaces cxxrtl, and its default size: width and height."""
+
+MAX_FRAMES = 9999
+"""Most frames of a turntable: four digits in their names."""
 
 COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
 """Options of a material."""

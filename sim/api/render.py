@@ -1,39 +1,29 @@
 """Frames of simulated pipelines, from a mesh or a scene in one call."""
 
-import base64
-import html
-import io
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Unpack, cast
 
-import numpy as np
-from PIL import Image
-
-from blysk.golden.frames.compare import Comparison, FrameErrors, compare, compare_image
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.pipeline import Design
-from blysk.golden.reference.metrics import error_map
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import design_of, refused_counts
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, Engine, RenderOptions, Source
+from blysk.sim.api.rendered_frame import RenderedFrame
 from blysk.sim.api.scene import load, scenes_of
 from blysk.sim.api.settings import Settings, check_engine, rendering_settings
 from blysk.sim.api.signature import with_options
 from blysk.sim.errors import CompilerMissing, OptionError
-from blysk.sim.frames.figures import difference_figures, frame_figures, saving_figures, triangle_figures
+from blysk.sim.frames.figures import difference_figures, saving_figures
 from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
-from blysk.sim.frames.picture import write_comparison, write_image
 from blysk.sim.frames.specialise import Specialisation, specialise
-from blysk.sim.frames.summary import frame_lines, specialisation_lines
-from blysk.sim.frames.triangles import LARGEST_PICTURE, SimulatedTriangleFrame, TriangleSimulator
+from blysk.sim.frames.triangles import LARGEST_PICTURE, TriangleSimulator
 from blysk.sim.meshes.mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
 from blysk.sim.run_files import RunFiles
@@ -41,9 +31,9 @@ from blysk.sim.run_files import RunFiles
 __all__ = [
     "BUILDING",
     "SPECIALISING",
-    "RenderedFrame",
     "Rendering",
     "prepare_rendering",
+    "prepared",
     "render",
 ]
 
@@ -53,165 +43,6 @@ BUILDING = "building the model"
 """Stage of `prepare_rendering` in which the hardware is compiled; the cause of a long time is appended."""
 
 Progress = Callable[[int, int], object]
-
-
-@dataclass(frozen=True)
-class RenderedFrame:
-    """A frame of a simulated pipeline; a notebook shows its picture and its figures.
-
-    Parameters
-    ----------
-    scene : Scene
-        What was drawn.
-    design : Design
-        The pipeline; if it was specialised, the full pipeline.
-    simulated : SimulatedFrame or SimulatedTriangleFrame
-        The hardware's frame, by spans or by triangles.
-    name : str
-        Name of the mesh.
-    details : dict
-        ``ignored`` and ``counts`` of `LoadedMesh`, ``seconds`` of its parts, perhaps ``specialisation``.
-    files : RunFiles
-        The files that were read, which `save` does not replace.
-    """
-
-    scene: Scene
-    design: Design
-    simulated: SimulatedFrame | SimulatedTriangleFrame
-    name: str
-    details: dict[str, Any]
-    files: RunFiles = field(default_factory=RunFiles)
-
-    @property
-    def image(self) -> np.ndarray:
-        """The picture, uint8, shape (height, width, 3)."""
-        return self.simulated.image
-
-    @property
-    def error(self) -> FrameErrors:
-        """Errors against exact normals at every pixel with the same reflection model, in LSB and dB."""
-        return self.comparison.method_error
-
-    @property
-    def total_error(self) -> FrameErrors:
-        """Errors against exact shading by the exact model: a lobe's own, else Blinn's power, see `target_of`.
-
-        That of the reflection model is in it; with a lobe it is `error`.
-        """
-        return self.comparison.total_error
-
-    @cached_property
-    def error_map(self) -> np.ndarray:
-        """Largest error of the channels of each pixel, as in `error`, LSB; float64, shape (height, width)."""
-        return error_map(self.image, self.comparison.golden)
-
-    @property
-    def cycles(self) -> int:
-        """Cycles from the first write of a constant to the last pixel; of triangles until all are drawn."""
-        return self.simulated.cycles
-
-    @property
-    def spans(self) -> int:
-        """Number of spans that went into the shading pipeline."""
-        return self.simulated.spans
-
-    @property
-    def pixels(self) -> int:
-        """Number of pixels that came out of it, hidden ones included."""
-        return self.simulated.pixels
-
-    @property
-    def engine(self) -> str:
-        """Simulator that ran: ``"cxxrtl"`` or ``"pysim"``."""
-        return self.simulated.engine
-
-    @cached_property
-    def comparison(self) -> Comparison:
-        """The golden frame, and the errors against three references; by triangles against two."""
-        if isinstance(self.simulated, SimulatedTriangleFrame):
-            return compare_image(self.scene, self.design, self.simulated.image)
-        return compare(self.scene, self.design, self.simulated)
-
-    @cached_property
-    def figures(self) -> dict[str, Any]:
-        """Every figure that the command line prints, by name."""
-        if isinstance(self.simulated, SimulatedTriangleFrame):
-            figures = triangle_figures(self.scene, self.design, self.simulated, self.comparison)
-        else:
-            figures = frame_figures(self.scene, self.design, self.simulated, self.comparison)
-        return {
-            "mesh": self.name,
-            **figures,
-            **self.details,
-            "counts": {**self.details["counts"], **figures["counts"]},
-            "seconds": {**self.details["seconds"], **figures["seconds"]},
-        }
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the picture; the suffix chooses the format.
-
-        Raises
-        ------
-        InputError
-            If the suffix names no picture format, or the file cannot be written, or was read for the frame.
-        """
-        with self.files.active():
-            write_image(path, self.image)
-
-    def save_comparison(self, path: str | os.PathLike[str]) -> None:
-        """Write one picture of the simulated frame, the golden frame and the error map; see `save`."""
-        parameter = self.design.highlight_parameter(self.scene.materials[0])
-        name = self.design.specular.model.PARAMETER if self.design.specular else "exponent"
-        highlight = "" if name is None else f", {name} {parameter:.4g}"
-        subtitle = "no pixel shows the surface"
-        if self.figures["visible_pixels"]:
-            subtitle = (
-                "simulated RTL beside exact normals of every pixel, same model, in float64: largest error "
-                f"{self.error.max_lsb:.2f} LSB, {self.cycles:,} cycles for {self.pixels:,} pixels"
-            )
-        title = f"{self.name}: {self.design.method}, {self.design.model}{highlight}"
-        with self.files.active():
-            write_comparison(path, self.image, self.comparison.golden, title=title, subtitle=subtitle)
-
-    def lines(self) -> Iterator[str]:
-        """The figures as the command line prints them."""
-        yield from frame_lines(self.figures)
-        if "specialisation" in self.figures:
-            yield from specialisation_lines(self.figures["specialisation"])
-
-    def __str__(self) -> str:
-        return "\n".join(self.lines())
-
-    def __repr__(self) -> str:
-        height, width, _ = self.image.shape
-        return (
-            f"<RenderedFrame {self.name} {width}x{height}, {self.design.method}, {self.design.model}, "
-            f"{self.cycles:,} cycles>"
-        )
-
-    def _repr_png_(self) -> bytes:
-        file = io.BytesIO()
-        Image.fromarray(self.image).save(file, format="PNG")
-        return file.getvalue()
-
-    def _repr_html_(self) -> str:
-        picture = base64.b64encode(self._repr_png_()).decode()
-        rows = {
-            "method": f"{self.design.method}, {self.design.model}",
-            "cycles": f"{self.cycles:,}",
-            "spans": f"{self.spans:,}",
-            "pixels": f"{self.pixels:,}",
-            "largest error, exact normals, same model": f"{self.error.max_lsb:.3f} LSB",
-            "PSNR": f"{self.error.psnr_db:.2f} dB",
-        }
-        table = "".join(
-            f"<tr><th>{key}</th><td>{html.escape(value)}</td></tr>" for key, value in rows.items()
-        )
-        alternative = html.escape(f"{self.name}, simulated")
-        return (
-            f'<figure><img alt="{alternative}" src="data:image/png;base64,{picture}">'
-            f"<figcaption><table>{table}</table></figcaption></figure>"
-        )
 
 
 @dataclass(frozen=True)
@@ -264,8 +95,10 @@ class Rendering:
         names = ("repaired_normals", "dropped_faces", "opposed_faces")
         return {name: getattr(self.loaded, name) for name in names}
 
-    def render(self, progress: Progress | None = None, vcd: str | None = None) -> RenderedFrame:
-        """Draw the first scene.
+    def render(
+        self, progress: Progress | None = None, vcd: str | None = None, index: int = 0
+    ) -> RenderedFrame:
+        """Draw a scene.
 
         Parameters
         ----------
@@ -273,19 +106,21 @@ class Rendering:
             Called now and then with the number of pixels so far and in all.
         vcd : str, optional
             File for the waveforms, of the engine ``"pysim"``.
+        index : int
+            Number of the scene; by default the first.
         """
         assert self.simulator is not None
-        frame = self.simulator.render(self.specialisation.scenes[0], progress=progress, vcd=vcd)
+        frame = self.simulator.render(self.specialisation.scenes[index], progress=progress, vcd=vcd)
         details: dict[str, Any] = {"ignored": list(self.loaded.ignored)}
         details |= {"counts": self.counts, "seconds": self.seconds}
         if self.is_specialised:
             details["specialisation"] = {**saving_figures(self.specialisation), "cycles": frame.cycles}
             if vcd is None:
-                whole = FrameSimulator(self.design, self.engine, self.pipes).render(self.scenes[0])
+                whole = FrameSimulator(self.design, self.engine, self.pipes).render(self.scenes[index])
                 details["specialisation"]["full_cycles"] = whole.cycles
                 details["specialisation"] |= difference_figures(cast(SimulatedFrame, frame), whole)
         files = RunFiles.current()
-        return RenderedFrame(self.scenes[0], self.design, frame, self.loaded.name, details, files)
+        return RenderedFrame(self.scenes[index], self.design, frame, self.loaded.name, details, files)
 
 
 def prepare_rendering(
@@ -440,6 +275,24 @@ def _shrink(settings: Settings, error: CompilerMissing) -> None:
     warnings.warn(f"pysim at {width}x{height} instead of cxxrtl, {error}", RuntimeWarning, stacklevel=4)
 
 
+def prepared(
+    source: Source | Scene,
+    design: Design | None,
+    engine: str,
+    options: Mapping[str, Any],
+    *,
+    vcd: str | os.PathLike[str] | None = None,
+    frames: int = 0,
+) -> Rendering:
+    """`prepare_rendering` of what a caller gives, see `render`; ``frames`` of a turntable."""
+    if design is not None:
+        for name in DESIGN.keys() & options.keys():
+            raise OptionError(name, "", "the design has its own", "leave out one of them")
+    check_engine(engine)
+    settings = rendering_settings(source, dict(options), vcd)
+    return prepare_rendering(settings, design=design, engine="pysim" if vcd else engine, frames=frames)
+
+
 @with_options({**SCENE, **DESIGN, **RENDERING}, RenderOptions)
 def render(
     source: Source | Scene = "teapot",
@@ -481,15 +334,10 @@ def render(
         If the pipeline breaks the rules of its streams; `CompilerMissing` if ``engine="cxxrtl"`` finds no
         compiler.
     """
-    if design is not None:
-        for name in DESIGN.keys() & options.keys():
-            raise OptionError(name, "", "the design has its own", "leave out one of them")
-    check_engine(engine)
     if vcd is not None and engine == "cxxrtl":
         raise OptionError("vcd", "", "the engine cxxrtl writes no waveforms", 'use engine="pysim"')
     with RunFiles.current().active(), refused_counts(design):
-        settings = rendering_settings(source, dict(options), vcd)
-        ready = prepare_rendering(settings, design=design, engine="pysim" if vcd else engine)
+        ready = prepared(source, design, engine, options, vcd=vcd)
         if vcd is None:
             return ready.render(progress)
         with atomic_writer(Path(vcd)) as waves:

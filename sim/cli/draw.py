@@ -9,7 +9,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from blysk.sim.api.render import BUILDING, SPECIALISING, RenderedFrame, Rendering, prepare_rendering
+from blysk.sim.api.render import BUILDING, SPECIALISING, Rendering, prepare_rendering
+from blysk.sim.api.rendered_frame import RenderedFrame
 from blysk.sim.api.settings import Settings
 from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import Animation, dask_executor, process_executor, render_frames, write_gif

@@ -7,7 +7,7 @@ from typing import get_args
 import click
 
 from blysk.golden.presets import METHOD_LINES, MODEL_LINES
-from blysk.sim.api.options import DESIGN, RENDERING, SCENE, Engine
+from blysk.sim.api.options import DESIGN, MAX_FRAMES, RENDERING, SCENE, Engine
 from blysk.sim.api.scene_file import key_lines
 from blysk.sim.api.settings import check_mesh, rendering_settings
 from blysk.sim.cli.options import given_options, options_of
@@ -16,9 +16,6 @@ from blysk.sim.run_files import check_beside
 from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = ["command"]
-
-MAX_FRAMES = 9999
-"""Most frames of a turntable: four digits in their names."""
 
 
 def _described(lines: dict[str, str]) -> str:

@@ -4,11 +4,11 @@ import pytest
 
 from blysk.bench.report import place_and_route
 from blysk.bench.report.place_and_route import OTHERS, OTHERS_SEEDS, measure, section, tasks
-from blysk.bench.report.placed import read_store
 from blysk.bench.tools.families import FAMILIES, Parts, Place
 from blysk.bench.tools.place_and_route import Layout
 from blysk.bench.tools.tool_runner import TooLarge, ToolError
 from blysk.golden.presets import METHODS
+from blysk.sim.api.placed import read_store
 from blysk.sim.installation import install_extra
 
 

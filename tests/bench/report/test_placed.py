@@ -7,9 +7,10 @@ from pathlib import Path
 from click.testing import CliRunner
 
 from blysk.bench.report import placed as module
-from blysk.bench.report.placed import STORE, design_of, merged, placed, read_store
+from blysk.bench.report.placed import merged, placed
 from blysk.bench.tools.families import DEVICE
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
+from blysk.sim.api.placed import STORE, design_of, read_store
 
 GUIDE = Path(__file__).parents[3] / "docs/guide/fpga.md"
 

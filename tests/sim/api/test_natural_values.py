@@ -2,14 +2,18 @@
 
 import inspect
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 import blysk
-from blysk.golden.presets import METHODS, PUBLISHED
+from blysk.golden.presets import METHODS, PUBLISHED, preset
+from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.api.options import COUNTS, DESIGN, RENDERING, SCENE
+from blysk.sim.api.placed import read_store
 from blysk.sim.meshes.mesh import given_mesh, load_mesh
 
 TINY = {"triangles": 100}
@@ -192,3 +196,46 @@ def test_methods_and_models_are_listed():
     assert {"blinn", "cosquad", "ggx", "phong"} <= blysk.MODELS.keys()
     for line in (*blysk.METHODS.values(), *blysk.MODELS.values()):
         assert len(line.split()) > 1
+
+
+def test_a_turntable(tmp_path):
+    tiny = {"size": "24x16", "triangles": 100}
+    turned = blysk.turntable("teapot", "3", **tiny)
+    assert (len(turned), str(turned)) == (3, "<Turntable teapot 3 frames 24x16, quotient, blinn>")
+    first = blysk.render("teapot", **tiny)
+    np.testing.assert_array_equal(turned[0].image, first.image)
+    images = [frame.image for frame in turned]
+    assert len({image.tobytes() for image in images}) == 3
+    np.testing.assert_array_equal(turned[-1].image, images[2])
+    assert turned[2].scene.camera.position != first.scene.camera.position
+    path, told = tmp_path / "a.gif", []
+    turned.save(path, progress=lambda *counts: told.append(counts))
+    assert told == [(1, 3), (2, 3), (3, 3)]
+    with Image.open(path) as gif:
+        assert (gif.n_frames, gif.size) == (3, (24, 16))
+    with pytest.raises(blysk.InputError, match="the animation is a GIF; let the name end in"):
+        turned.save(tmp_path / "a.png")
+    with pytest.raises(blysk.InputError, match=r"^frames 0: out of range; give a whole number"):
+        blysk.turntable(frames=0)
+    with pytest.raises(blysk.InputError, match="looks along the axis that it would turn about"):
+        blysk.turntable(view=(0, 1, 0), **tiny)
+
+
+def test_a_design_has_its_cost():
+    design, same = blysk.design(method="chord"), preset("chord")
+    assert design == same
+    assert same == design
+    assert (hash(design), repr(design)) == (hash(same), repr(same))
+    assert design != preset("linear")
+    cost = design.cost()
+    unit = ShadingPipelineUnit(same)
+    assert (cost.latency, cost.cycles_per_pixel) == (unit.latency, unit.cycles_per_pixel)
+    (entry,) = (e for e in read_store() if e["design"] == "pipeline chord, blinn, 1 light")
+    assert (cost.luts, cost.flip_flops, cost.device) == (entry["luts"], entry["flip_flops"], entry["device"])
+    # The mapper makes each of these one multiplier of 18x18 bits.
+    assert cost.multipliers == sum(cost.multiplier_widths.values()) == entry["multipliers"]
+    assert f"{entry['luts']:,} LUT" in str(cost)
+    # No figure of another design: neither more lights nor another build is that which was placed.
+    for other in (replace(design, lights=2), design.built(setup_interval=3), replace(design, gate=True)):
+        assert isinstance(other, blysk.Design)
+        assert other.placed() == {}

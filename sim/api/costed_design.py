@@ -1,0 +1,117 @@
+"""A design as Python gives it: with its cost."""
+
+from dataclasses import dataclass, fields
+from statistics import median
+from typing import Any
+
+from blysk.golden import pipeline
+from blysk.golden.presets import preset
+from blysk.hdl.emit.cost import cost_of
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.api.placed import design_of, read_store
+
+__all__ = ["Design", "DesignCost"]
+
+
+@dataclass(frozen=True)
+class DesignCost:
+    """What a pipeline costs: counted in its netlist, and placed on an FPGA if that is committed.
+
+    Parameters
+    ----------
+    multipliers : int
+        Multipliers of two words that are no constants, of any width.
+    multiplier_widths : dict of (int, int) to int
+        Their number by the widths of their operands, the wider first.
+    register_bits, memory_bits : int
+        Bits of flip-flops, and of memories, before technology mapping.
+    cycles_per_pixel : int
+        Cycles of a pixel of a long span.
+    setup_interval : int
+        A span of n pixels takes max(``cycles_per_pixel`` n, this) cycles at most.
+    latency : int
+        Cycles from a span to its first pixel.
+    luts, flip_flops, block_rams : int or None
+        Parts on ``device`` as placed by ``blysk fpga``; ``None`` if this design is not in `placed.STORE`.
+    clock_mhz : float or None
+        Median clock rate over the seeds of the placement.
+    device, placed_on : str or None
+        The FPGA, and the date of the placement.
+    """
+
+    multipliers: int
+    multiplier_widths: dict[tuple[int, int], int]
+    register_bits: int
+    memory_bits: int
+    cycles_per_pixel: int
+    setup_interval: int
+    latency: int
+    luts: int | None = None
+    flip_flops: int | None = None
+    block_rams: int | None = None
+    clock_mhz: float | None = None
+    device: str | None = None
+    placed_on: str | None = None
+
+    def __str__(self) -> str:
+        """Two lines: the netlist and the times; the placement."""
+        widths = ", ".join(f"{n}*{wide}x{narrow}" for (wide, narrow), n in self.multiplier_widths.items())
+        netlist = (
+            f"{self.multipliers} multipliers ({widths or 'none'}), {self.register_bits:,} register bits, "
+            f"{self.memory_bits:,} memory bits; {self.cycles_per_pixel} a pixel, {self.setup_interval} a "
+            f"span at least, latency {self.latency} cycles"
+        )
+        if self.luts is None:
+            return f"{netlist}\nnot placed; blysk fpga places it"
+        return (
+            f"{netlist}\n{self.luts:,} LUT, {self.flip_flops:,} flip-flops, {self.block_rams} block RAMs, "
+            f"{self.clock_mhz:.0f} MHz on {self.device}, {self.placed_on}"
+        )
+
+
+class Design(pipeline.Design):
+    """A design of the golden layer, equal to that, with `cost`."""
+
+    @classmethod
+    def of(cls, design: pipeline.Design) -> "Design":
+        """The same design with a cost."""
+        return cls(**{field.name: getattr(design, field.name) for field in fields(design)})
+
+    def cost(self) -> DesignCost:
+        """Multipliers, bits and cycles, from the unit; parts of an FPGA where they are committed.
+
+        The netlist is written and counted each time: seconds.
+        """
+        unit = ShadingPipelineUnit(self)
+        cost = cost_of(unit)
+        return DesignCost(
+            multipliers=cost.multiplier_count,
+            multiplier_widths=cost.multipliers,
+            register_bits=cost.register_bits,
+            memory_bits=cost.rom_bits + cost.ram_bits,
+            cycles_per_pixel=unit.cycles_per_pixel,
+            setup_interval=unit.setup_interval,
+            latency=unit.latency,
+            **self.placed(),
+        )
+
+    def placed(self) -> dict[str, Any]:
+        """Figures of `DesignCost` from the committed placement of this very design; empty without one."""
+        for entry in read_store():
+            words = design_of(entry["design"])
+            if words is None or words[:2] != (self.method, self.model):
+                continue
+            if preset(*words[:2], operand=words[2] if len(words) > 2 else None) == self:
+                return {
+                    **{name: entry[name] for name in ("luts", "flip_flops", "block_rams", "device")},
+                    "clock_mhz": median(entry["fmax_mhz"]),
+                    "placed_on": entry["date"],
+                }
+        return {}
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, pipeline.Design):
+            return NotImplemented
+        return all(getattr(self, field.name) == getattr(other, field.name) for field in fields(self))
+
+    __hash__ = pipeline.Design.__hash__

@@ -1,0 +1,27 @@
+"""The committed results of place and route, each with its date."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+__all__ = ["STORE", "design_of", "read_store"]
+
+STORE = Path(__file__).with_name("placed.json")
+"""The committed store: a list of entries of `blysk.bench.report.placed.merged`."""
+
+_NAME = re.compile(r"pipeline ([\w-]+), ([\w-]+), 1 light(?:, (cosine|one_minus_cosine))?")
+
+
+def design_of(name: str) -> tuple[str, ...] | None:
+    """Method, model and perhaps operand of a pipeline, from its name in ``blysk fpga``.
+
+    ``None`` for more than one light, another style, and names that are no pipeline's.
+    """
+    found = _NAME.fullmatch(name)
+    return tuple(word for word in found.groups() if word) if found else None
+
+
+def read_store(path: Path = STORE) -> list[dict[str, Any]]:
+    """Entries of the store."""
+    return json.loads(path.read_text(encoding="utf-8"))
