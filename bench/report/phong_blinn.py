@@ -61,7 +61,7 @@ PIXELS = 1 << 14
 
 _METHOD = "quotient"
 _HARDWARE_MODELS = ("blinn", "phong")
-_SHAPE = {"degrees": 60, "exponent": 25}
+_SHAPE = {"degrees": 50, "exponent": 12}
 _EXPONENT = 50
 _TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
 _WIDTHS = (10, 100, 1000)
@@ -329,7 +329,8 @@ def picture(model: str, exponent: int, side: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``png``, in base 64, the whole picture; ``lsb``, its largest error off the border of the light.
+        ``png``, in base 64, the part with the highlight; ``lsb``, the largest error of the picture off the
+        border of the light.
     """
     scene = scene_for(sphere(48), exponent, side, side)
     right, _, towards = scene.camera.axes[0], scene.camera.axes[1], scene.camera.viewer
@@ -339,7 +340,8 @@ def picture(model: str, exponent: int, side: int) -> dict[str, Any]:
     design = preset(_METHOD, model)
     frame = FrameSimulator(design, "auto").render(scene)
     buffer = io.BytesIO()
-    Image.fromarray(frame.image).convert("L").save(buffer, "png", optimize=True)
+    part = frame.image[side // 8 : side - side // 8, : side // 2]
+    Image.fromarray(part).convert("L").save(buffer, "png", optimize=True)
     error = compare(scene, design, frame).method_error.steady_lsb
     return {"png": base64.b64encode(buffer.getvalue()).decode(), "lsb": error}
 
@@ -363,7 +365,7 @@ def tasks(quick: bool) -> list[Task]:
         errors = {"exponents": [_EXPONENT] if count != _TRIANGLES[1] else [1, 10, _EXPONENT, 100, 1000]}
         found += [Task(hardware_frames, {"model": model, **settings, **errors}) for model in _HARDWARE_MODELS]
     found += [Task(hardware_cost, {"model": model}) for model in _HARDWARE_MODELS]
-    side = 160 if quick else 320
+    side = 240 if quick else 480
     return found + [Task(picture, {"model": m, "exponent": n, "side": side}) for m, n, _ in _pictured()]
 
 
