@@ -1,8 +1,11 @@
 """Shared parts of this folder's commands: progress that can be interrupted, and the exit status."""
 
 import contextlib
+import io
 import sys
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TypeVar
 
 import click
 from tqdm import tqdm
@@ -10,7 +13,42 @@ from tqdm import tqdm
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
 from blysk.sim.errors import InputError
 
-__all__ = ["resumable", "run"]
+__all__ = ["progress", "resumable", "run"]
+
+_SECONDS = 10
+"""Seconds from a line of `progress` to the next, where there is no terminal."""
+
+Part = TypeVar("Part")
+
+
+class _Lines(tqdm):
+    """Progress without a terminal: a line on standard error each `_SECONDS`, and none of shorter work."""
+
+    def __init__(self, *arguments, **options):
+        self.told = time.monotonic()
+        super().__init__(*arguments, file=io.StringIO(), ncols=0, **options)
+
+    def display(self, msg=None, pos=None):
+        """Print the state, if the last line is long ago; the empty state at the end is left out."""
+        if msg is None and time.monotonic() - self.told >= _SECONDS:
+            self.told = time.monotonic()
+            print(self, file=sys.stderr, flush=True)
+
+
+def progress(parts: Iterable[Part] | None = None, *, total: int, unit: str) -> "tqdm[Part]":
+    """Progress of long work: a bar on a terminal, else a line on standard error each 10 seconds.
+
+    Parameters
+    ----------
+    parts : iterable, optional
+        The work, over which the bar is then an iterator; else ``update`` tells of each part.
+    total : int
+        Number of the parts.
+    unit : str
+        Name of the parts.
+    """
+    kind = tqdm if sys.stderr.isatty() else _Lines
+    return kind(parts, total=total, unit=f" {unit}", leave=False)
 
 
 @contextlib.contextmanager
@@ -27,7 +65,7 @@ def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
         Name of the parts.
     """
     kept = 0
-    with tqdm(total=total, unit=f" {unit}", leave=False, disable=None) as bar:
+    with progress(total=total, unit=unit) as bar:
 
         def count() -> None:
             nonlocal kept

@@ -19,10 +19,9 @@ from pathlib import Path
 
 import click
 import numpy as np
-from tqdm import tqdm
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.command import run
+from blysk.bench.command import progress, run
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.blocks import ENTRIES as UNITS
 from blysk.bench.tools.blocks import Entry, entries_of
@@ -218,7 +217,7 @@ def _command(words: Sequence[str], update: bool, jobs: int) -> int:
     tasks = [Task(measure, {"name": name}) for name in chosen]
     try:
         with (
-            tqdm(total=len(tasks), unit=" entries", leave=False, disable=None) as bar,
+            progress(total=len(tasks), unit="entries") as bar,
             local_executor(jobs) as executor,
         ):
             new = dict(zip(chosen, results_of(tasks, executor, bar.update), strict=True))

@@ -28,9 +28,8 @@ from pathlib import Path
 from typing import Any
 
 import click
-from tqdm import tqdm
 
-from blysk.bench.command import run
+from blysk.bench.command import progress, run
 from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
 from blysk.bench.store import Task, results_of
@@ -221,7 +220,7 @@ def _command(units, count, seed, jobs, figures) -> int:
     names = units or tuple(RECORDS)
     with (
         local_executor(jobs) as executor,
-        tqdm(total=len(names), unit=" units", leave=False, disable=None) as bar,
+        progress(total=len(names), unit="units") as bar,
     ):
         rows = scores(names, count, seed, executor, bar.update)
     if figures:

@@ -19,9 +19,8 @@ from typing import Any
 import click
 import numpy as np
 from amaranth.lib.wiring import Component
-from tqdm import tqdm
 
-from blysk.bench.command import run
+from blysk.bench.command import progress, run
 from blysk.bench.speed.verilator import Verilated, free_stimulus
 from blysk.bench.store import Task, results_of
 from blysk.golden.frame_constants import FrameConstants
@@ -461,7 +460,7 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
     with (
         tempfile.TemporaryDirectory(prefix="blysk-", ignore_cleanup_errors=True) as folder,
         local_executor(jobs, _begin, (folder,)) as executor,
-        tqdm(total=len(work), unit=" parts", leave=False, disable=None) as bar,
+        progress(total=len(work), unit="parts") as bar,
     ):
         rows = table(work, results_of(work, executor, bar.update))
     if figures:

@@ -18,10 +18,9 @@ from typing import NamedTuple
 import click
 import numpy as np
 from amaranth.lib.wiring import Component
-from tqdm import tqdm
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.command import run
+from blysk.bench.command import progress, run
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.diffuse import Diffuse
@@ -354,11 +353,7 @@ def _command(meshes, size, models, exponents, figures) -> int:
         check_writable(figures)
     loaded = [load_mesh(source) for source in meshes or ["teapot"]]
     count = len(loaded) * len(models) * len(exponents)
-    rows = list(
-        tqdm(
-            measure(loaded, models, exponents, *size), total=count, unit=" frames", leave=False, disable=None
-        )
-    )
+    rows = list(progress(measure(loaded, models, exponents, *size), total=count, unit="frames"))
     if figures:
         write_json(figures, {"width": size[0], "height": size[1], "frames": [_figures(row) for row in rows]})
     _print(rows)

@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from blysk.bench.accuracy import model_of, scene_for
+from blysk.bench.command import progress
 from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pixel_pipelines import PIPES
@@ -158,7 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     rates = [
         rate
-        for pipes in options.pipes
+        for pipes in progress(options.pipes, total=len(options.pipes), unit="counts of pipelines")
         for rate in measure(pipes, options.meshes, options.width, options.height, options.method)
     ]
     if options.json:

@@ -17,6 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from blysk.bench.accuracy import model_of, scene_for
+from blysk.bench.command import progress
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Spans
@@ -237,9 +238,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     lengths: list[Lengths] = []
     rows: list[Throughput] = []
-    for frame, throughputs in _frames(
-        options.triangles, options.methods, options.intervals, options.width, options.height
-    ):
+    frames = _frames(options.triangles, options.methods, options.intervals, options.width, options.height)
+    for frame, throughputs in progress(frames, total=len(options.triangles), unit="meshes"):
         lengths.append(frame)
         rows += throughputs
     if options.json:

@@ -12,8 +12,8 @@ from typing import Any
 import click
 import numpy as np
 from amaranth.lib.wiring import Component
-from tqdm import tqdm
 
+from blysk.bench.command import progress
 from blysk.hdl.emit.cost import Cost, cost_of
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.simulate import simulate
@@ -321,9 +321,7 @@ def command(samples, seed, jobs, figures):
     """
     if figures:
         check_writable(figures)
-    lines = list(
-        tqdm(rows(ENTRIES, samples, seed, jobs), total=len(ENTRIES), unit=" rows", leave=False, disable=None)
-    )
+    lines = list(progress(rows(ENTRIES, samples, seed, jobs), total=len(ENTRIES), unit="rows"))
     if figures:
         write_json(figures, {"samples": samples, "seed": seed, "blocks": [row.as_dict() for row in lines]})
     click.echo(table(lines))

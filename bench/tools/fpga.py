@@ -26,8 +26,8 @@ from typing import Any
 
 import click
 from amaranth.lib import wiring
-from tqdm import tqdm
 
+from blysk.bench.command import progress
 from blysk.bench.tools.blocks import ENTRIES
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F, Family, Parts
 from blysk.bench.tools.parts_by_unit import parts_by_unit, sum_parts
@@ -247,7 +247,10 @@ def command(
     tools = versions_of(family)
     about = {"device": family.device, "capacity": asdict(family.capacity), "tools": tools}
     if by_unit:
-        found = {name: parts_by_unit(unit(), family, not keep_registers) for name, unit in designs}
+        found = {
+            name: parts_by_unit(unit(), family, not keep_registers)
+            for name, unit in progress(designs, total=len(designs), unit="designs")
+        }
         if figures:
             entries = {
                 name: {unit: asdict(parts) for unit, parts in of.items()} for name, of in found.items()
@@ -256,7 +259,7 @@ def command(
         click.echo("\n\n".join(table_by_unit(name, of, family) for name, of in found.items()))
         return
     layouts, too_large = [], {}
-    with tqdm(total=len(designs) * seeds, unit=" placements", leave=False, disable=None) as bar:
+    with progress(total=len(designs) * seeds, unit="placements") as bar:
         for name, unit in designs:
             bar.set_description_str(name)
             try:

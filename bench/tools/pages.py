@@ -17,8 +17,8 @@ from amaranth.hdl import Fragment, Shape
 from amaranth.lib import stream, wiring
 from amaranth.lib.data import StructLayout
 from matplotlib import rc_context
-from tqdm import tqdm
 
+from blysk.bench.command import progress
 from blysk.bench.svg import STYLE, svg
 from blysk.bench.tools.blocks import SEED, Entry, Row, cells_of, entries_of, row_of, sample_of
 from blysk.bench.tools.docstrings import inline, markdown, markdown_table
@@ -484,7 +484,7 @@ def command(folder, units):
         blysk pages docs/blocks --unit bisection
     """
     units = units or tuple(RECORDS)
-    with tqdm(total=len(units), unit=" pages", leave=False, disable=None) as bar:
+    with progress(total=len(units), unit="pages") as bar:
 
         def show(unit):
             bar.set_postfix_str(unit)

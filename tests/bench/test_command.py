@@ -1,10 +1,12 @@
 """The end of a command: one line and a status for each kind of error."""
 
 import re
+import time
 
 import click
 import pytest
 
+from blysk.bench import command
 from blysk.bench.command import run
 from blysk.sim.cli.main import main
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
@@ -56,3 +58,21 @@ def test_help_has_an_example(name, capsys):
 def test_bad_input_is_one_line(arguments, line, refused, tmp_path):
     (tmp_path / "file").touch()
     refused(*arguments, line=line)
+
+
+def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, monkeypatch):
+    monkeypatch.setattr(command, "_SECONDS", 0.3)
+    for _ in command.progress(range(8), total=8, unit="parts"):
+        time.sleep(0.15)
+    output, errors = capsys.readouterr()
+    assert output == ""
+    lines = errors.splitlines()
+    assert 1 <= len(lines) <= 6
+    assert all(re.match(r" *\d+% \d/8 \[.* parts/s\]$", line) for line in lines)
+
+
+def test_progress_of_short_work_says_nothing(capsys):
+    with command.progress(total=2, unit="parts") as bar:
+        bar.set_description_str("first")
+        bar.update(2)
+    assert capsys.readouterr() == ("", "")
