@@ -1,10 +1,10 @@
 # amaranth: UnusedElaboratable=no
 """Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets.
 
-The quick run has all stimuli of the default variants but those of `SELDOM` and `SELDOM_STIMULI`, compiled:
-the engine itself compares the first beats with Amaranth's simulator. CI has every default variant. The long
-run has all variants, whose models are compared so, too, and of default variants both simulators under every
-pattern of stalls.
+The quick run has all stimuli of the default variants and of the default design, but those of `SELDOM` and
+`SELDOM_STIMULI`, compiled: the engine itself compares the first beats with Amaranth's simulator. CI has every
+default variant. The long run has all variants, whose models are compared so, too, and of default variants
+both simulators under every pattern of stalls.
 """
 
 import inspect
@@ -34,6 +34,9 @@ SELDOM = (
 )
 """Units that the default design does not have: of other methods and models, of renderer, buses and boards."""
 
+DEFAULT_DESIGN = ("pipeline", "quotient, blinn")
+"""In the quick run it stands for the default of its record, most of whose stimuli are of unit normals."""
+
 SELDOM_STIMULI = ("ties", "terminator")
 """Stimuli whose expected beats take the longest: integers of any size, and many spans."""
 
@@ -41,8 +44,10 @@ SELDOM_STIMULI = ("ties", "terminator")
 CI = [pytest.mark.long, pytest.mark.ci]
 
 
-def marks_of(name, stimulus, quick):
-    return CI[:1] if not quick else CI if name in SELDOM or stimulus in SELDOM_STIMULI else []
+def marks_of(name, variant, stimulus, usual):
+    replaced = name == DEFAULT_DESIGN[0] and variant != DEFAULT_DESIGN[1]
+    seldom = name in SELDOM or stimulus in SELDOM_STIMULI or replaced
+    return CI[:1] if not usual else CI if seldom else []
 
 
 @lru_cache(maxsize=1)
@@ -65,14 +70,15 @@ def _runs():
         for variant, given in record.variants.items():
             stimuli = record.stimuli_of(variant)
             for stimulus, sent in stimuli.items():
-                quick = variant == record.default and not (given.long or sent.long)
+                usual = variant == record.default or (name, variant) == DEFAULT_DESIGN
+                usual = usual and not (given.long or sent.long)
                 # The default variant gets every stimulus, the others the first and those that name them.
                 if variant == record.default or stimulus == next(iter(stimuli)) or variant in sent.variants:
                     yield pytest.param(
                         name,
                         variant,
                         stimulus,
-                        marks=marks_of(name, stimulus, quick),
+                        marks=marks_of(name, variant, stimulus, usual),
                         id=f"{name}-{variant}-{stimulus}",
                     )
 

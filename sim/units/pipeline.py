@@ -350,7 +350,9 @@ def _counters(unit, rng, count):
 _CHORD = preset("chord", "cosquad")
 _FULL = preset("chord", "cosquad", lights=2, gate=True)
 _BOTH = ("chord, blinn", "quadratic, cosquad")
-"""Variants that get every stimulus: of `chord` and of the documents."""
+"""Variants of unit normals that get every stimulus: of `chord` and of the documents."""
+_ALL = ("quotient, blinn", *_BOTH)
+"""Variants that get the stimuli of any spans: with the default design."""
 _LESS = {"x_bits": 9, "y_bits": 8, "length_bits": 5}
 
 DESIGNS: dict[str, Design] = {
@@ -449,8 +451,8 @@ RECORD = Record(
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 3000, repeats=3),
-        "frames": Stimulus(_frames, 400, variants=_BOTH),
-        "setups": Stimulus(_every_setup, 60, stalled=False, variants=_BOTH),
+        "frames": Stimulus(_frames, 400, variants=_ALL),
+        "setups": Stimulus(_every_setup, 60, stalled=False, variants=_ALL),
         "terminator": Stimulus(_terminator, variants=_BOTH),
         "roundings": Stimulus(_roundings, variants=_BOTH),
         "long spans": Stimulus(_long_spans, stalled=False, variants=_BOTH),
@@ -459,8 +461,8 @@ RECORD = Record(
         "peaks": Stimulus(partial(_highlights, exponent=997, invert=0, brightness=1), variants=_BOTH),
         "limits": Stimulus(_limits, 600, stalled=False, repeats=20, variants=_BOTH[:1]),
         "halves": Stimulus(_halves, 30, repeats=12, variants=_BOTH),
-        "brightest": Stimulus(_brightest, 800, stalled=False, variants=_BOTH),
-        "counters": Stimulus(_counters, stalled=False, variants=_BOTH),
+        "brightest": Stimulus(_brightest, 800, stalled=False, variants=_ALL),
+        "counters": Stimulus(_counters, stalled=False, variants=_ALL),
     },
     waivers={
         "tables.read": "No table is written while beats read it: then the register may move.",
