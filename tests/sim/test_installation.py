@@ -24,6 +24,8 @@ def tried(command, folder):
     return done.returncode, done.stdout + done.stderr
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_advice_from_a_clone_works_from_any_folder(tmp_path):
     command = shlex.split(install_extra(",".join(EXTRAS)))
     assert command[0] == sys.executable

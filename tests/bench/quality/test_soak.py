@@ -104,6 +104,7 @@ def test_parts_of_a_unit():
     assert rows == [{"design": name, "beats": 22} for name in ("geometry", "all")]
 
 
+@pytest.mark.long
 def test_beats_of_a_unit_are_drawn_anew_and_a_wrong_one_stops_the_run(monkeypatch):
     found = measure_unit("vertex_sort", 2000, 1, 0, None)
     assert found["beats"] >= 2000

@@ -104,6 +104,7 @@ def test_section():
     assert "void" in " ".join(section(quick, [[own], [frame(False, top=1)], [on]]).text)
 
 
+@pytest.mark.long
 def test_tasks():
     full = tasks(quick=False)
     assert [tuple(task.settings[name] for name in ("method", "model", "gate")) for task in full] == [

@@ -43,6 +43,7 @@ def test_nanoseconds_where_most_are_placed_and_the_others_are_named():
     assert "Not drawn" not in conclusion(found(angular=100)).drawing.note
 
 
+@pytest.mark.long
 def test_cycles_where_most_are_not_placed():
     few = [of | {"ns": None, "luts": None, "fmax_mhz": None} for of in found()[1:]]
     drawing = conclusion([found()[0], *few]).drawing

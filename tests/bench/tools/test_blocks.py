@@ -150,6 +150,8 @@ def test_every_unit_has_a_record():
     assert units == found | set(PARTS)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_json_equals_the_table(tmp_path):
     found = check_json_equals_the_table(FEW_ENTRIES, tmp_path)
     check_stated(found, {pair: expected for pair, expected in STATED.items() if pair in found})
@@ -225,7 +227,7 @@ def test_errors_are_measured(entry):
     assert model is None or total <= model + arithmetic + 1e-12
 
 
-@pytest.mark.parametrize("samples", [1000, pytest.param(200_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("samples", [300, pytest.param(200_000, marks=pytest.mark.long)])
 def test_no_word_wraps_in_its_domain(monkeypatch, samples):
     """But phases of the angular setup, where 1 is a turn, and steps of attributes, which are modulo 4."""
     wraps, found = Fixed.wrap, set()

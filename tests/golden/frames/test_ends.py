@@ -59,7 +59,9 @@ def test_no_warning_at_the_ends_of_a_model(name):
             assert frame.image.any()
 
 
-@pytest.mark.parametrize("model", [GGX, BECKMANN], ids=lambda model: model.name)
+@pytest.mark.parametrize(
+    "model", [GGX, pytest.param(BECKMANN, marks=pytest.mark.long)], ids=lambda model: model.name
+)
 def test_no_warning_of_a_small_roughness(model):
     """The curve is 1 at its peak and goes down to 0 elsewhere, as for any roughness in the limit."""
     cosine = np.r_[-1, 0, np.linspace(0, 1, 1000, endpoint=False), 1 - 2.0**-53, 1]

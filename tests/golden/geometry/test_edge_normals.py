@@ -60,6 +60,8 @@ def test_no_piece_turns_more_than_the_limit(limit):
     assert 1.1 * whole < len(spans) < stages.clipped.length.sum()
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_opposite_normals_are_repaired():
     """Where they cancel the normal before takes the place, and no pixel is lost."""
     triangles = random_triangles(np.random.default_rng(3), 300, size=30.0)

@@ -169,7 +169,7 @@ def test_is_lit(model):
 
 
 @pytest.mark.parametrize("opposite", [False, True])
-@pytest.mark.parametrize("exponent", [10, 1000, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 100))])
+@pytest.mark.parametrize("exponent", [1000, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 10, 100))])
 def test_total_error(exponent, opposite):
     """Fit and arithmetic against vectors normalised at each pixel, over spans that pass the tolerances."""
     rng = np.random.default_rng(exponent)

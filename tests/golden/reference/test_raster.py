@@ -110,7 +110,7 @@ def grid(rng, size, low, high, step=256):
 
 
 @pytest.mark.parametrize("step", [2, 4, 256])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2))])
 def test_every_pixel_of_a_triangulation_exactly_once(seed, step):
     # With step 2 and 4 many vertices and edges lie exactly on pixel centres.
     rng = np.random.default_rng(seed)

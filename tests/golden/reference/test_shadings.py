@@ -169,7 +169,11 @@ def close_by_hand(scene, normal, highlight, diffuse):
 
 
 @pytest.mark.parametrize(
-    "thresholds", [(0.15, 1, 1), (2, 0.05, 2), (2, 2, 0.2), (0.6, 0.1, 0.3), (0.9, 0.004, 0.008)]
+    "thresholds",
+    [
+        *(pytest.param(of, marks=pytest.mark.long) for of in ((0.15, 1, 1), (2, 0.05, 2), (2, 2, 0.2))),
+        *((0.6, 0.1, 0.3), (0.9, 0.004, 0.008)),
+    ],
 )
 def test_triangles_for_gouraud(thresholds):
     scene = scene_of(ball(40, 25), SCENES["perspective"].camera)

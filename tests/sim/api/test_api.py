@@ -95,6 +95,8 @@ def test_command_line_prints_and_writes_the_same(frame, tmp_path, capsys):
     assert printed == [line for line in str(frame).splitlines() if not line.startswith(varying)]
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_design_and_verilog(capsys):
     design = blysk.design(method="chord", lights=2, materials=3, gate=True, style="compact", setup_interval=9)
     build = Build(style="compact", setup_interval=9)

@@ -64,7 +64,7 @@ def check(rows):
 
 
 def test_some_malformed_input(tmp_path):
-    rows = attempts(tmp_path, seed=1, files=20, every=120)
+    rows = attempts(tmp_path, seed=1, files=15, every=200)
     assert len(rows) > 30
     check(rows)
 

@@ -148,7 +148,9 @@ def test_repairs_are_counted(capsys):
 
 
 @pytest.mark.parametrize(
-    "options", [[], ["-v"], ["--frames", "1", "--jobs", "1"]], ids=["short", "-v", "frames"]
+    "options",
+    [[], ["-v"], pytest.param(["--frames", "1", "--jobs", "1"], marks=[pytest.mark.ci, pytest.mark.long])],
+    ids=["short", "-v", "frames"],
 )
 def test_what_is_not_read_is_told_in_one_line(capsys, options):
     Path("a.obj").write_bytes(CORNERS + b"usemtl a\ns off\nf 1 2 3\nl 1 2\nSurf 1\n")

@@ -67,6 +67,8 @@ def figures_of(name):
     return figures
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_scene_file_says_what_the_options_say(scenes, capsys):
     assert main(["render", "scenes/a.toml", *SLOW, "--json", "file.json"]) == 0
     options = [*SCENE_OPTIONS, *SLOW, "-o", "b.png", "--json", "options.json"]

@@ -116,7 +116,7 @@ def test_many_wide_registers(engine):
     assert toggles == {"top": expected}
 
 
-@pytest.mark.parametrize("interval", [1, 2, 4])
+@pytest.mark.parametrize("interval", [2, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 4))])
 def test_dark_beats_toggle_only_their_input(interval):
     """Operand isolation: 200 dark beats add nothing to the data path but to its first registers.
 

@@ -100,6 +100,8 @@ def test_count_within_bound(triangles):
     assert abs(len(mesh.faces) - triangles) <= 8 * np.sqrt(triangles) + 32
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_a_million_triangles_in_time():
     started = time.process_time()
     mesh = teapot(1_000_000)
