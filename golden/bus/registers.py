@@ -129,10 +129,11 @@ def frame_registers(keep: bool = False) -> list[Register]:
     }
     kinds = ", ".join(f"{k}: {name}" for k, name in enumerate(BACK_FACES))
     most = 1 << X_BITS - 2
+    chord = "largest chord between the unit normals of a span's ends, in 1/1024"
     rows = [(name, X_BITS, True, f"{text}; pixels, -{most} to {most}") for name, text in borders.items()]
     rows += [
         ("back_faces", 2, False, f"back faces, {kinds}"),
-        ("limit", LIMIT_BITS, False, "largest chord between the unit normals of a span's ends, in 1/1024"),
+        ("limit", LIMIT_BITS, False, f"{chord}; not read where spans have true lines or vectors"),
     ]
     if keep:
         rows.append(("keep", 1, False, "1: the next frame adds to the picture; 0: its depths begin anew"))

@@ -16,9 +16,6 @@ from blysk.golden.render import Renderer
 
 __all__ = ["TriangleFrame", "frame_of_pixels", "sent_triangles", "span_angle", "triangle_frame"]
 
-_WIDEST_ANGLE = 60.0
-"""Widest piece of a span of vectors in degrees: with the largest `Frame.limit`, see `VectorAdapter`."""
-
 _SPAN_ANGLE = 5.0
 """Widest piece of a span in degrees, for methods without a `SpanLimit`."""
 
@@ -48,10 +45,9 @@ class TriangleFrame:
 def span_angle(scene: Scene, design: Design) -> float:
     """Widest piece of a span in degrees.
 
-    `SpanLimit.angle` of the steepest highlight; 60 for a method that takes vectors; 5 for the others.
+    `SpanLimit.angle` of the steepest highlight; 5 for methods without a limit. True lines and vectors are not
+    cut at an angle.
     """
-    if design.takes_vectors:
-        return _WIDEST_ANGLE
     limit = design.span_limit
     if limit is None:
         return _SPAN_ANGLE
@@ -68,7 +64,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     renderer : Renderer
         Geometry and shading.
     angle : float, optional
-        In degrees, 0 to 60; by default `span_angle`. True lines are not cut.
+        In degrees, 0 to 60; by default `span_angle`. True lines and vectors are not cut at an angle.
 
     Raises
     ------

@@ -21,8 +21,8 @@ class PlacedSpans:
     ----------
     x, y, length : int64 arrays, shape (S,)
         Column and scanline of the first pixel, and number of pixels, 1 or more.
-    depth, depth_last : int64 arrays, shape (S,)
-        Depth at the first and at the last pixel, UQ(24, 9).
+    depth : int64 array, shape (S,)
+        Depth at the first pixel, UQ(24, 9).
     depth_step : int64 array, shape (S,)
         Step of the depth from a pixel to the next, SQ(25, 9); without meaning in a span of one pixel.
     material : int64 array, shape (S,)
@@ -35,7 +35,6 @@ class PlacedSpans:
     y: np.ndarray
     length: np.ndarray
     depth: np.ndarray
-    depth_last: np.ndarray
     depth_step: np.ndarray
     material: np.ndarray
     triangle: np.ndarray
@@ -49,11 +48,11 @@ class PlacedSpans:
         return {name: value for name, value in vars(self).items() if name != "triangle"}
 
     @classmethod
-    def of(cls, pieces: Pieces, **normals: np.ndarray) -> Self:
-        """Spans of this class: places and depths from ``pieces``, its other fields from ``normals``."""
+    def of(cls, pieces: Pieces, **others: np.ndarray) -> Self:
+        """Spans of this class: places and depths from ``pieces``, its other fields from ``others``."""
         placed = {name: getattr(pieces, name) for name in ("x", "y", "length", "material", "triangle")}
-        depths = {name: getattr(pieces, name).codes for name in ("depth", "depth_last", "depth_step")}
-        return cls(**placed, **depths, **normals)
+        depths = {name: getattr(pieces, name).codes for name in ("depth", "depth_step")}
+        return cls(**placed, **depths, **others)
 
 
 @dataclass(frozen=True)
@@ -62,8 +61,10 @@ class TrueSpans(PlacedSpans):
 
     Parameters
     ----------
-    x, y, length, depth, depth_last, depth_step, material, triangle
+    x, y, length, depth, depth_step, material, triangle
         As in `PlacedSpans`.
+    depth_last : int64 array, shape (S,)
+        Depth at the last pixel, UQ(24, 9).
     normal_left, normal_middle, normal_right : int64 arrays, shape (S, 3)
         Unit normals, SQ(1, 17), at the first pixel's centre, half-way to the last one's, and at the last
         one's. In a span of 1 pixel all three are the left one; in a span of 2 the middle is the right one.
@@ -74,6 +75,7 @@ class TrueSpans(PlacedSpans):
         Whether the unit normals are negated.
     """
 
+    depth_last: np.ndarray
     normal_left: np.ndarray
     normal_middle: np.ndarray
     normal_right: np.ndarray
@@ -126,6 +128,7 @@ class EdgeNormals:
         codes = codes[np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))][1:].reshape(-1, 3, 3)
         spans = TrueSpans.of(
             pieces,
+            depth_last=pieces.depth_last.codes,
             normal_left=codes[:, 0],
             normal_middle=codes[:, 2],
             normal_right=codes[:, 1],

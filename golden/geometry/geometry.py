@@ -14,6 +14,7 @@ from blysk.golden.geometry.plane_setup import PlaneSetup
 from blysk.golden.geometry.span_adapter import LineAdapter, LineSpans
 from blysk.golden.geometry.span_attributes import Pieces, SpanAttributes
 from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
+from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triangles
 from blysk.golden.geometry.vector_adapter import VectorAdapter, VectorSpans
 from blysk.golden.geometry.vertex_sort import SortedTriangles, VertexSort
@@ -37,8 +38,8 @@ class Geometry:
         Whether spans have their true line, N/W at both ends, in place of unit normals; then no span is cut
         into pieces, and no normal is normalised.
     vectors : bool
-        Whether spans have N/W at the first pixel and its step in place of unit normals; no normal is
-        normalised. Not with ``lines``.
+        Whether spans have N/W at the first pixel and its step in place of unit normals: they are cut by
+        `SpanHalver`, and no normal is normalised. Not with ``lines``.
 
     Raises
     ------
@@ -76,7 +77,7 @@ class Geometry:
         scales = PlaneSetup(self.grid).compute(drawn, EdgeSetup(self.grid).compute(drawn))
         corners = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
         gradients = GradientSetup().compute(*corners, scales)
-        planes = PlaneAssembler(not self.lines).compute(
+        planes = PlaneAssembler(not (self.lines or self.vectors)).compute(
             gradients, AttributeSerialiser().least(drawn.triangles), frame
         )
         return planes, int(scales.sliver.sum())
@@ -86,6 +87,8 @@ class Geometry:
         drawn, rows, _, counts = self.rows(triangles, frame)
         planes, sliver = self.planes(drawn, frame)
         pieces, more = SpanAttributes(self.vectors).compute(rows, planes)
+        if self.vectors:
+            pieces, more["cut"] = SpanHalver().compute(pieces)
         counts = {
             **counts,
             "empty": counts["empty"] + more["empty"],

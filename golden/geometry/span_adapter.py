@@ -20,12 +20,15 @@ class LineSpans(PlacedSpans):
 
     Parameters
     ----------
-    x, y, length, depth, depth_last, depth_step, material, triangle
+    x, y, length, depth, depth_step, material, triangle
         As in `PlacedSpans`.
+    depth_last : int64 array, shape (S,)
+        Depth at the last pixel, UQ(24, 9).
     normal_left, normal_right : int64 arrays, shape (S, 3)
         Ends of the line at the first and at the last pixel's centre, SQ(1, 22).
     """
 
+    depth_last: np.ndarray
     normal_left: np.ndarray
     normal_right: np.ndarray
 
@@ -65,7 +68,8 @@ class LineAdapter:
             From `SpanAttributes`.
         """
         left, right = self.ends(pieces.left, pieces.right, pieces.flip)
-        return LineSpans.of(pieces, normal_left=left, normal_right=right)
+        depth_last = pieces.depth_last.codes
+        return LineSpans.of(pieces, depth_last=depth_last, normal_left=left, normal_right=right)
 
     def ends(self, left: Fixed, right: Fixed, flip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bit-accurate codes of both ends, SQ(1, 22).

@@ -9,7 +9,7 @@ from blysk.golden.geometry.plane_assembler import Planes
 from blysk.golden.geometry.span_clip import ClippedRows
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 
-__all__ = ["DEPTH_STEP", "SPAN_DEPTH", "SPAN_NORMAL", "SPAN_STEP", "Pieces", "SpanAttributes"]
+__all__ = ["DEPTH_STEP", "SPAN_DEPTH", "SPAN_NORMAL", "SPAN_STEP", "Pieces", "SpanAttributes", "WholeSpans"]
 
 SPAN_NORMAL = SQ(1, 26)
 """Number format of a component of N/W at a pixel."""
@@ -45,7 +45,9 @@ class Pieces:
     triangle : int64 array, shape (S,)
         Index of the triangle.
     step : Fixed, shape (S, 3), SQ(2, 32), optional
-        Step of N/W from a pixel to the next; without meaning in a span of one pixel.
+        Step of N/W to the next pixel away from the long edge; without meaning in a span of one pixel.
+    turned : bool array, shape (S,), optional
+        Whether the way from the long edge leads to the left.
     """
 
     x: np.ndarray
@@ -60,6 +62,7 @@ class Pieces:
     material: np.ndarray
     triangle: np.ndarray
     step: Fixed | None = None
+    turned: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.x)
@@ -67,11 +70,61 @@ class Pieces:
     @property
     def beats(self) -> dict:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
+        return _beats(self)
+
+    @staticmethod
+    def ends(left: np.ndarray, right: np.ndarray) -> dict[str, Fixed]:
+        """Fields ``left``, ``right``, ``depth`` and ``depth_last`` of attributes at both ends.
+
+        Parameters
+        ----------
+        left, right : int64 arrays, shape (S, 4)
+            Codes of the attributes, `SPAN_STEP`. They are cut to the formats, and saturate.
+        """
         return {
-            name: value.codes if isinstance(value, Fixed) else value
-            for name, value in vars(self).items()
-            if name != "triangle" and value is not None
+            "left": _normal(left),
+            "right": _normal(right),
+            "depth": _depth(left),
+            "depth_last": _depth(right),
         }
+
+
+@dataclass(frozen=True)
+class WholeSpans:
+    """Spans that are not cut, with the attributes of `Planes` along them.
+
+    Parameters
+    ----------
+    x, y, length : int64 arrays, shape (S,)
+        As in `Pieces`.
+    near, far : Fixed, shape (S, 4), SQ(2, 32)
+        Attributes at the first and the last pixel's centre, the first at the long edge; modulo 4.
+    inward : Fixed, shape (S, 4), SQ(2, 32)
+        Their step from the first to the next pixel.
+    right : bool array, shape (S,)
+        Whether the long edge is on the right.
+    flip, material, triangle
+        As in `Pieces`.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    length: np.ndarray
+    near: Fixed
+    far: Fixed
+    inward: Fixed
+    right: np.ndarray
+    flip: np.ndarray
+    material: np.ndarray
+    triangle: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def beats(self) -> dict:
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
+        return _beats(self)
 
 
 @dataclass(frozen=True)
@@ -91,16 +144,15 @@ class SpanAttributes:
 
     Parameters
     ----------
-    steps : bool
-        Whether pieces have the step of N/W, too: the triangle's ``inward``, negated where the span goes to
-        the long edge.
+    whole : bool
+        Whether spans are given whole, as `WholeSpans`, for `SpanHalver`; else in pieces.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
-    steps: bool = False
+    whole: bool = False
 
-    def compute(self, rows: ClippedRows, planes: Planes) -> tuple[Pieces, dict[str, int]]:
+    def compute(self, rows: ClippedRows, planes: Planes) -> tuple[Pieces | WholeSpans, dict[str, int]]:
         """Bit-accurate pieces, and the counts of triangles without a span and of spans that were cut.
 
         Parameters
@@ -112,7 +164,7 @@ class SpanAttributes:
 
         Returns
         -------
-        pieces : Pieces
+        pieces : Pieces, or with ``whole`` WholeSpans
             In the order of the scanlines, within a scanline from the long edge on.
         counts : dict of str to int
             ``empty`` and ``cut``.
@@ -135,7 +187,17 @@ class SpanAttributes:
         edge = format.wrap(start + row[:, np.newaxis] * short + carries[:, np.newaxis] * (long - short))
         edge = edge + skip[:, np.newaxis] * inward
 
+        drawn = np.zeros(len(planes), dtype=bool)
+        drawn[triangle] = True
+        counts = {"empty": int((~drawn).sum()), "cut": 0}
         length, most = rows.length[spans], 1 << planes.piece[triangle]
+        if self.whole:
+            edge = format.wrap(edge)
+            far = format.wrap(edge + (length - 1)[:, np.newaxis] * inward)
+            words = {"near": edge, "far": far, "inward": inward}
+            places = {name: getattr(rows, name)[spans] for name in ("x", "y", "right", "flip", "material")}
+            fixed = {name: Fixed(format, codes) for name, codes in words.items()}
+            return WholeSpans(length=length, triangle=triangle, **places, **fixed), counts
         count = -(-length // most)
         span = np.repeat(np.arange(len(spans)), count)
         number = np.arange(len(span)) - np.repeat(np.cumsum(count) - count, count)
@@ -147,26 +209,26 @@ class SpanAttributes:
         right = rows.right[spans][span]
         x = rows.x[spans][span]
         turned = right[:, np.newaxis]
-        left_end, right_end = np.where(turned, far, near), np.where(turned, near, far)
-        step = inward[span]
-        step = format.wrap(np.where(turned, -step, step))
+        step = format.wrap(np.where(right, -inward[span, 3], inward[span, 3]))
         pieces = Pieces(
             x=np.where(right, x + length[span] - before - pixels, x + before),
             y=rows.y[spans][span],
             length=pixels,
-            left=_normal(left_end),
-            right=_normal(right_end),
-            depth=_depth(left_end),
-            depth_last=_depth(right_end),
-            depth_step=Fixed(DEPTH_STEP, step[:, 3]),
+            **Pieces.ends(np.where(turned, far, near), np.where(turned, near, far)),
+            depth_step=Fixed(DEPTH_STEP, step),
             flip=rows.flip[spans][span],
             material=rows.material[spans][span],
             triangle=source,
-            step=Fixed(SPAN_STEP, step[:, :3]) if self.steps else None,
         )
-        drawn = np.zeros(len(planes), dtype=bool)
-        drawn[triangle] = True
-        return pieces, {"empty": int((~drawn).sum()), "cut": int((count > 1).sum())}
+        return pieces, counts | {"cut": int((count > 1).sum())}
+
+
+def _beats(spans: Pieces | WholeSpans) -> dict:
+    return {
+        name: value.codes if isinstance(value, Fixed) else value
+        for name, value in vars(spans).items()
+        if name != "triangle" and value is not None
+    }
 
 
 def _normal(codes: np.ndarray) -> Fixed:

@@ -104,7 +104,7 @@ class Frame:
         Treatment of back faces, one of `BACK_FACES`.
     limit : int
         Largest chord between the unit normals of a span's ends, in 1/1024: 0 to 1023. See
-        `PlaneAssembler`; `limit_of` gives it for an angle.
+        `PlaneAssembler`; `limit_of` gives it for an angle. Spans of true lines or vectors do not read it.
 
     Raises
     ------

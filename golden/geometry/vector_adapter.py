@@ -7,6 +7,7 @@ import numpy as np
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.geometry.edge_normals import PlacedSpans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL, SPAN_STEP, Pieces
+from blysk.golden.geometry.span_halver import SpanHalver
 
 __all__ = ["VectorAdapter", "VectorSpans"]
 
@@ -17,7 +18,7 @@ class VectorSpans(PlacedSpans):
 
     Parameters
     ----------
-    x, y, length, depth, depth_last, depth_step, material, triangle
+    x, y, length, depth, depth_step, material, triangle
         As in `PlacedSpans`.
     start, step : int64 arrays, shape (S, 3)
         As in `SpanVectors`. The step of a span of one pixel has no meaning.
@@ -40,10 +41,11 @@ class VectorAdapter:
     """Words of `SpanVectors` from N/W at both ends of a span and its step: shifts and roundings alone.
 
     The components of both ends and of the step are shifted left by the same number s of places: the sign
-    copies that all components of the ends have, at most `LARGEST_SHIFT`. Then each word x becomes
+    copies that all components of the ends have, `SpanHalver.shift`. Then each word x becomes
     ``x - 2^-14 x``, cut: so 8 steps of 2^-17 are left to 1, which no pixel may reach, and nothing saturates.
-    The step is shifted left by e places more: as many as leave it under 1, at most 15. All are negated where
-    ``flip`` is set, and rounded half up to 17 fraction bits.
+    The step is shifted left by e places more: as many as leave it under 1, at most 15. The start is negated
+    where ``flip`` is set, the step where either ``flip`` or ``turned`` is, and both are rounded half up to 17
+    fraction bits.
 
     ========== ============ =====================================================================
     word       format       why
@@ -56,10 +58,10 @@ class VectorAdapter:
     exponent   UQ(4, 0)     e
     ========== ============ =====================================================================
 
-    Geometry cuts a span to pieces of p pixels where ``p |step|`` would be over the least ``|N/W|`` of the
-    triangle. So the step of a piece of two pixels or more is under half of the length of an end, which after
-    the shift is under ``sqrt(3)``: the step fits. Along a piece ``|N/W|`` changes by a factor of 2 at most,
-    and its direction by 60 degrees at most: the method needs no other cuts.
+    `SpanHalver` cuts spans. A step of a piece of three pixels or more is half of the difference of its ends
+    at most, and fits; that of a piece of two fits, as no component of 1/2 or more changes its sign. Along a
+    piece ``|N/W|`` is at least 5/16 in the scale of the words, if an end reaches `SHORTEST`. The method asks
+    for 0.2236, and needs no other cuts.
 
     Rounding moves a component of the start by half a step of its word: `ERROR` times the length of the longer
     end at most, if that is at least `SHORTEST`. Rounding of the step adds `ERROR` times the distance of the
@@ -69,7 +71,6 @@ class VectorAdapter:
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
 
-    LARGEST_SHIFT = 7
     MARGIN_SHIFT = 14
     ERROR = 2.0**-17
     SHORTEST = 2.0**-8
@@ -84,7 +85,7 @@ class VectorAdapter:
         Parameters
         ----------
         pieces : Pieces
-            From `SpanAttributes` with ``steps``.
+            From `SpanHalver`.
 
         Raises
         ------
@@ -94,15 +95,16 @@ class VectorAdapter:
         step = pieces.step
         if step is None or {pieces.left.format, pieces.right.format, step.format} != {SPAN_NORMAL, SPAN_STEP}:
             raise ValueError(f"pieces must have ends of {SPAN_NORMAL} and steps of {SPAN_STEP}")
-        flip = np.asarray(pieces.flip, dtype=bool)[:, np.newaxis]
-        used = _used(np.concatenate((pieces.left.codes, pieces.right.codes), axis=-1))
-        shift = np.minimum(SPAN_NORMAL.fraction_bits - used, self.LARGEST_SHIFT)[:, np.newaxis]
+        flip, turned = (np.asarray(flag, dtype=bool)[:, np.newaxis] for flag in (pieces.flip, pieces.turned))
+        shift = SpanHalver().shift(pieces.left, pieces.right)[:, np.newaxis]
         start = self._rounded(self._smaller(pieces.left.codes << shift), flip, SPAN_NORMAL.fraction_bits)
         # Modulo 2: steps that are larger come in pieces of one pixel alone.
         whole = 1 << self.STEP_BITS
         shifted = (((step.codes << shift) + whole) & (2 * whole - 1)) - whole
         exponent = np.minimum(self.STEP_BITS - _used(shifted), self.LARGEST_EXPONENT)
-        word = self._rounded(self._smaller(shifted) << exponent[:, np.newaxis], flip, self.STEP_BITS)
+        word = self._rounded(
+            self._smaller(shifted) << exponent[:, np.newaxis], flip != turned, self.STEP_BITS
+        )
         return VectorSpans.of(pieces, start=start, step=word, exponent=exponent)
 
     def _rounded(self, codes: np.ndarray, flip: np.ndarray, point: int) -> np.ndarray:

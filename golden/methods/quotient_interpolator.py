@@ -27,7 +27,8 @@ class QuotientInterpolator(Interpolator):
     - the lengths of v at its ends differ by a factor over `LARGEST_RATIO`;
     - or the angle between them is over 90 degrees.
 
-    Then ``|v|`` is at least ``1/(2 sqrt(5))`` at every pixel, in the scale of the words.
+    Then ``|v|`` is at least ``1/(2 sqrt(5))`` at every pixel, in the scale of the words. `SpanHalver` cuts by
+    another rule, with the same promise.
 
     Parameters
     ----------

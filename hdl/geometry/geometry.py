@@ -19,6 +19,7 @@ from blysk.hdl.geometry.plane_setup import PlaneSetupUnit, scales_shape
 from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
+from blysk.hdl.geometry.span_halver import SpanHalverUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
 from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit, vector_spans_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
@@ -166,7 +167,8 @@ class GeometryUnit(wiring.Component):
       pixel, 2 for 2 pixels and 3 for more (with ``lines`` or ``vectors`` at least 1): never more than it has
       pixels. For n pixels cut off at the long edge it takes as many cycles more as n has bits. In the compact
       style it takes four cycles for each scanline and for every two of those bits; at the same time the
-      normals take three cycles each.
+      normals take three cycles each. With ``vectors`` each time that a span does not fit, and each piece
+      behind the first, takes two cycles (`SpanHalverUnit`).
 
     The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` or ``vectors``
     4 and 2. The second lane adds 4, in the compact style 2.
@@ -183,8 +185,8 @@ class GeometryUnit(wiring.Component):
     setups : int
         Number of lanes, from the edges to the planes, that triangles take in turns: 1 or 2.
     vectors : bool
-        Whether spans have N/W at the first pixel and its step in place of unit normals, and no normal is
-        normalised; not with ``lines``.
+        Whether spans have N/W at the first pixel and its step in place of unit normals: they are cut by
+        `SpanHalver`, and no normal is normalised; not with ``lines``.
 
     Raises
     ------
@@ -224,7 +226,7 @@ class GeometryUnit(wiring.Component):
             raise ValueError("spans have true lines or vectors, not both")
         self.grid, self.compact, self.lines, self.vectors = grid, compact, lines, vectors
         self._sort = VertexSortUnit(grid, compact)
-        self._lanes = [_TriangleSetup(grid, compact, not lines) for _ in range(setups)]
+        self._lanes = [_TriangleSetup(grid, compact, not (lines or vectors)) for _ in range(setups)]
         self.interval = -(-self._lanes[0].interval // setups)
         self._attributes, self._walk, self._clip = (
             SpanAttributesUnit(compact, vectors),
@@ -235,6 +237,7 @@ class GeometryUnit(wiring.Component):
             self._normals, shape = LineAdapterUnit(), line_spans_shape()
         elif vectors:
             self._normals, shape = VectorAdapterUnit(), vector_spans_shape()
+            self._halver = SpanHalverUnit()
         else:
             self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
         normaliser = 0 if lines or vectors else self._normals.multipliers
@@ -263,7 +266,12 @@ class GeometryUnit(wiring.Component):
         connect(m, walks, self._walk.i)
         connect(m, self._walk.o, self._clip.i)
         rows = self._walk_planes(m, planes)
-        connect(m, self._attributes.o, self._normals.i)
+        made = self._attributes.o
+        if self.vectors:
+            m.submodules.halver = self._halver
+            connect(m, made, self._halver.i)
+            made = self._halver.o
+        connect(m, made, self._normals.i)
         connect(m, self._normals.o, wiring.flipped(self.o))
         self._count(m)
         self._watch(m, rows)
@@ -341,10 +349,11 @@ class GeometryUnit(wiring.Component):
             m.d.sync += taken.eq(taken + 1)
         with m.If(rows.valid & rows.ready & rows.payload.last):
             m.d.sync += walked.eq(walked + 1)
-        spans = moving(m, "pieces", self._attributes.o, self.o)
-        m.d.comb += self.idle.eq(
-            ((taken - walked)[:_INSIDE_BITS] == dropped) & self._attributes.idle & ~spans
-        )
+        made, idle = self._attributes, self._attributes.idle
+        if self.vectors:
+            made, idle = self._halver, idle & self._halver.idle
+        spans = moving(m, "pieces", made.o, self.o)
+        m.d.comb += self.idle.eq(((taken - walked)[:_INSIDE_BITS] == dropped) & idle & ~spans)
 
     def _count(self, m: Module) -> None:
         """Counters of the units; a counter that two units have is their sum."""
@@ -356,7 +365,7 @@ class GeometryUnit(wiring.Component):
             self.status.zero_area.eq(sort.zero_area),
             self.status.culled.eq(sort.culled),
             self.status.sliver.eq(sliver),
-            self.status.cut.eq(attributes.cut),
+            self.status.cut.eq(self._halver.status.cut if self.vectors else attributes.cut),
             self.status.repaired.eq(0 if self.lines or self.vectors else self._normals.status.repaired),
         ]
 

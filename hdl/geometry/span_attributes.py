@@ -14,7 +14,7 @@ from blysk.hdl.geometry.plane_assembler import plane_shape, planes_shape
 from blysk.hdl.geometry.span_clip import clipped_rows_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
-__all__ = ["SpanAttributesUnit", "pieces_shape", "planes_rows_shape", "span_words_shape"]
+__all__ = ["SpanAttributesUnit", "pieces_shape", "planes_rows_shape", "span_words_shape", "whole_spans_shape"]
 
 _BITS = GradientSetup.FORMAT.width
 
@@ -38,14 +38,17 @@ def span_words_shape() -> dict:
     return words | depth | rest
 
 
-def pieces_shape(steps: bool = False) -> data.StructLayout:
-    """Shape of `Pieces.beats`: first pixel, length, N/W and depth at both ends, flip and material.
-
-    With ``steps`` also the step of N/W.
-    """
+def pieces_shape() -> data.StructLayout:
+    """Shape of `Pieces.beats`: first pixel, length, N/W and depth at both ends, flip and material."""
     normal = data.ArrayLayout(FixedShape(SPAN_NORMAL), 3)
-    step = {"step": data.ArrayLayout(FixedShape(SPAN_STEP), 3)} if steps else {}
-    return data.StructLayout({"left": normal, "right": normal} | step | span_words_shape())
+    return data.StructLayout({"left": normal, "right": normal} | span_words_shape())
+
+
+def whole_spans_shape() -> data.StructLayout:
+    """Shape of `WholeSpans.beats`: attributes at both ends and their step, first pixel, length, flags."""
+    words = {name: data.ArrayLayout(FixedShape(SPAN_STEP), ATTRIBUTES) for name in ("near", "far", "inward")}
+    places = {name: unsigned(PIXEL_BITS) for name in ("x", "length")}
+    return data.StructLayout(words | places | _tag_shape().members)
 
 
 class SpanAttributesUnit(wiring.Component):
@@ -62,22 +65,26 @@ class SpanAttributesUnit(wiring.Component):
     cycles without pixels, and else four cycles for every two bits of the numbers above; `latency` is 6, from
     the fourth time on. A piece also waits until the piece before it has been taken.
 
+    With ``whole`` spans are not cut, and leave as the walk finds them, a cycle earlier: `latency` is 2. In
+    the serial form it stays.
+
     Parameters
     ----------
     serial : bool
         Whether the attributes of a scanline come and are computed one after the other.
-    steps : bool
-        Whether pieces have the step of N/W, too.
+    whole : bool
+        Whether spans are given whole.
 
     Members
     -------
     i : :py:`In(stream.Signature(planes_rows_shape(serial)))`
         Scanlines. The planes are read with the first scanline of a triangle: the first of all, or the one
         after a scanline with ``last``.
-    o : :py:`Out(stream.Signature(pieces_shape(steps)))`
-        Pieces.
+    o : :py:`Out(stream.Signature(pieces_shape()))`
+        Pieces; with ``whole`` spans, in `whole_spans_shape`.
     status : :py:`Out(counters_shape("empty", "cut"))`
-        Number of triangles without a span, and of spans of more than one piece, since the reset.
+        Number of triangles without a span, and of spans of more than one piece, since the reset; with
+        ``whole`` the first alone.
 
     Attributes
     ----------
@@ -87,13 +94,13 @@ class SpanAttributesUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
-    def __init__(self, serial: bool = False, steps: bool = False):
-        self.serial, self.steps, self.latency = serial, steps, 6 if serial else 3
+    def __init__(self, serial: bool = False, whole: bool = False):
+        self.serial, self.whole, self.latency = serial, whole, 6 if serial else 3 - whole
         super().__init__(
             {
                 "i": In(stream.Signature(planes_rows_shape(serial))),
-                "o": Out(stream.Signature(pieces_shape(steps))),
-                "status": Out(counters_shape("empty", "cut")),
+                "o": Out(stream.Signature(whole_spans_shape() if whole else pieces_shape())),
+                "status": Out(counters_shape("empty") if whole else counters_shape("empty", "cut")),
             }
         )
         self.idle = Signal(name="idle")
@@ -110,15 +117,19 @@ class SpanAttributesUnit(wiring.Component):
         with m.If(pace.goes & pace.loads):
             m.d.sync += [tag[name].eq(row[name]) for name in ("y", "right", "flip", "material")]
 
+        # A whole span is the last piece of its own.
         most = Mux(first, _mask(planes.piece), mask)
+        if self.whole:
+            most = mask = Const((1 << PIXEL_BITS) - 1)
         along = _Along(m, row, tag, most, mask, loads, busy, pace)
         with m.If(pace.goes & pace.takes):
             m.d.sync += [first.eq(row.last), drawn.eq(row.covered | (drawn & ~first))]
-            with m.If(first):
-                m.d.sync += [mask.eq(most), along.single.eq(planes.piece == 0)]
-                if self.serial:
-                    # The last step of a whole piece takes one bit or two.
-                    m.d.sync += along.double.eq(~planes.piece[0] & (planes.piece != 0))
+            if not self.whole:
+                with m.If(first):
+                    m.d.sync += [mask.eq(most), along.single.eq(planes.piece == 0)]
+                    if self.serial:
+                        # The last step of a whole piece takes one bit or two.
+                        m.d.sync += along.double.eq(~planes.piece[0] & (planes.piece != 0))
         count = 1 if self.serial else ATTRIBUTES
         found = Signal(self._found_shape(count), name="found")
         for k in range(count):
@@ -132,11 +143,32 @@ class SpanAttributesUnit(wiring.Component):
         with m.If(pace.goes):
             m.d.sync += busy.eq((pace.loads) | (busy & ~pace.leaves))
 
-        valid, result, result_valid = (
-            Signal(name="found_valid"),
-            Signal(self.o.payload.shape(), name="result"),
-            Signal(name="result_valid"),
-        )
+        valid = Signal(name="found_valid")
+        with m.If(pace.advance):
+            m.d.sync += [
+                valid.eq(along.emits),
+                found.x.eq(along.x),
+                found.length.eq(along.pixels + 1),
+                found.tag.eq(tag),
+                found.ends.eq(pace.ends),
+            ]
+        self._give(m, pace, along, valid, found)
+        m.d.comb += self.idle.eq(~(busy | valid | self.o.valid | pace.lane.any()))
+        cuts = {} if self.whole else {"cut": along.cuts}
+        empty = pace.goes & pace.takes & row.last & ~row.covered & (first | ~drawn)
+        count_events(m, self.status, empty=empty, **cuts)
+        return m
+
+    def _give(self, m: Module, pace, along, valid: Signal, found) -> None:
+        """What was found, to the output; and whether the walk may advance."""
+        if self.whole and not self.serial:
+            m.d.comb += [
+                self.o.valid.eq(valid),
+                pace.advance.eq(~valid | self.o.ready),
+                *self._whole(found, self.o.payload),
+            ]
+            return
+        result, result_valid = Signal(self.o.payload.shape(), name="result"), Signal(name="result_valid")
         if self.serial:
             # The words that are found replace the result, which must have been taken by then.
             m.d.comb += [self.o.valid.eq(result_valid), self.o.payload.eq(result)]
@@ -146,25 +178,23 @@ class SpanAttributesUnit(wiring.Component):
                 m.d.sync += result_valid.eq(0)
         else:
             m.d.comb += pace.advance.eq(skid_buffer(m, self.o, result_valid, result))
-        m.d.comb += self.idle.eq(~(busy | valid | self.o.valid | pace.lane.any()))
-        with m.If(pace.advance):
-            m.d.sync += [
-                valid.eq(along.emits),
-                found.x.eq(along.x),
-                found.length.eq(along.pixels + 1),
-                found.tag.eq(tag),
-                found.ends.eq(pace.ends),
-            ]
         with m.If(valid & ~result_valid if self.serial else pace.advance):
             m.d.sync += result_valid.eq(valid & found.ends)
-            self._convert(m, valid, found, result)
-        count_events(
-            m,
-            self.status,
-            empty=pace.goes & pace.takes & row.last & ~row.covered & (first | ~drawn),
-            cut=along.cuts,
-        )
-        return m
+            if self.whole:
+                m.d.sync += self._whole(found, result)
+            else:
+                self._convert(m, valid, found, result)
+
+    @staticmethod
+    def _whole(found, result) -> list:
+        """A whole span of what was found; of an attribute alone, the words are moved on by it."""
+        moved = []
+        for name, words in (("near", found.near), ("far", found.far), ("inward", found.step)):
+            targets = [Value.cast(word) for word in result[name]]
+            given = [*targets, *words][-len(targets) :]
+            moved += [target.eq(word) for target, word in zip(targets, given, strict=True)]
+        places = [result[name].eq(found[name]) for name in ("x", "length")]
+        return moved + places + [result[name].eq(found.tag[name]) for name in _tag_shape().members]
 
     @staticmethod
     def _found_shape(count: int) -> data.StructLayout:
@@ -219,15 +249,9 @@ class SpanAttributesUnit(wiring.Component):
                 if self.serial or k == components:
                     code = Value.cast(value.saturate(SQ(1, GradientSetup.FORMAT.fraction_bits)))
                     m.d.sync += Value.cast(result[depth]).eq(Cat(code[:-1], ~code[-1]))
-        steps = [Mux(right, -Value.cast(step), Value.cast(step))[:_BITS] for step in found.step]
-        if self.steps and self.serial:
-            words = [Value.cast(word) for word in result.step]
-            with m.If(valid & ~found.ends):
-                m.d.sync += [word.eq(other) for word, other in zip(words, [*words[1:], *steps], strict=True)]
-        elif self.steps:
-            m.d.sync += [Value.cast(result.step[k]).eq(steps[k]) for k in range(components)]
+        step = Value.cast(found.step[-1])
         m.d.sync += [
-            Value.cast(result.depth_step).eq(steps[-1]),
+            Value.cast(result.depth_step).eq(Mux(right, -step, step)[:_BITS]),
             *(result[name].eq(found[name]) for name in ("x", "length")),
             *(result[name].eq(found.tag[name]) for name in ("y", "flip", "material")),
         ]

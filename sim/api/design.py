@@ -11,7 +11,7 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.quotient_spans import MARGIN
 from blysk.golden.frame_constants import address_table
 from blysk.golden.geometry.coarse_depth import CoarseDepth
-from blysk.golden.geometry.triangles import ATTRIBUTE, Frame
+from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
@@ -328,9 +328,8 @@ def _geometry_lines(geometry: GeometryUnit) -> list[str]:
     spans = "their true lines, uncut" if geometry.lines else "three unit normals, wide ones cut"
     normal, limit = "vertex normal", "is not read" if geometry.lines else _LIMIT
     if geometry.vectors:
-        spans = "N/W and its step, wide ones cut"
+        spans, limit = "N/W and its step, cut where N/W grows short", "is not read"
         normal = "vertex normal in the frame of the light (H along z, L and V in the xz plane)"
-        limit = f"chord of the widest span in 1/1024; any is right, {Frame.limit_of(60)} cuts least"
     return [
         f"geometry: at most a triangle in {geometry.interval} cycles; spans with {spans}; {grid.coordinate} "
         "coordinates",

@@ -23,7 +23,7 @@ def _firsts(last):
     return np.r_[True, last[:-1]]
 
 
-def _pieces(beats, steps):
+def _pieces(beats, whole):
     words = {field.name: beats["row"][field.name] for field in fields(ClippedRows)}
     rows, at = ClippedRows(**words), _firsts(words["last"])
     planes = {name: value[at] for name, value in beats["planes"].items()}
@@ -31,7 +31,7 @@ def _pieces(beats, steps):
         ("short", "long", "inward"), GradientSetup.FORMAT
     )
     words = {name: Fixed(format, planes[name]) for name, format in formats.items()}
-    return SpanAttributes(steps).compute(rows, Planes(Gradients(**words, size=np.zeros(0)), planes["piece"]))
+    return SpanAttributes(whole).compute(rows, Planes(Gradients(**words, size=np.zeros(0)), planes["piece"]))
 
 
 def _rows_of(unit, beats):
@@ -60,11 +60,12 @@ def _beats_of(unit, planes, row):
 
 def _status(unit, case):
     beats = _rows_of(unit, case.beats)
-    counts, rows = _pieces(beats, unit.steps)[1], beats["row"]
+    counts, rows = _pieces(beats, unit.whole)[1], beats["row"]
     # A triangle is not yet known to be empty before its last scanline.
     begun = np.flatnonzero(_firsts(rows["last"]))[-1]
     unknown = not rows["last"][-1] and not rows["length"][begun:].any()
-    return counts | {"empty": counts["empty"] - unknown}
+    counts["empty"] -= unknown
+    return {"empty": counts["empty"]} if unit.whole else counts
 
 
 def _case(unit, triangles, frame, count):
@@ -130,12 +131,12 @@ RECORD = Record(
     variants={
         "": Variant(SpanAttributesUnit, note="exact sums of the steps"),
         "serial": Variant(partial(SpanAttributesUnit, serial=True), note="exact sums of the steps"),
-        "serial, steps": Variant(
-            partial(SpanAttributesUnit, serial=True, steps=True), note="exact sums of the steps", long=True
+        "serial, whole": Variant(
+            partial(SpanAttributesUnit, serial=True, whole=True), note="exact sums of the steps", long=True
         ),
-        "steps": Variant(partial(SpanAttributesUnit, steps=True), note="exact sums of the steps", long=True),
+        "whole": Variant(partial(SpanAttributesUnit, whole=True), note="exact sums of the steps", long=True),
     },
-    expect=lambda unit, case: _pieces(_rows_of(unit, case.beats), unit.steps)[0].beats,
+    expect=lambda unit, case: _pieces(_rows_of(unit, case.beats), unit.whole)[0].beats,
     status=_status,
     stimuli={
         "rows": Stimulus(_rows, 1500),

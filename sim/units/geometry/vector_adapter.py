@@ -3,6 +3,7 @@
 import numpy as np
 
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, SPAN_STEP, Pieces
+from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.number.fixed import Fixed
 from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit
@@ -12,32 +13,38 @@ from blysk.sim.units.record import Case, Record, Stimulus, Variant
 __all__ = ["RECORD"]
 
 _FORMATS = {
-    "left": SPAN_NORMAL,
+    "start": SPAN_NORMAL,
     "right": SPAN_NORMAL,
     "step": SPAN_STEP,
     "depth": SPAN_DEPTH,
-    "depth_last": SPAN_DEPTH,
     "depth_step": DEPTH_STEP,
 }
 
-_VECTORS = "left", "right", "step"
+_VECTORS = "start", "right", "step"
 
 
 def _expect(unit, case):
-    words = dict(case.beats)
-    words |= {name: Fixed(format, words[name]) for name, format in _FORMATS.items()}
-    pieces = Pieces(**words | {"flip": words["flip"].astype(bool)}, triangle=np.zeros(0))
+    words = {name: value for name, value in case.beats.items() if name not in ("start", "shift")}
+    words |= {name: Fixed(format, case.beats[name]) for name, format in _FORMATS.items() if name in words}
+    words |= {name: words[name].astype(bool) for name in ("flip", "turned")}
+    # The shift tells all that there is to know of the other end.
+    start = Fixed(SPAN_NORMAL, case.beats["start"])
+    reach = 1 << (SPAN_NORMAL.fraction_bits - 1 - case.beats["shift"])
+    right = Fixed(SPAN_NORMAL, np.repeat(reach[:, np.newaxis], 3, axis=1))
+    pieces = Pieces(**words, left=start, right=right, depth_last=words["depth"], triangle=np.zeros(0))
     return VectorAdapter().compute(pieces).beats
 
 
 def _case(rng, **vectors):
-    count = len(vectors["left"])
-    beats = dict(vectors)
-    for name in ("depth", "depth_last", "depth_step"):
+    count = len(vectors["start"])
+    ends = (Fixed(SPAN_NORMAL, vectors[name]) for name in ("start", "right"))
+    beats = {"start": vectors["start"], "step": vectors["step"], "shift": SpanHalver().shift(*ends)}
+    for name in ("depth", "depth_step"):
         beats[name] = any_codes(rng, _FORMATS[name], count)
     beats |= {name: rng.integers(0, 4096, count) for name in ("x", "y")}
-    beats.setdefault("length", rng.integers(1, 4096, count))
-    return Case(beats | {"flip": rng.integers(0, 2, count), "material": rng.integers(0, 1024, count)})
+    beats["length"] = vectors.get("length", rng.integers(1, 4096, count))
+    flags = {name: rng.integers(0, 2, count) for name in ("flip", "turned")}
+    return Case(beats | flags | {"material": rng.integers(0, 1024, count)})
 
 
 def _lines(unit, rng, count):

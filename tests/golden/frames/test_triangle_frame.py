@@ -47,10 +47,12 @@ def test_vectors_within_0_6_lsb_of_exact_normals(triangles, exponent, back_faces
     error = np.abs(frame.image - exact.image * 255)[exact.mask]
     assert 0.49 < error.max() < 0.6
     assert 0 < (error > 0.5).mean() < 0.01
-    # Fewer pieces than chord's, and more than there are spans only where normals turn far in a triangle.
-    chord = triangle_frame(drawn, Renderer(preset("chord", "blinn"))).counts
-    assert frame.counts["pixels"] == chord["pixels"]
-    assert frame.counts["spans"] < 0.7 * chord["spans"]
+    # More pieces than there are spans only where normals turn far along a span.
+    raster = rasterise(drawn)
+    whole = len(raster.length) + raster.hidden_spans
+    assert (back_faces == "flip") == (raster.culled == 0)
+    assert frame.counts["spans"] <= (1.01 if triangles > 64 else 1.5) * whole
+    assert frame.counts["cut"] <= frame.counts["spans"] - whole
 
 
 def test_vectors_without_highlights():

@@ -127,7 +127,7 @@ def test_same_from_python(capsys):
     assert "_geometry_normals_normaliser" not in text
     assert main(["verilog", *HARDWARE, "--method", "quotient", "--model", "blinn"]) == 0
     text = capsys.readouterr().out
-    assert "N/W and its step, wide ones cut" in text
+    assert "N/W and its step, cut where N/W grows short" in text
     assert "vertex normal in the frame of the light (H along z, L and V in the xz plane)" in text
     assert "_geometry_normals_normaliser" not in text
 

@@ -1,0 +1,234 @@
+"""The span halver: spans cut where N/W grows too short along them for a method that takes vectors."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, SPAN_STEP
+from blysk.golden.geometry.span_halver import SpanHalver
+from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.geometry.span_attributes import whole_spans_shape
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+
+__all__ = ["SpanHalverUnit", "halved_spans_shape"]
+
+_COMPONENTS = ATTRIBUTES - 1
+
+
+def halved_spans_shape() -> data.StructLayout:
+    """Shape of a piece: N/W at its first pixel, its step and shift, depth, first pixel, length, flags."""
+    words = {
+        "start": data.ArrayLayout(FixedShape(SPAN_NORMAL), _COMPONENTS),
+        "step": data.ArrayLayout(FixedShape(SPAN_STEP), _COMPONENTS),
+        "shift": unsigned(SpanHalver.LARGEST_SHIFT.bit_length()),
+    }
+    places = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length")}
+    depth = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
+    flags = {"flip": unsigned(1), "turned": unsigned(1), "material": unsigned(MATERIAL_BITS)}
+    return data.StructLayout(words | places | depth | flags)
+
+
+class SpanHalverUnit(wiring.Component):
+    """Pieces of spans along which N/W stays long: `SpanHalver` is the bit-accurate model.
+
+    A span, or a piece, is offered with the cycle after it was taken in; while the output is ready one is
+    taken in on every cycle. One that does not fit takes two cycles more each time that it is tried again; so
+    does what is left of a span behind a piece. No multipliers: two ends of an attribute share one adder.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(whole_spans_shape()))`
+        Spans of `SpanAttributesUnit` with ``whole``.
+    o : :py:`Out(stream.Signature(halved_spans_shape()))`
+        Their pieces: N/W at the first pixel, the attributes' step away from the long edge, and the places by
+        which both are to be shifted.
+    status : :py:`Out(counters_shape("cut"))`
+        Number of spans that were cut, since the reset.
+
+    Attributes
+    ----------
+    idle : Signal
+        No piece is inside.
+
+    Source: docs/theory/geometry.md#normals; not in the documents.
+    """
+
+    latency = 1
+
+    def __init__(self):
+        super().__init__(
+            {
+                "i": In(stream.Signature(whole_spans_shape())),
+                "o": Out(stream.Signature(halved_spans_shape())),
+                "status": Out(counters_shape("cut")),
+            }
+        )
+        self.idle = Signal(name="idle")
+
+    def elaborate(self, platform):
+        """The piece that is tried; the bits that tell whether it fits; what is tried next."""
+        m = Module()
+        given, result = self.i.payload, self.o.payload
+        # ``known``: its bits are those of its ends; ``whole``: it reaches to the end of the span.
+        valid, known, whole, uncut = (Signal(name=name) for name in ("valid", "known", "whole", "uncut"))
+        fits, takes, leaves = (Signal(name=name) for name in ("fits", "takes", "leaves"))
+        tag = {
+            name: Signal.like(Value.cast(given[name]), name=name, reset_less=True)
+            for name in ("y", "right", "flip", "material")
+        }
+        x, left, pixels = (Signal(PIXEL_BITS, name=name, reset_less=True) for name in ("x", "left", "pixels"))
+        m.d.comb += [
+            self.o.valid.eq(valid & known & fits),
+            leaves.eq(self.o.valid & self.o.ready),
+            self.i.ready.eq(~valid | (leaves & whole)),
+            takes.eq(self.i.valid & self.i.ready),
+            self.idle.eq(~valid),
+        ]
+        retries, rest = Signal(name="retries"), (left - pixels)[:PIXEL_BITS]
+        odd = pixels[0]
+        m.d.comb += retries.eq(valid & known & ~fits)
+        ends = [
+            self._attribute(m, k, (takes, leaves, retries), (fits, odd), given) for k in range(ATTRIBUTES)
+        ]
+        marks = self._marks(m, valid & ~known, takes, ends, given)
+        m.d.comb += fits.eq(self._fits(marks, pixels))
+
+        with m.If(takes):
+            m.d.sync += [
+                *(signal.eq(Value.cast(given[name])) for name, signal in tag.items()),
+                *(signal.eq(given.length) for signal in (left, pixels)),
+                x.eq(given.x),
+                *(flag.eq(1) for flag in (valid, known, whole, uncut)),
+            ]
+        with m.Elif(leaves):
+            m.d.sync += [
+                valid.eq(~whole),
+                known.eq(0),
+                whole.eq(1),
+                left.eq(rest),
+                pixels.eq(rest),
+                x.eq(Mux(tag["right"], x, x + pixels)),
+            ]
+        with m.Elif(retries):
+            shorter = Mux(odd, pixels >> 1, pixels) + Mux(odd, 1, (1 << PIXEL_BITS) - 1)
+            m.d.sync += [known.eq(0), whole.eq(0), uncut.eq(0), pixels.eq(shorter[:PIXEL_BITS])]
+        with m.Else():
+            m.d.sync += known.eq(1)
+
+        turned = tag["right"]
+        steps = []
+        for k, (near, far, step) in enumerate(ends):
+            value = FixedValue(SPAN_STEP, Mux(turned, far, near).as_signed())
+            if k < _COMPONENTS:
+                end = value.truncate(SPAN_NORMAL.fraction_bits).saturate(SPAN_NORMAL)
+                m.d.comb += [result.start[k].eq(end), Value.cast(result.step[k]).eq(step)]
+            else:
+                code = Value.cast(value.saturate(SQ(1, SPAN_STEP.fraction_bits)))
+                m.d.comb += Value.cast(result.depth).eq(Cat(code[:-1], ~code[-1]))
+                steps.append(Mux(turned, -step, step)[: len(step)])
+        m.d.comb += [
+            Value.cast(result.depth_step).eq(steps[0]),
+            result.shift.eq(marks["shift"]),
+            result.x.eq(Mux(turned, x + rest, x)),
+            result.length.eq(pixels),
+            result.turned.eq(turned),
+            *(result[name].eq(tag[name]) for name in ("y", "flip", "material")),
+        ]
+        count_events(m, self.status, cut=retries & uncut)
+        return m
+
+    @staticmethod
+    def _attribute(m: Module, k: int, moves, kind, given) -> tuple[Signal, Signal, Signal]:
+        """Registers of an attribute at both ends of the piece, and of its step."""
+        (takes, leaves, retries), (fits, odd) = moves, kind
+        near, far, last, step = (
+            Signal(SPAN_STEP.width, name=f"{name}_{k}", reset_less=True)
+            for name in ("near", "far", "last", "step")
+        )
+        signed_far, signed_near = far.as_signed(), near.as_signed()
+        # Behind a piece the next pixel; else one pixel less, or the mean of both ends.
+        other = Mux(fits, step.as_signed(), Mux(odd, signed_near, ~step.as_signed()))
+        total = Signal(SPAN_STEP.width + 1, name=f"total_{k}")
+        m.d.comb += total.eq(signed_far + other + (~fits & ~odd))
+        with m.If(takes):
+            m.d.sync += [
+                near.eq(Value.cast(given.near[k])),
+                *(signal.eq(Value.cast(given.far[k])) for signal in (far, last)),
+                step.eq(Value.cast(given.inward[k])),
+            ]
+        with m.Elif(leaves):
+            m.d.sync += [near.eq(total), far.eq(last)]
+        with m.Elif(retries):
+            m.d.sync += far.eq(Mux(odd, total >> 1, total))
+        return near, far, step
+
+    @staticmethod
+    def _marks(m: Module, again, takes, ends, given) -> dict:
+        """Registers: the shift, the first bits of the sizes, whether signs are the same."""
+        bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
+        top = SPAN_STEP.fraction_bits
+
+        # Each stage is a signal: an expression that is used twice would be made twice.
+        def wire(value, name):
+            signal = Signal(Value.cast(value).shape(), name=name)
+            m.d.comb += signal.eq(value)
+            return signal
+
+        sizes, signs = [], []
+        for k in range(_COMPONENTS):
+            for end, (mine, other) in enumerate(zip(ends[k][:2], (given.near[k], given.far[k]), strict=True)):
+                code = wire(Mux(again, mine, Value.cast(other).as_unsigned()), f"end_{end}_{k}")
+                sign, beyond = code[-1], code[-1] ^ code[-2]
+                chosen = code[top - places - bits : top]
+                size = (chosen ^ sign.replicate(len(chosen))) | beyond.replicate(len(chosen))
+                sizes.append(wire(size, f"whole_size_{end}_{k}"))
+                signs.append(sign)
+        used = sizes[0][bits:]
+        for size in sizes[1:]:
+            used = used | size[bits:]
+        used = wire(used, "used")
+        shift = []
+        for step in (4, 2, 1):
+            empty = wire(~used[-step:].any(), f"empty_{step}")
+            used = wire(Mux(empty, used << step, used)[:places], f"used_{step}")
+            sizes = [
+                wire(Mux(empty, size << step, size)[: places + bits], f"size_{step}_{k}")
+                for k, size in enumerate(sizes)
+            ]
+            shift.insert(0, empty)
+        marks = {
+            "shift": Signal(len(shift), name="shift", reset_less=True),
+            "sizes": [
+                [Signal(bits, name=f"size_{end}_{k}", reset_less=True) for k in range(_COMPONENTS)]
+                for end in range(2)
+            ],
+            "same": [Signal(name=f"same_{k}", reset_less=True) for k in range(_COMPONENTS)],
+        }
+        with m.If(again | takes):
+            m.d.sync += marks["shift"].eq(Cat(shift))
+            for k in range(_COMPONENTS):
+                m.d.sync += [
+                    marks["same"][k].eq(signs[2 * k] == signs[2 * k + 1]),
+                    *(marks["sizes"][end][k].eq(sizes[2 * k + end][-bits:]) for end in range(2)),
+                ]
+        return marks
+
+    @staticmethod
+    def _fits(marks: dict, pixels: Value) -> Value:
+        """Whether the piece needs no cut."""
+        scale = 1 << SpanHalver.BITS
+        axis, pair = int(SpanHalver.AXIS * scale), int(SpanHalver.PAIR * scale)
+        first, last = marks["sizes"]
+        same = marks["same"]
+        long = 0
+        for k, keeps in enumerate(same):
+            long = long | (keeps & (first[k] >= axis) & (last[k] >= axis))
+            j = (k + 1) % len(same)
+            sums = [end[j] + end[k] >= pair for end in (first, last)]
+            long = long | (keeps & same[j] & sums[0] & sums[1])
+        large = [first[k][-1] | last[k][-1] for k in range(len(same))]
+        steep = Cat(~keeps & size for keeps, size in zip(same, large, strict=True)).any()
+        two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
+        return one | ((long | ~Cat(large).any()) & ~(two & steep))
