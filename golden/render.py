@@ -10,6 +10,7 @@ from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.depth_test import DepthTest
 from blysk.golden.geometry.edge_normals import TrueSpans
 from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.geometry.mirror_adapter import MirrorAdapter
 from blysk.golden.geometry.span_adapter import LineSpans, shading_spans
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.geometry.vector_adapter import VectorSpans
@@ -68,7 +69,7 @@ class Renderer:
     Parameters
     ----------
     design : Design
-        The shading pipeline, of a method that takes normals; or vectors for one light, without R·V.
+        The shading pipeline, of a method that takes normals, or vectors for one light.
     geometry : Geometry
         The part that makes spans of triangles, with ``lines`` for a method that takes true lines, with
         ``vectors`` for one that takes vectors. ``None``: the geometry that suits the method.
@@ -79,8 +80,7 @@ class Renderer:
     Raises
     ------
     ValueError
-        If the method takes values, vectors of several lights or for R·V, or other words than the geometry
-        gives.
+        If the method takes values, vectors of several lights, or other words than the geometry gives.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -99,13 +99,14 @@ class Renderer:
         if vectors and design.lights > 1:
             reason = f"triangles give vectors for one light, not {design.lights}"
             raise ValueError(f"{reason}; give one light, or use method chord")
-        if vectors and design.specular is not None and design.vector_spans.mirror:
-            raise ValueError(
-                f"triangles give vectors of three components, and {design.model} takes four; use model blinn"
-            )
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
             raise ValueError(f"method {design.method} takes {taken}, the geometry gives {given}")
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether vectors of geometry get the components of R·V, by `MirrorAdapter`."""
+        return self.design.takes_vectors and self.design.mirror and self.design.lights > 0
 
     def compute(
         self, triangles: Triangles, frame: Frame, constants: FrameConstants | Sequence[FrameConstants]
@@ -122,6 +123,10 @@ class Renderer:
             As for `Design.compute`.
         """
         spans, counts = self.geometry.compute(triangles, frame)
+        if self.mirrors:
+            of_a_frame = constants if isinstance(constants, FrameConstants) else constants[0]
+            sine, _, cosine = of_a_frame.direction[0]
+            spans = MirrorAdapter().compute(spans, sine, cosine)
         dropped = 0
         if self.coarse is not None:
             places = (spans.x, spans.y, spans.length, spans.depth, spans.depth_step)

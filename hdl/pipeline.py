@@ -13,6 +13,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
@@ -133,6 +134,11 @@ class ShadingPipelineUnit(wiring.Component):
     status : :py:`Out(status_shape())`
         Counters.
 
+    Attributes
+    ----------
+    direction : View
+        Of `normal_shape`: the constant L of the first light, for what makes vectors for highlights of R·V.
+
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
@@ -149,6 +155,7 @@ class ShadingPipelineUnit(wiring.Component):
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
         self._tables = None
+        self.direction = Signal(normal_shape(), name="first_direction")
         self.setup_interval = self.cycles_per_pixel = 1
         self.latency = LATE_FIFO_LATENCY + self._assembler.coordinates_latency
         if p.lights:
@@ -255,6 +262,8 @@ class ShadingPipelineUnit(wiring.Component):
         )
         sinks = [self._carry_coordinates(m)]
         if p.lights:
+            if p.takes_vectors and p.mirror:
+                m.d.comb += self.direction.eq(frame.constants.lights[0].direction)
             sinks += self._shade(m, frame)
         else:
             ambient = frame.constants.ambient

@@ -15,6 +15,7 @@ from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.hdl.geometry.mirror_adapter import MirrorAdapterUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
 from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_shape, triangle_shape
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -86,7 +87,9 @@ class RenderUnit(wiring.Component):
     design's build is that of shading, and that of geometry unless ``compact`` says otherwise.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
-    for the pipeline to be empty, see `ShadingPipelineUnit`.
+    for the pipeline to be empty, see `ShadingPipelineUnit`. With highlights of R·V `MirrorAdapterUnit` makes
+    the components of vectors that geometry does not have. It reads L of the light: write that before the
+    frame's first triangle.
 
     Parameters
     ----------
@@ -140,6 +143,7 @@ class RenderUnit(wiring.Component):
         compact = design.build.style == "compact" if compact is None else compact
         self.geometry = GeometryUnit(grid, compact, geometry.lines, setups, geometry.vectors)
         self.pipeline = ShadingPipelineUnit(design)
+        self._mirror = MirrorAdapterUnit(serial=compact) if self.parameters.mirrors else None
         coarse, bits = self.parameters.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
         self.depth = DepthTestUnit(*bits, size, clears)
@@ -177,13 +181,14 @@ class RenderUnit(wiring.Component):
         deep = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
         span = stream.Signature(data.StructLayout({"span": pipeline.i.payload.shape(), **deep}))
         made, ready = span.create(path=("made",)), span.create(path=("ready",))
-        connect_shading_span(m, geometry.o.payload, made.payload.span)
+        source = self._components(m)
+        connect_shading_span(m, source.payload, made.payload.span)
         m.d.comb += [
-            *(made.payload[name].eq(geometry.o.payload[name]) for name in deep),
-            made.valid.eq(geometry.o.valid & (room := Signal(name="room"))),
-            geometry.o.ready.eq(made.ready & room),
+            *(made.payload[name].eq(source.payload[name]) for name in deep),
+            made.valid.eq(source.valid & (room := Signal(name="room"))),
+            source.ready.eq(made.ready & room),
         ]
-        known, drops = self._judge(m, room, made.ready, ready)
+        known, drops = self._judge(m, source, room, made.ready, ready)
         if geometry.compact and self.coarse is None:
             # Memories of 16 words for one span and the next would cost as much as they win.
             connect_register(m, "waiting_span", made, ready)
@@ -193,7 +198,8 @@ class RenderUnit(wiring.Component):
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(pipeline.i.valid & pipeline.i.ready):
             m.d.sync += count.eq(count + 1)
-        spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
+        enters = made if self._mirror is None else geometry.o
+        spans = moving(m, "spans", enters, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
         m.d.comb += [
             pixel_last.eq(depth.i.payload.pixel.last),
             self.idle.eq(geometry.idle & depth.idle & ~spans),
@@ -233,7 +239,19 @@ class RenderUnit(wiring.Component):
         ]
         return m
 
-    def _judge(self, m: Module, room: Signal, taken: Value, head: stream.Interface) -> tuple[Value, Value]:
+    def _components(self, m: Module) -> stream.Interface:
+        """Spans of geometry, with the components that highlights of R·V take of their vectors."""
+        if self._mirror is None:
+            return self.geometry.o
+        m.submodules.mirror = mirror = self._mirror
+        connect(m, self.geometry.o, mirror.i)
+        sine, _, cosine = self.pipeline.direction
+        m.d.comb += [mirror.constants.sine.eq(sine), mirror.constants.cosine.eq(cosine)]
+        return mirror.o
+
+    def _judge(
+        self, m: Module, span: stream.Interface, room: Signal, taken: Value, head: stream.Interface
+    ) -> tuple[Value, Value]:
         """For the first span that waits: whether its depth test has an answer, and whether it is hidden.
 
         The coarse depth test, if there is one, gets the spans of geometry, too, while it has ``room``.
@@ -242,7 +260,7 @@ class RenderUnit(wiring.Component):
             m.d.comb += room.eq(1)
             return Const(1), Const(0)
         m.submodules.coarse = coarse = self.coarse
-        span, place = self.geometry.o, coarse.i.payload
+        place = coarse.i.payload
         # A number that changes with the first span of a picture: a picture without spans may turn it back.
         number, before, turned = (Signal(name=name) for name in ("number", "picture_before", "turned"))
         turns = turned | (self.constants.picture != before)

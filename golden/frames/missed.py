@@ -5,7 +5,7 @@ import numpy as np
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks
 from blysk.golden.frames.pieces import Pieces
-from blysk.golden.frames.vector_axes import vector_axes
+from blysk.golden.frames.vector_axes import triangle_axes
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.geometry.span_adapter import LineAdapter
@@ -20,7 +20,7 @@ from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
-__all__ = ["missed_pieces", "missed_spans"]
+__all__ = ["component_error", "missed_pieces", "missed_spans", "nearest"]
 
 
 def missed_spans(
@@ -103,31 +103,45 @@ def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dic
     design = renderer.design
     limits = HighlightLimits.of(scene.materials, design)
     turn = _turn(drawn, pieces, renderer)
-    axes = vector_axes(scene, design) if design.takes_vectors and design.lights else np.eye(3)
+    axes = triangle_axes(scene, design) if design.takes_vectors and design.lights else np.eye(3)
     raster = _raster(pieces, sent.source[drawn.source], axes)
     curve, words = _missed(scene, raster, design.interpolator, limits, turn)
     return {"missed_pieces": int(curve.sum()), "short_normals": int(words.sum())}
 
 
-def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) -> np.ndarray:
-    """Angle in radians by which the words may turn a normal of each piece."""
+def component_error(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) -> np.ndarray:
+    """Bound of the error of a component of N/W at any pixel of each piece: float64 array, shape (S,).
+
+    The corners are rounded, the sums of `GradientSetup` have their error, and the pixel's value is cut.
+
+    Parameters
+    ----------
+    drawn, pieces : SortedTriangles, Pieces
+        From `Geometry.pieces`.
+    renderer : Renderer
+        Geometry and shading.
+    """
     steps = renderer.geometry.grid.steps
     rows = np.ptp(drawn.triangles.y, axis=1) / steps
     width = np.maximum(drawn.area / np.maximum(rows, 1 / steps) / steps**2, 1 / steps)
-    # The corners are rounded, and the pixel's value is cut.
     error = GradientSetup.error(rows, width) + ATTRIBUTE.step / 2 + SPAN_NORMAL.step
+    return error[pieces.triangle]
+
+
+def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) -> np.ndarray:
+    """Angle in radians by which the words may turn a normal of each piece."""
     left, right = pieces.left.values, pieces.right.values
     longest = np.maximum(*(np.linalg.norm(end, axis=1) for end in (left, right)))
-    error = np.sqrt(3) * error[pieces.triangle]
+    error = np.sqrt(3) * component_error(drawn, pieces, renderer)
     if renderer.geometry.lines:
         error += longest * (2 * np.sqrt(3) * LineAdapter.ERROR + LineSetup.ERROR)
     elif renderer.geometry.vectors:
         change = np.linalg.norm(right - left, axis=1)
         error += np.sqrt(3) * (np.maximum(longest, VectorAdapter.SHORTEST) + change) * VectorAdapter.ERROR
-    return np.minimum(error / np.maximum(_nearest(left, right), SPAN_NORMAL.step), np.pi)
+    return np.minimum(error / np.maximum(nearest(left, right), SPAN_NORMAL.step), np.pi)
 
 
-def _nearest(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+def nearest(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Least distance of straight lines between two points, each of shape (S, 3), from 0."""
     step = right - left
     square = np.einsum("sk,sk->s", step, step)

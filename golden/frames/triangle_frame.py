@@ -7,7 +7,7 @@ import numpy as np
 
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.vector_axes import vector_axes
+from blysk.golden.frames.vector_axes import triangle_axes
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
 from blysk.golden.geometry.triangles import Frame
 from blysk.golden.pipeline import Design
@@ -75,7 +75,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
         raise ValueError("point lights and a near viewer need spans with values, which triangles do not give")
     angle = span_angle(scene, renderer.design) if angle is None else angle
     design = renderer.design
-    axes = vector_axes(scene, design) if design.takes_vectors and design.lights else None
+    axes = triangle_axes(scene, design) if design.takes_vectors and design.lights else None
     return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle), axes).by_material()
 
 

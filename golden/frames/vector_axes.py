@@ -6,7 +6,7 @@ from blysk.golden.pipeline import Design
 from blysk.golden.reference.light_frame import LightFrame, light_frame
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["light_frames", "vector_axes"]
+__all__ = ["light_frames", "triangle_axes", "vector_axes"]
 
 
 def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
@@ -37,12 +37,34 @@ def vector_axes(scene: Scene, design: Design) -> np.ndarray:
     frames = light_frames(scene, design.lights)
     rows = {}
     for k, frame in enumerate(frames):
-        x, y, z = frame.axes
-        if not model.highlights:
-            # x and y lie across L, z along it.
-            x, z = frame.cosine * x - frame.sine * z, frame.sine * x + frame.cosine * z
-        elif model.mirror:
+        x, y, z = _axes(frame, model.highlights)
+        if model.mirror:
             rows.setdefault("s0", frame.sine * y)
             y = frame.cosine * y
         rows |= {f"x{k}": x, f"y{k}": y, f"z{k}": z}
     return np.stack([rows[name] for name in model.components])
+
+
+def triangle_axes(scene: Scene, design: Design) -> np.ndarray:
+    """Axes in the scene's frame of the normals that triangles have, for a method that takes vectors, by rows.
+
+    x, y and z of the first light's frame; without highlights z is along the light.
+
+    Parameters
+    ----------
+    scene, design
+        As for `vector_axes`.
+
+    Returns
+    -------
+    float64 array, shape (3, 3)
+    """
+    return _axes(light_frames(scene, 1)[0], design.vector_spans.highlights)
+
+
+def _axes(frame: LightFrame, highlights: bool) -> np.ndarray:
+    """x, y, z of a light's frame; without highlights x and y across L, z along it."""
+    if highlights:
+        return frame.axes
+    x, y, z = frame.axes
+    return np.stack([frame.cosine * x - frame.sine * z, y, frame.sine * x + frame.cosine * z])

@@ -108,7 +108,7 @@ def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
         `VectorAdapter`: their normals are 0.
     """
     if isinstance(spans, VectorSpans):
-        none = np.zeros_like(spans.start)
+        none = np.zeros_like(spans.start[:, :3])
         placed = spans.x, spans.y, spans.length, none, none, spans.material
         return Spans(*placed, vectors=spans.vectors)
     return Spans(

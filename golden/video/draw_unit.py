@@ -8,7 +8,7 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.triangle_frame import span_angle
-from blysk.golden.frames.vector_axes import vector_axes
+from blysk.golden.frames.vector_axes import triangle_axes
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import preset
@@ -165,7 +165,7 @@ class Drawing:
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
         renderer, mesh = Renderer(design), MeshMemory.of([scene.mesh])
         turned_to = [
-            vector_axes(each, design) if design.takes_vectors and design.lights else np.eye(3)
+            triangle_axes(each, design) if design.takes_vectors and design.lights else np.eye(3)
             for each in scenes
         ]
         axes, sets = np.unique(np.stack(turned_to), axis=0, return_inverse=True)

@@ -12,9 +12,9 @@ from blysk.hdl.geometry.span_halver import halved_spans_shape
 __all__ = ["VectorAdapterUnit", "vector_spans_shape"]
 
 
-def vector_spans_shape() -> data.StructLayout:
+def vector_spans_shape(components: int = 3) -> data.StructLayout:
     """Shape of a span: its first vector, step and exponent, first pixel, length, depth and material."""
-    vector = data.ArrayLayout(FixedShape(VectorAdapter.FORMAT), 3)
+    vector = data.ArrayLayout(FixedShape(VectorAdapter.FORMAT), components)
     exponent = unsigned(VectorAdapter.LARGEST_EXPONENT.bit_length())
     given = halved_spans_shape().members
     words = {name: given[name] for name in ("x", "y", "length", "depth", "depth_step", "material")}

@@ -5,11 +5,13 @@ from functools import partial
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
+from blysk.golden.frames.prepare import with_tables
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.render import RenderUnit
+from blysk.sim.frames.frame import sample_material
 from blysk.sim.units.operands import unit_codes
 from blysk.sim.units.record import Case, Record, Stimulus, Variant
 from blysk.sim.units.triangles import ended, frame_of, random_triangles
@@ -23,14 +25,20 @@ _SEED = 2026
 def _constants(rng, design):
     """Frame constants of each material: lights from anywhere."""
     direction, halfway = (unit_codes(rng, design.lights) for _ in range(2))
+    constants = []
     for index in range(design.materials):
         colors = rng.integers(0, 255 * 64, (2, design.lights, 3))
-        yield FrameConstants(9 + index, rng.integers(0, 255 * 8, 3), direction, halfway, *colors)
+        ambient = rng.integers(0, 255 * 8, 3)
+        constants.append(FrameConstants(9 + index, ambient, direction, halfway, *colors))
+    if design.loads_tables:
+        materials = [sample_material(design, index) for index in range(design.materials)]
+        constants = with_tables(constants, materials, design)
+    return constants
 
 
 def _made(unit, case):
     parameters = unit.parameters
-    constants = list(_constants(np.random.default_rng(_SEED), parameters.design))
+    constants = _constants(np.random.default_rng(_SEED), parameters.design)
     frame = {name: code for name, code in case.constants.items() if name != "picture"}
     return parameters.compute(Triangles(**case.beats), frame_of(frame), constants)
 
@@ -46,7 +54,7 @@ def _triangles(unit, rng, count, size=6.0, spread=0.2):
     triangles = ended(random_triangles(rng, count, size=size, spread=spread))
     triangles.material[:] = rng.integers(0, design.materials, count)
     frame = Frame.centred(*_SIZE, limit=Frame.limit_of(15.0))
-    write = writes_of(list(_constants(np.random.default_rng(_SEED), design)))
+    write = writes_of(_constants(np.random.default_rng(_SEED), design))
     codes = frame.codes | {"picture": 0}
     return Case(triangles.beats, {name: codes[name] for name in unit.constants.shape().members}, write)
 
@@ -67,6 +75,9 @@ def _variants():
         ("chord, compact", {"style": "compact"}),
         ("renormalise, 2 lights, 3 materials", {"method": "renormalise", "lights": 2, "materials": 3}),
         ("linear, coarse", {"method": "linear"}),
+        ("quotient", {"method": "quotient", "model": "blinn"}),
+        ("quotient, phong, coarse", {"method": "quotient", "model": "phong"}),
+        ("quotient, phong, compact", {"method": "quotient", "model": "phong", "style": "compact"}),
     ):
         design = preset(**{"method": "chord", "model": "cosquad", "x_bits": 5, "y_bits": 5} | options)
         renderer = Renderer(design, coarse=CoarseDepth(*_SIZE) if "coarse" in name else None)

@@ -79,9 +79,10 @@ def test_unequal_lengths_are_counted():
     assert errors(scene, design, model_frame(scene, design).image).max() < PROMISED
 
 
-def test_unequal_lengths_do_not_matter_to_vectors():
+@pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_unequal_lengths_do_not_matter_to_vectors(model):
     """The same triangle, and W of 1 to 100: within 0.6 LSB; nothing is counted."""
-    design = preset("quotient", "blinn")
+    design = preset("quotient", model)
     for scene in (scene_of(*([part] for part in WORST), 992, 0.98), deep_scene(100, 1000)):
         error, counts = by_hardware(scene, design)
         assert 0.49 < error.max() < 0.6

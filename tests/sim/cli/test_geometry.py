@@ -161,7 +161,6 @@ UNKNOWN = "use one of software, hardware"
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
         ((*RENDER, *HARDWARE, "--light", "1,1,1", "--light", "0,1,1"), "", ONE_LIGHT),
         ((*VERILOG, *HARDWARE, *QUOTIENT, "--lights", "2"), "", ONE_LIGHT),
-        ((*RENDER, *HARDWARE, "--model", "phong"), "", "use model blinn, or use software"),
         # It would send spans.
         ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
         ((*VERILOG, "--coarse", "64x48"), "--coarse", "give --top render, too"),

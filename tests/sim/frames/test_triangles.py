@@ -46,10 +46,10 @@ def test_frame_is_the_model_s(simulator, triangles, back_faces):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("style", ["throughput", "compact"])
-def test_vectors(style):
+@pytest.mark.parametrize(("style", "model"), [("throughput", "blinn"), ("compact", "phong")])
+def test_vectors(style, model):
     """Of the quotient method: picture and counters are the model's; nothing is missed."""
-    simulator = TriangleSimulator(Renderer(design(method="quotient", model="blinn", style=style)), SIZE)
+    simulator = TriangleSimulator(Renderer(design(method="quotient", model=model, style=style)), SIZE)
     drawn = scene("teapot", size=SIZE, triangles=200)
     frame, model = simulator.render(drawn), triangle_frame(drawn, simulator.renderer)
     np.testing.assert_array_equal(frame.image, model.image)
