@@ -10,7 +10,8 @@ import numpy as np
 
 from blysk.golden.frames.frame import Frame
 from blysk.golden.frames.local import line_ends, local_operands
-from blysk.golden.frames.quotient_bound import quotient_bound
+from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
+from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.pipeline import Design
@@ -27,6 +28,7 @@ from blysk.golden.reference.renderer import (
     visible_mask,
 )
 from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
 
 __all__ = [
     "BORDER",
@@ -35,6 +37,7 @@ __all__ = [
     "border_mask",
     "compare",
     "compare_image",
+    "compare_triangles",
     "error_bound",
     "highlight_step",
     "method_in_float64",
@@ -285,7 +288,33 @@ def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
     frame : Frame
         The frame of that pipeline.
     """
-    return _compare(scene, design, frame.image, frame.raster, frame.cut_raster)
+    bound = error_bound(scene, design, frame.cut_raster)
+    return _compare(scene, design, frame.image, frame.raster, frame.cut_raster, bound)
+
+
+def compare_triangles(
+    scene: Scene, renderer: Renderer, sent: SceneTriangles, image: np.ndarray
+) -> Comparison:
+    """Errors of a picture by triangles, with the bound of the method ``quotient``.
+
+    The bound holds where the picture shows the triangle that the exact one shows, see
+    `quotient_triangle_bound`; of other methods none is known.
+
+    Parameters
+    ----------
+    scene : Scene
+        What was drawn.
+    renderer : Renderer
+        Geometry and shading.
+    sent : SceneTriangles
+        The scene's triangles.
+    image : uint8 array, shape (height, width, 3)
+        The frame buffer.
+    """
+    design, bound = renderer.design, None
+    if design.takes_vectors and design.specular is not None and design.lights:
+        bound = quotient_triangle_bound(scene, renderer, sent)
+    return _compare(scene, design, image, rasterise(scene), None, bound)
 
 
 def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison:
@@ -298,17 +327,21 @@ def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     """
-    return _compare(scene, design, image, rasterise(scene), None)
+    return _compare(scene, design, image, rasterise(scene), None, None)
 
 
 def _compare(
-    scene: Scene, design: Design, image: np.ndarray, raster: Raster, cut_raster: Raster | None
+    scene: Scene,
+    design: Design,
+    image: np.ndarray,
+    raster: Raster,
+    cut_raster: Raster | None,
+    bound: float | None,
 ) -> Comparison:
     """Comparison by float64 frames, one at a time, as a large frame has 400 MB."""
     nothing = FrameErrors(*[math.nan] * len(fields(FrameErrors)))
     mask, model = visible_mask(scene, raster), _model_of(design)
     target = target_of(design)
-    bound = None if cut_raster is None else error_bound(scene, design, cut_raster)
     figures: dict[str, Any] = {"target": target.name, "bound_lsb": bound, "arithmetic_error": nothing}
     figures["step_lsb"] = highlight_step(scene, model)
     figures["border"] = "|N.L| or |N.H|" if figures["step_lsb"] else "|N.L|"

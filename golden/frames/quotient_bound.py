@@ -1,8 +1,16 @@
 """Bound of a frame's error by the quotient method, from the vectors of its own spans."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from blysk.golden.frames.missed import component_error, nearest
 from blysk.golden.frames.prepare import span_vectors
+from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.geometry.span_halver import SpanHalver
+from blysk.golden.geometry.triangles import ATTRIBUTE
+from blysk.golden.geometry.vector_adapter import VectorAdapter
+from blysk.golden.geometry.vertex_sort import SortedTriangles
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.methods.quotient_interpolator import QuotientErrors, QuotientInterpolator
@@ -10,8 +18,9 @@ from blysk.golden.pipeline import Design
 from blysk.golden.reference.lighting import distant_cosine
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
 
-__all__ = ["quotient_bound"]
+__all__ = ["quotient_bound", "quotient_triangle_bound"]
 
 
 def quotient_bound(scene: Scene, design: Design, cut: Raster) -> float:
@@ -28,12 +37,72 @@ def quotient_bound(scene: Scene, design: Design, cut: Raster) -> float:
     cut : Raster
         The spans that were shaded.
     """
-    lobe, method = design.specular, design.interpolator
-    assert isinstance(lobe, QuotientLobe)
+    method = design.interpolator
     assert isinstance(method, QuotientInterpolator)
     if not len(cut.length):
         return 0.5
-    errors = QuotientErrors.of(span_vectors(scene, cut, design), cut.length, method.mirror)
+    return _bound(
+        scene, design, QuotientErrors.of(span_vectors(scene, cut, design), cut.length, method.mirror)
+    )
+
+
+def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
+    """The same bound of a frame by triangles, where it shows the triangle that exact shading shows, in LSB.
+
+    A component of N/W is off by `component_error`, times the shift, and by the words of `VectorAdapter`: half
+    a step for the start, the rounding of the step, and an eighth of a step for cuts. Slivers, which have the
+    attributes of their longest edge, are off by those of their middle corner against that edge, too.
+    `MirrorAdapter` turns psi by 2^-15 at most.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is drawn.
+    renderer : Renderer
+        Geometry and shading, of the method ``quotient``, with specular light.
+    sent : SceneTriangles
+        The scene's triangles.
+
+    Returns
+    -------
+    float or None
+        The bound; ``None`` if the words of a span are too short for a direction.
+    """
+    drawn, pieces, _ = renderer.geometry.pieces(sent.triangles, sent.frame)
+    if not len(pieces):
+        return 0.5
+    left, right = pieces.left.values, pieces.right.values
+    steps = np.ldexp(
+        2.0**17 * (1 - 2.0**-VectorAdapter.MARGIN_SHIFT), SpanHalver().shift(pieces.left, pieces.right)
+    )
+    last = pieces.length - 1.0
+    difference = np.abs(right - left).max(axis=1) * steps
+    rounding = np.where(last > 0, np.maximum(difference * 2.0**-17, 1 / 16) + 1 / 8, 0)
+    error = component_error(drawn, pieces, renderer) + _across_slivers(drawn, renderer)[pieces.triangle]
+    component = 0.5 + rounding + error * steps
+    shortest = nearest(left, right) * steps - 2 * component
+    if (shortest <= 2 * component).any():
+        return None
+    errors = QuotientErrors.of_words(component, shortest, last, renderer.mirrors)
+    if renderer.mirrors:
+        errors = replace(errors, turn=errors.turn + 2.0**-15)
+    return _bound(scene, renderer.design, errors)
+
+
+def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
+    """Largest difference of a component of N/W across each triangle that is a sliver; 0 of the others."""
+    y, normal = drawn.triangles.y, drawn.triangles.normal * ATTRIBUTE.step
+    height = y[:, 2] - y[:, 0]
+    share = ((y[:, 1] - y[:, 0]) / height)[:, np.newaxis]
+    across = normal[:, 1] - (1 - share) * normal[:, 0] - share * normal[:, 2]
+    steps = renderer.geometry.grid.steps
+    return np.where(drawn.area * 256 <= height * steps, np.abs(across).max(axis=1), 0)
+
+
+def _bound(scene: Scene, design: Design, errors: QuotientErrors) -> float:
+    """From the bounds of directions to that of a pixel."""
+    lobe = design.specular
+    assert isinstance(lobe, QuotientLobe)
     largest = 0.0
     for material in scene.materials:
         parameter = design.highlight_parameter(material)

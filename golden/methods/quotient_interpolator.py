@@ -158,7 +158,7 @@ class QuotientErrors:
         square = np.einsum("si,si->s", way, way)
         t = np.clip(-np.einsum("si,si->s", start, way) / np.where(square, square, 1), 0, 1)
         shortest = np.linalg.norm(start + t[:, np.newaxis] * way, axis=1)
-        return cls._of(0.5 + difference, np.maximum(shortest - 3, 1), last, mirror)
+        return cls.of_words(0.5 + difference, np.maximum(shortest - 3, 1), last, mirror)
 
     @classmethod
     def worst(cls, length: int, mirror: bool = False) -> "QuotientErrors":
@@ -172,11 +172,25 @@ class QuotientErrors:
             Whether the highlight is one of R·V.
         """
         shortest = QuotientInterpolator.SHORTEST * 2.0**17 - 3
-        return cls._of(*(np.array([value]) for value in (2.5, shortest, length - 1.0)), mirror)
+        return cls.of_words(*(np.array([value]) for value in (2.5, shortest, length - 1.0)), mirror)
 
     @classmethod
-    def _of(cls, component, shortest, last, mirror) -> "QuotientErrors":
-        """From the error of a component and the length of v, in steps; and the last pixel."""
+    def of_words(
+        cls, component: np.ndarray, shortest: np.ndarray, last: np.ndarray, mirror: bool = False
+    ) -> "QuotientErrors":
+        """The largest bounds of some spans whose words are off by more than their rounding.
+
+        Parameters
+        ----------
+        component : float array, shape (spans,)
+            Largest error of a component of v at any pixel, in steps of 2^-17.
+        shortest : float array, shape (spans,)
+            Lower bound of ``|v|`` of the words, in the same steps.
+        last : float array, shape (spans,)
+            Pixels less 1.
+        mirror : bool
+            Whether the highlight is one of R·V.
+        """
         angle = np.arcsin(np.minimum(np.sqrt(3) * component / shortest, 1))
         # Of R and V the angle turns twice as fast, and y cos a is rounded once more.
         turn = 2 * angle + 2 * np.sqrt(2) * (component + 0.5) / shortest if mirror else angle

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from blysk.golden.frames.compare import Comparison, FrameErrors, compare, compare_image
+from blysk.golden.frames.compare import Comparison, FrameErrors, compare, compare_triangles
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.metrics import error_map
 from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
 from blysk.sim.frames.figures import frame_figures, triangle_figures
 from blysk.sim.frames.frame import SimulatedFrame
 from blysk.sim.frames.picture import write_comparison, write_image
@@ -100,7 +101,8 @@ class RenderedFrame:
     def comparison(self) -> Comparison:
         """The golden frame, and the errors against three references; by triangles against two."""
         if isinstance(self.simulated, SimulatedTriangleFrame):
-            return compare_image(self.scene, self.design, self.simulated.image)
+            drawn = self.simulated
+            return compare_triangles(self.scene, Renderer(self.design), drawn.sent, drawn.image)
         return compare(self.scene, self.design, self.simulated)
 
     @cached_property

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from blysk.golden.frames.compare import compare, compare_image
+from blysk.golden.frames.compare import compare, compare_triangles
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.camera import Camera
@@ -187,8 +187,9 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
         if animation.setups:
             design, size = animation.design, (scene.width, scene.height)
             lanes = animation.setups, animation.coarse
-            drawn = _triangle_simulator(design, animation.engine, size, *lanes).render(scene)
-            comparison = compare_image(scene, design, drawn.image)
+            simulator = _triangle_simulator(design, animation.engine, size, *lanes)
+            drawn = simulator.render(scene)
+            comparison = compare_triangles(scene, simulator.renderer, drawn.sent, drawn.image)
             return AnimationFrame(drawn.image, triangle_figures(scene, design, drawn, comparison))
         frame = _simulator(animation.design, animation.engine, animation.pipes).render(scene)
         full = animation.full or animation.design

@@ -176,8 +176,11 @@ def _pixel_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 def _bound(figures: Mapping[str, Any]) -> str:
     bound = figures["bound_lsb"]
+    if bound is None:
+        return "no bound is known"
+    where = " where the same triangle shows" if "geometry" in figures else ""
     # Rounded up: a bound stays one.
-    return "no bound is known" if bound is None else f"bound {math.ceil(100 * bound - 1e-6) / 100:.2f}"
+    return f"bound {math.ceil(100 * bound - 1e-6) / 100:.2f}{where}"
 
 
 def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:
@@ -207,7 +210,9 @@ def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         )
     method = figures["method_error"]
     where = f"largest method error off the border of a light {method['steady_lsb']:.3f}"
-    hypothesis = "" if figures["bound_lsb"] is None else ", for spans from software"
+    hypothesis = ", for spans from software" * (
+        figures["bound_lsb"] is not None and "geometry" not in figures
+    )
     yield _line("", f"{where}; {_bound(figures)}{hypothesis}")
     yield from _border_line(figures)
 

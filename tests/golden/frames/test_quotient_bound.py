@@ -1,15 +1,22 @@
 """Bound of frames by the quotient method: never exceeded, and near what is found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from blysk.golden.frames.compare import compare
+from blysk.golden.frames.compare import border_mask, compare, compare_triangles
 from blysk.golden.frames.frame import model_frame
+from blysk.golden.frames.triangle_frame import triangle_frame
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
+from blysk.sim.meshes.teapot import teapot
 
 
 def _scene(rng):
@@ -35,4 +42,36 @@ def test_no_frame_exceeds_its_bound(model):
         if compared.visible_pixels > 20:
             assert compared.method_error.steady_lsb <= compared.bound_lsb
             ratios.append(compared.method_error.steady_lsb / compared.bound_lsb)
+    assert max(ratios) > 0.6
+
+
+@pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_no_frame_by_triangles_exceeds_its_bound(model):
+    """Where the frame shows the triangle that the exact one shows; normals far apart, and slivers, too."""
+    rng = np.random.default_rng(7)
+    ratios = []
+    for k in range(14):
+        scene = _scene(rng)
+        scene = replace(scene, lights=scene.lights[:1])
+        slivers = k == 0 and model == "blinn"
+        if slivers:
+            mesh = teapot(10_000)
+            scene = replace(scene, mesh=mesh, camera=Camera.framing(mesh.vertices, (1, 2, 3)))
+        renderer = Renderer(preset("quotient", model).for_materials(scene.materials))
+        drawn = triangle_frame(scene, renderer)
+        compared = compare_triangles(scene, renderer, drawn.sent, drawn.image)
+        if slivers:
+            assert drawn.counts["sliver"]
+        if compared.bound_lsb is None or compared.visible_pixels < 20:
+            continue
+        raster = rasterise(scene)
+        owner = np.full(scene.width * scene.height, -1)
+        owner[raster.pixel[raster.visible]] = raster.triangle[raster.span[raster.visible]]
+        same = (owner == drawn.owner.reshape(-1)) & (owner >= 0)
+        same &= ~border_mask(scene, raster, renderer.design.specular.model).reshape(-1)
+        exact = render(scene, "phong", renderer.design.specular.model, raster).image.reshape(-1, 3) * 255
+        error = np.abs(drawn.image.reshape(-1, 3) - exact)[same].max()
+        assert error <= compared.bound_lsb
+        ratios.append(error / compared.bound_lsb)
+    assert len(ratios) > 8
     assert max(ratios) > 0.6
