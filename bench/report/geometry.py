@@ -1,7 +1,8 @@
 """The report's section on triangles: whole designs compared, from triangles to pixels, and stiff cases.
 
-The rivals are ``chord``, which needs unit normals at the ends and in the middle of each span, and
-``renormalise``, which takes the line between the ends as it is and normalises at every pixel.
+The method is ``quotient``, which takes a vector and its step. Its rivals are ``chord``, which needs unit
+normals at the ends and in the middle of each span, and ``renormalise``, which takes the line between the ends
+as it is and normalises at every pixel.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +28,7 @@ from blysk.sim.frames.triangles import TriangleSimulator
 
 __all__ = ["CANDIDATES", "Candidate", "measure", "section", "tasks"]
 
-_METHODS = "chord", "renormalise"
+_METHODS = "quotient", "chord", "renormalise"
 _EXPONENTS = 1, 20, 100, 1000
 _TRIANGLES = 64, 1000, 10_000, 100_000
 
@@ -69,16 +70,19 @@ class Candidate:
 
 
 CANDIDATES = {
+    "quotient": Candidate("quotient"),
+    "quotient, two lanes": Candidate("quotient", setups=2),
     "chord": Candidate("chord"),
     "chord, two lanes": Candidate("chord", setups=2),
     "renormalise": Candidate("renormalise", setup_interval=2),
     "renormalise, two lanes": Candidate("renormalise", setup_interval=2, setups=2),
+    "quotient, compact": Candidate("quotient", style="compact"),
     "chord, compact": Candidate("chord", style="compact"),
     "renormalise, compact": Candidate("renormalise", style="compact"),
 }
 """Designs to compare, by name."""
 
-_QUICK = "chord, compact", "renormalise, compact"
+_QUICK = "quotient, compact", "chord, compact", "renormalise, compact"
 
 
 def measure(design: str, triangles: Sequence[int], size: Sequence[int]) -> dict[str, Any]:
@@ -148,9 +152,10 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     rates = {entry["design"]: entry["fmax_mhz"] for entry in read_store() if entry["device"] == DEVICE}
     text = [
         f"The teapot at {size[0]}x{size[1]}, one light, every triangle sent, back faces shaded, with a "
-        "depth test. `chord` gets unit normals at the ends and in the middle of every span, and wide spans "
-        "are cut; `renormalise` gets the line between the ends as it is: no normaliser of edges, no cuts, "
-        "but about 14 products a pixel and light.",
+        "depth test. `quotient` gets the vector N/W at the first pixel of a span and its step: no "
+        "normaliser of edges, and cuts only where N/W grows short. `chord` gets unit normals at the ends and "
+        "in the middle of every span, and wide spans are cut. `renormalise` gets the line between the ends "
+        "as it is: no normaliser of edges, no cuts, but about 14 products a pixel and light.",
         *_verdict(designs, rates),
         _stability(cases),
     ]
@@ -159,31 +164,34 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _verdict(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> Iterator[str]:
-    """Which of two designs of a style takes less time for large triangles and for small ones."""
+    """What each rival of a style takes beside the first method, for large triangles and for small ones."""
     for style in ("", ", two lanes", ", compact"):
-        pair = [designs.get(f"{method}{style}") for method in _METHODS]
-        if None in pair:
-            continue
-        names = [f"{method}{style}" for method in _METHODS]
-        seeds = [rates.get(CANDIDATES[name].placed, ()) for name in names]
-        known = all(seeds)
-        clocks = [median(of) for of in seeds] if known else []
-        words = []
-        for chord, rival in zip(*(of["frames"] for of in pair), strict=True):
-            ratio = rival["cycles"] / chord["cycles"]
-            timed = f", {ratio * clocks[0] / clocks[1]:.2f} of the time" if known else ""
-            words.append(f"{ratio:.2f} of the cycles{timed} with {chord['triangles']:,} triangles")
-        more = pair[1]["multipliers"] - pair[0]["multipliers"]
-        rate = (
-            f" (clock rates of {clocks[0]:.0f} and {clocks[1]:.0f} MHz, medians of {len(seeds[0])} and "
-            f"{len(seeds[1])} placements)"
-            if known
-            else ""
-        )
-        yield (
-            f"`{names[1]}` takes, of `{names[0]}`, {'; '.join(words)}{rate}, and {abs(more)} multipliers "
-            f"{'more' if more >= 0 else 'fewer'}."
-        )
+        for rival in _METHODS[1:]:
+            names = [f"{method}{style}" for method in (_METHODS[0], rival)]
+            if all(name in designs for name in names):
+                yield _beside(names, [designs[name] for name in names], rates)
+
+
+def _beside(names: Sequence[str], pair: Sequence[Any], rates: Mapping[str, Sequence[float]]) -> str:
+    """What the second of two designs takes of the first one's cycles, time and multipliers."""
+    seeds = [rates.get(CANDIDATES[name].placed, ()) for name in names]
+    clocks = [median(of) for of in seeds] if all(seeds) else []
+    words = []
+    for own, rival in zip(*(of["frames"] for of in pair), strict=True):
+        ratio = rival["cycles"] / own["cycles"]
+        timed = f", {ratio * clocks[0] / clocks[1]:.2f} of the time" if clocks else ""
+        words.append(f"{ratio:.2f} of the cycles{timed} with {own['triangles']:,} triangles")
+    more = pair[1]["multipliers"] - pair[0]["multipliers"]
+    rate = (
+        f" (clock rates of {clocks[0]:.0f} and {clocks[1]:.0f} MHz, medians of {len(seeds[0])} and "
+        f"{len(seeds[1])} placements)"
+        if clocks
+        else ""
+    )
+    return (
+        f"`{names[1]}` takes, of `{names[0]}`, {'; '.join(words)}{rate}, and {abs(more)} multipliers "
+        f"{'more' if more >= 0 else 'fewer'}."
+    )
 
 
 def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> Table:
@@ -246,7 +254,7 @@ def _stability(cases: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     errors = [case["error"] for case in every if not case["sliver"] and case["error"] is not None]
     told = sorted({case["name"] for case in every if (case["error"] or 0) > 1})
     return (
-        f"{len(every) // len(cases)} stiff and extreme cases with both methods: "
+        f"{len(every) // len(cases)} stiff and extreme cases with each method: "
         f"{sum(case['coverage'] for case in every)} pixels are covered in one of hardware and float64 alone, "
         f"and the largest error is {max(errors):.2f} LSB where the hardware counts no sliver. "
         f"More than 1 LSB off: {'; '.join(told) or 'none'}."

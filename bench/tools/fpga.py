@@ -138,7 +138,7 @@ def _pipelines(
         name += [f"{setups} lanes"] if setups > 1 else []
         if top == "shader":
             yield ", ".join(name), partial(pixel_pipelines, made, pipes)
-        elif not (made.takes_values or made.takes_vectors) or not every:
+        elif not (made.takes_values or (made.takes_vectors and lights > 1)) or not every:
             yield ", ".join(name), partial(TOPS[top].unit, renderer_of(made, "top", top), setups=setups)
 
 

@@ -18,14 +18,16 @@ from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
+METHODS = "quotient", "chord", "renormalise"
+
 
 @pytest.fixture(scope="module")
 def cases():
-    return {method: measure_cases(method, True) for method in ("chord", "renormalise")}
+    return {method: measure_cases(method, True) for method in METHODS}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", ["chord", "renormalise"])
+@pytest.mark.parametrize("method", METHODS)
 def test_cases(cases, method):
     """Coverage is exact; only slivers are off, and only opposite normals come to 0."""
     for case in cases[method]:
@@ -54,7 +56,7 @@ def test_differences_are_found():
     assert 63 < found["error"] < 65
 
 
-@pytest.mark.parametrize("method", ["chord", "renormalise"])
+@pytest.mark.parametrize("method", METHODS)
 def test_random_coarse_meshes(method):
     """Ten convex bodies of 8 to 39 corners, whose normals stray by some 30 degrees."""
     rng = np.random.default_rng(10)
@@ -82,8 +84,8 @@ def _normals_of(points, faces):
 
 
 def test_tasks():
-    assert [task.settings["design"] for task in tasks(False)[:-2]] == list(CANDIDATES)
-    assert {task.settings["quick"] for task in tasks(True)[-2:]} == {True}
+    assert [task.settings["design"] for task in tasks(False)[:-3]] == list(CANDIDATES)
+    assert {task.settings["quick"] for task in tasks(True)[-3:]} == {True}
 
 
 def _result(multipliers, *cycles):
@@ -99,21 +101,22 @@ def test_section(cases, monkeypatch):
     """Which design takes less time follows from cycles and clock rates."""
     store = [
         {"design": f"render {method}, blinn, 1 light, compact", "device": DEVICE, "fmax_mhz": rates}
-        for method, rates in (("chord", [90, 100, 120]), ("renormalise", [80]))
+        for method, rates in (("quotient", [90, 100, 120]), ("chord", [100]), ("renormalise", [80]))
     ]
     monkeypatch.setattr(geometry, "read_store", lambda: store)
     chosen = tasks(True)
-    results = [_result(10, 4000, 8000), _result(15, 2000, 8000), *cases.values()]
+    results = [_result(10, 4000, 8000), _result(9, 4000, 4000), _result(15, 2000, 8000), *cases.values()]
     made = section(chosen, results)
-    assert made.text[1] == (
-        "`renormalise, compact` takes, of `chord, compact`, 0.50 of the cycles, 0.62 of the time with 10 "
+    assert made.text[1].startswith("`chord, compact` takes, of `quotient, compact`, 1.00 of the cycles, ")
+    assert made.text[2] == (
+        "`renormalise, compact` takes, of `quotient, compact`, 0.50 of the cycles, 0.62 of the time with 10 "
         "triangles; 1.00 of the cycles, 1.25 of the time with 1,000 triangles (clock rates of 100 and 80 "
         "MHz, medians of 3 and 1 placements), and 5 multipliers more."
     )
-    assert "0 pixels are covered" in made.text[2]
-    assert made.text[2].endswith("More than 1 LSB off: slivers of 1/256 pixel.")
+    assert "0 pixels are covered" in made.text[3]
+    assert made.text[3].endswith("More than 1 LSB off: slivers of 1/256 pixel.")
     designs, drawing, extreme = made.parts
-    assert [row[5] for row in designs.rows] == [100, 80]
+    assert [row[5] for row in designs.rows] == [100, 100, 80]
     assert "<svg" in drawing.svg
     errors = extreme.columns.index("error, LSB")
     assert {marks[errors] for marks in extreme.marks} == {"", "stated"}
