@@ -6,6 +6,8 @@ chord method with one light, for the models cosquad, coscos4 and blinn and the e
 gated spans and pixels, cycles, and toggled register bits. The exit status is 1 if a frame is not equal, to
 the bit, in all four simulations and by the bit-accurate model; 2 for bad input.
 
+The method quotient has no gate: its vectors bring neither unit normals nor values at three places.
+
 Toggles are of registers: changes inside a multiplier between two registers are not counted. The gate works
 once a span and saves once a pixel, so the lengths of the frame's spans decide whether it saves toggles.
 """
