@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from blysk.golden.geometry.scene_triangles import scene_triangles
+from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 from blysk.golden.video.controls import Controls
 from blysk.golden.video.draw_commands import KINDS, DrawCommands
-from blysk.golden.video.draw_unit import Drawing, board_design, turned
+from blysk.golden.video.draw_unit import Drawing, turned
 from blysk.sim.meshes.teapot import teapot
 
 SIZE = 160, 120
@@ -74,13 +75,16 @@ def errors_with_exact_coordinates(drawing, shown, angle, monkeypatch, preset=0):
     return np.abs(picture - 255 * frame.image)[drawn]
 
 
-def test_each_light_has_matrices_into_its_frame(monkeypatch):
+@pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_each_light_has_matrices_into_its_frame(monkeypatch, model):
     """Any direction, that of the viewer, the opposite, and none; lights that are equal share a slot."""
     shown = scene()
     viewer = shown.camera.viewer
     lamps = (0.5, 0.8, 1), viewer, -viewer, (-1, 0.3, 0.4), (0.5, 0.8, 1)
     scenes = [replace(shown, lights=(Light(tuple(lamp)),)) for lamp in lamps]
-    drawing = Drawing.of([*scenes, replace(shown, lights=())], board_design(), controls=Controls(lights=6))
+    drawing = Drawing.of(
+        [*scenes, replace(shown, lights=())], preset("quotient", model), controls=Controls(lights=6)
+    )
     lists = [drawing.commands.compute(start, True) for start in drawing.commands.starts]
     slots = [words[words[:, 0] == KINDS.index("transform"), 1].item() for words in lists]
     assert slots[4] == slots[0]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
@@ -119,6 +120,17 @@ def test_buttons_count_from_the_next_frame_on(simulator):
     bands = [*range(count)] * len(buttons)
     buttons = buttons.ravel().tolist()
     assert_equal(simulator.run(bands, buttons), expected(simulator.drawing, bands, buttons))
+
+
+@pytest.mark.long
+def test_highlights_of_phong_follow_the_light():
+    """The light changes after the first frame: L of the new one counts before the first triangle."""
+    drawing = drawing_of(60, (48, 32), preset("quotient", "phong", materials=2))
+    bands = [*range(drawing.bands)] * 3
+    buttons = [0, 1 << BUTTONS.index("light"), *[0] * (len(bands) - 2)]
+    found = DrawingSimulator(drawing).run(bands, buttons)
+    assert_equal(found, expected(drawing, bands, buttons))
+    assert sum(len(pixels) for pixels in found.pixels) > 500
 
 
 @pytest.mark.long
