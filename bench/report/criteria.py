@@ -191,6 +191,8 @@ def _drawing(frames: Sequence[tuple]) -> Drawing:
     axes.set_xticks((), minor=True)
     axes.set_yticks((1, 2, 5, 10, 20, 50), ("1", "2", "5", "10", "20", "50"), minor=False)
     axes.set_yticks((), minor=True)
+    # Where lines lie together, not all have room.
+    labels.sort(key=lambda label: label.text != METHOD)
     place_labels(axes, labels, points)
     size = sum(result[METHOD]["pixels"] for _, _, result in frames) // len(frames)
     note = (

@@ -90,9 +90,9 @@ turned into its frame by the page."""
 
 DESIGNS = (
     *(pair for pair in accuracy.DESIGNS if pair[0] in SERVED),
-    *(("quotient", "ggx"), ("chord", "ggx")),
+    *(("quotient", "ggx"), ("chord", "ggx"), ("linear", "blinn")),
 )
-"""Method and model of each module."""
+"""Method and model of each module; the rival has the model of the first one, too."""
 
 ROUGHNESSES = tuple(round(step / 100, 2) for step in range(10, 101))
 """Roughnesses that a model with a roughness may have."""

@@ -138,7 +138,6 @@ def test_every_control_changes_the_frame(open_page):
             ("exponent", 100),
             ("model", "phong"),
             ("method", "chord"),
-            ("model", "cosquad"),
             ("ambient", 0.3),
             ("diffuse", 0.5),
             ("specular", 0.9),
