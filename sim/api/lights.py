@@ -8,10 +8,9 @@ from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.reference.lighting import Light
 from blysk.sim.value_types import Color, PartError, Value, Vector, plain, shown, shown_key
 
-__all__ = ["LightLike", "Lights", "LightsLike"]
+__all__ = ["Lights", "LightsLike"]
 
-LightLike = Light | Mapping[str, Any] | Sequence[float] | str
-LightsLike = LightLike | Sequence[LightLike]
+LightsLike = Light | Mapping[str, Any] | str | Sequence[Any]
 """Lights: a `Light`, a dict of its fields, numbers or a text as on the command line; or several of these."""
 
 
@@ -61,7 +60,8 @@ class Lights(Value):
 
     def light(self, numbers: Sequence[float]) -> Light:
         """The light of checked numbers; `ValueError` if `Light` refuses a number."""
-        parts, rest = {}, tuple(numbers)
+        parts: dict[str, Any] = {}
+        rest = tuple(numbers)
         for field in self.fields:
             count = 2 if field == "cone" else 3
             if rest:

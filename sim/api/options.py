@@ -4,8 +4,6 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
 
-from numpy.typing import ArrayLike
-
 from blysk.golden.bus.framing import BUSES, PACKETS
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
@@ -77,7 +75,7 @@ COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fres
 ColorLike = str | float | Triple
 """A colour: ``"#rrggbb"``, one number, or three."""
 
-Source = Union[str, os.PathLike[str], Mesh, Sequence[ArrayLike], "trimesh.Trimesh", "trimesh.Scene"]
+Source = Union[str, os.PathLike[str], Mesh, Sequence[Any], "trimesh.Trimesh", "trimesh.Scene"]
 """``"teapot"``, a mesh file, a scene file (``.toml``), a mesh, also of `trimesh`, or arrays: vertices, faces
 and perhaps normals."""
 
