@@ -12,6 +12,7 @@ from amaranth.lib.memory import Memory
 from blysk.golden.number.fixed import Format
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.formula import SYMBOLS, Formula, component, formula_of
+from blysk.hdl.core.memory import delayed, turn_of
 from blysk.hdl.core.schedule import Schedule, place
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.word import Word, traced
@@ -32,6 +33,9 @@ MULTIPLIER_BITS = 18
 
 MULTIPLIER_LATENCY = 2
 """Cycles of `registered_product`."""
+
+_LONG, _WIDE = 4, 4
+"""Least cycles that a word waits in a memory, and least bits of the word."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +84,9 @@ class Dataflow:
         Whether beats come at any distance from the interval on; see `PipelinedUnit`.
     low_latency : bool
         Whether a product takes a single register, two cycles in all.
+    memories : bool
+        Whether a wide word that waits for long does so in a memory of look-up tables in place of registers,
+        with an interval of 1.
 
     Raises
     ------
@@ -89,11 +96,14 @@ class Dataflow:
     Source: docs/theory/scheduling.md.
     """
 
-    def __init__(self, interval: int, *, spaced: bool = False, low_latency: bool = False):
+    def __init__(
+        self, interval: int, *, spaced: bool = False, low_latency: bool = False, memories: bool = False
+    ):
         if interval < 1:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
         self.spaced = spaced
+        self.memories = memories and interval == 1
         self._words: list[Word] = []
         self._schedule: Schedule | None = None
         latency, product = MULTIPLIER_LATENCY, registered_product
@@ -428,6 +438,7 @@ class _Build:
         self.graph, self.m, self.unit, self.operands = graph, m, unit, operands
         self.values: dict[Word, dict[int, Any]] = {}
         self._instances: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
+        self._turns: dict[int, Signal] = {}
         self._issued: dict[tuple[FunctionalUnit, int], list[tuple[Value | None, Sequence[Any]]]] = {}
 
     def when(self, stage: int) -> Value | None:
@@ -437,7 +448,10 @@ class _Build:
     def at(self, word: Word, stage: int) -> Any:
         """Value of a word at a stage, through copies after its lifetime."""
         copies = self.values[word]
-        first = max(copies)
+        first = max(start for start in copies if start <= stage)
+        if self.graph.memories and stage - first >= _LONG and len(Value.cast(copies[first])) >= _WIDE:
+            copies[stage] = self._delay(f"{word.name}_{stage}", copies[first], stage - first)
+            return copies[stage]
         lifetime = word.lifetime if first == word.stage else self.unit.initiation_interval
         while stage >= first + lifetime:
             value = copies[first]
@@ -446,7 +460,13 @@ class _Build:
                 self.m, value, f"{word.name}_{first}", when=self.when(first - 1)
             )
             lifetime = self.unit.initiation_interval
-        return copies[max(start for start in copies if start <= stage)]
+        return copies[first]
+
+    def _delay(self, name: str, value: Any, cycles: int) -> Any:
+        """A word some cycles later, from a memory."""
+        if cycles not in self._turns:
+            self._turns[cycles] = turn_of(self.m, cycles)
+        return delayed(self.m, name, value, cycles, self._turns[cycles])
 
     def issue(self, functional_unit: FunctionalUnit, use: Word, operands: Sequence[Any]) -> Any:
         """Issue operands to an instance of a functional unit; return its result, which all its uses read."""

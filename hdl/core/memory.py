@@ -1,6 +1,6 @@
 """Memories read through the output register of an FPGA's memory blocks, and FIFOs made from memories."""
 
-from amaranth.hdl import Module, Shape, Signal, Value
+from amaranth.hdl import Module, Mux, Shape, Signal, Value
 from amaranth.lib import stream
 from amaranth.lib.memory import Memory, WritePort
 
@@ -13,7 +13,9 @@ __all__ = [
     "connect_headed_fifo",
     "connect_late_fifo",
     "connect_wide_fifo",
+    "delayed",
     "registered_read",
+    "turn_of",
 ]
 
 HEADED_FIFO_LATENCY = 2
@@ -66,6 +68,50 @@ def registered_read(
     with m.If(moves):
         m.d.sync += [read.eq(port.data), word.eq(read)]
     return word, moves
+
+
+def turn_of(m: Module, cycles: int) -> Signal:
+    """Address for `delayed`, which words of one delay share: it counts from 0 to ``cycles - 2``."""
+    turn = Signal(range(cycles - 1), name=f"turn_{cycles}")
+    m.d.sync += turn.eq(Mux(turn == cycles - 2, 0, turn + 1))
+    return turn
+
+
+def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Signal:
+    """A word some cycles later, from a memory of look-up tables before a register.
+
+    The cycles are those on which the module is enabled. On each the memory is read at an address, and then
+    written there. After a reset words from before it come, in any order.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the register; the memory is its submodule.
+    name : str
+        Of both.
+    value : Value
+        The word, of any shape.
+    cycles : int
+        At least 3.
+    turn : Value
+        From `turn_of` the cycles, in the same module.
+
+    Returns
+    -------
+    Signal
+        The word, of the same shape.
+    """
+    m.submodules[name] = memory = Memory(shape=len(Value.cast(value)), depth=cycles - 1, init=[])
+    word = Signal(value.shape(), name=name, reset_less=True)
+    write, read = memory.write_port(), memory.read_port(domain="comb")
+    m.d.comb += [
+        write.addr.eq(turn),
+        write.data.eq(value),
+        write.en.eq(1),
+        read.addr.eq(turn),
+    ]
+    m.d.sync += Value.cast(word).eq(read.data)
+    return word
 
 
 def connect_late_fifo(
@@ -176,7 +222,7 @@ def connect_headed_fifo(
     head : Value
         Bits of the source's payload, or made from it.
     depth : int
-        Payloads that the FIFO holds, a power of two.
+        Words of the memory, a power of two from 4 on; all but one of them hold payloads.
 
     Returns
     -------
@@ -187,14 +233,17 @@ def connect_headed_fifo(
     ------
     TypeError
         As `connect_fifo`.
+    ValueError
+        If the depth is less than 4 or no power of two.
     """
     require_same_shape(source.payload.shape(), sink.payload.shape())
+    if depth < 4 or depth & (depth - 1):
+        raise ValueError(f"depth must be a power of two from 4 on, not {depth}")
     width, bits = Shape.cast(source.payload.shape()).width, (depth - 1).bit_length()
     m.submodules[name] = memory = Memory(shape=width, depth=depth, init=[])
     m.submodules[f"{name}_heads"] = heads = Memory(shape=len(head), depth=depth, init=[])
     free, first, ahead = (Signal(bits, name=f"{name}_{word}") for word in ("free", "first", "ahead"))
     room, some = Signal(name=f"{name}_room", init=1), Signal(name=f"{name}_some")
-    level, following = (Signal(range(depth + 1), name=f"{name}_{word}") for word in ("level", "following"))
     found = Signal(len(head), name=f"{name}_head", reset_less=True)
     comes, goes, fetches = source.valid & room, some & sink.ready, Signal(name=f"{name}_fetches")
     read, of_heads = memory.read_port(domain="comb"), heads.read_port(domain="comb")
@@ -208,17 +257,16 @@ def connect_headed_fifo(
         of_heads.addr.eq(ahead),
         Value.cast(sink.payload).eq(read.data),
         fetches.eq((free != ahead) & (~some | sink.ready)),
-        following.eq(level + comes - goes),
     ]
     m.d.sync += [
-        free.eq(free + comes),
-        first.eq(first + goes),
-        ahead.eq(ahead + fetches),
         some.eq(fetches | (some & ~sink.ready)),
-        level.eq(following),
-        # The pointers tell of no more payloads than this.
-        room.eq(following < depth - 1),
+        # From registers alone: one payload more may come. The pointers tell of no more than depth - 1.
+        room.eq((free - first)[:bits] < depth - 2),
     ]
+    with m.If(comes):
+        m.d.sync += free.eq(free + 1)
+    with m.If(goes):
+        m.d.sync += first.eq(first + 1)
     with m.If(fetches):
-        m.d.sync += found.eq(of_heads.data)
+        m.d.sync += [ahead.eq(ahead + 1), found.eq(of_heads.data)]
     return found

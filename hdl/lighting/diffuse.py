@@ -13,7 +13,8 @@ class DiffuseUnit(PipelinedUnit):
 
     The latency is ``latency`` cycles: one for rounding, one for saturation, one more to take the operand in
     where the initiation interval is over 1, and a delay for the rest, so that the term leaves together with
-    that of a longer unit beside it. The delay costs a register for each interval; no multipliers.
+    that of a longer unit beside it. The delay is a memory of look-up tables where the interval is 1, and
+    else a register for each interval. No multipliers.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ class DiffuseUnit(PipelinedUnit):
         initiation_interval: int = 1,
     ):
         self.parameters = parameters or Diffuse()
-        self._graph = graph = Dataflow(initiation_interval)
+        self._graph = graph = Dataflow(initiation_interval, memories=True)
         operand = graph.input("operand", lambda operand: operand)
         rounded = graph.register("rounded", lambda cosine: cosine.round_half_up(17), operand)
         self._result = graph.register(

@@ -27,8 +27,8 @@ INTERVALS = [3, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 4, 5, 
 class GraphUnit(PipelinedUnit):
     """A unit that is a graph: ``describe`` gives its results, by name, each with its shape."""
 
-    def __init__(self, interval, describe, spaced=False):
-        self.graph = Dataflow(interval, spaced=spaced)
+    def __init__(self, interval, describe, spaced=False, memories=False):
+        self.graph = Dataflow(interval, spaced=spaced, memories=memories)
         inputs = {
             name: self.graph.input(name, lambda operands, name=name: operands[name])
             for name in INPUTS.members
@@ -175,6 +175,16 @@ def test_graphs_equal_their_functions(graph, interval):
         assert unit.latency == 14 + (interval > 1)
     if graph is products:
         assert cost_of(GraphUnit(interval, products)).multiplier_count == -(-4 // interval)
+
+
+@pytest.mark.parametrize("graph", [copies, table, late_and_early])
+def test_words_that_wait_in_memories(graph):
+    """They come as from registers: the same results on the same cycles, with fewer registers."""
+    beats = beats_of(np.random.default_rng(1))
+    verify(GraphUnit(1, graph, memories=True), beats, functions_of(**beats)[graph])
+    registers, memories = (cost_of(GraphUnit(1, graph, memories=m)) for m in (False, True))
+    assert memories.register_bits < registers.register_bits
+    assert memories.ram_bits > registers.ram_bits == 0
 
 
 WORD = 18

@@ -1,0 +1,18 @@
+# amaranth: UnusedElaboratable=no
+"""Refusals of FIFOs made from memories; what they do is proved where they are used."""
+
+import re
+
+import pytest
+from amaranth.hdl import Const, Module
+from amaranth.lib import stream
+
+from blysk.hdl.core.memory import connect_headed_fifo
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3, 12])
+def test_headed_fifo_refuses_a_depth(depth):
+    """With two words no payload would ever be accepted."""
+    source, sink = (stream.Signature(8).create(path=(name,)) for name in ("source", "sink"))
+    with pytest.raises(ValueError, match=re.escape(f"depth must be a power of two from 4 on, not {depth}")):
+        connect_headed_fifo(Module(), "words", source, sink, Const(0, 1), depth)
