@@ -337,7 +337,7 @@ class Lobe(HighlightOperand):
         if operand.format != self.operand_format:
             raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
         exact = ONE_SQUARED - operand if self.operand == "cosine" else operand
-        return exact.truncate(self.fraction_bits).saturate(self.argument_format)
+        return exact.truncate(self.argument_format.fraction_bits).saturate(self.argument_format)
 
     def address(self, argument: Fixed) -> tuple[np.ndarray, Fixed]:
         """Word of a table, and position within its step, for arguments under 1.

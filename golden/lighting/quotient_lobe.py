@@ -133,18 +133,6 @@ class QuotientLobe(Lobe):
             largest = max(largest, float(np.abs(line - self.model.reflect(cosine, parameter)).max()))
         return largest
 
-    def argument(self, operand):
-        """The place itself.
-
-        Raises
-        ------
-        ValueError
-            If the operand has another format.
-        """
-        if operand.format != self.operand_format:
-            raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
-        return operand
-
     def address(self, argument):
         """Word of a table, and position within its step: integer and fraction of a place."""
         format = self.fraction_format
