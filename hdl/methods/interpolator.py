@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import ClassVar
 
-from amaranth.hdl import Module, Value
+from amaranth.hdl import Module, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -14,7 +14,7 @@ from blysk.hdl.core.stream import connect
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
 
-__all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "span_words", "spelled"]
+__all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "flag_spans", "span_words", "spelled"]
 
 
 def spelled(numbers: Sequence[int]) -> str:
@@ -28,6 +28,35 @@ def spelled(numbers: Sequence[int]) -> str:
 def span_words(span: data.View) -> list[tuple[str, Value]]:
     """Names and values of a span's members; a shorter length may be assigned to one of 12 bits."""
     return [(name, span[name]) for name in ("normal_left", "normal_right", "length")]
+
+
+def flag_spans(m: Module, accepted: Value, pixel: data.View) -> Signal:
+    """Flag each span once, at its first pixel that is out of range.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the registers.
+    accepted : Value
+        Whether a pixel leaves on this cycle.
+    pixel : data.View
+        The pixel, with ``out_of_range``, and ``span``, a bit that alternates from span to span.
+
+    Returns
+    -------
+    Signal
+        High for a cycle for each flagged span.
+    """
+    last, flagged, out_of_range = (Signal(name=name) for name in ("last", "flagged", "out_of_range"))
+    before = flagged & (last == pixel.span)
+    m.d.sync += out_of_range.eq(0)
+    with m.If(accepted):
+        m.d.sync += [
+            out_of_range.eq(pixel.out_of_range & ~before),
+            flagged.eq(pixel.out_of_range | before),
+            last.eq(pixel.span),
+        ]
+    return out_of_range
 
 
 class InterpolatorUnit(wiring.Component):

@@ -9,7 +9,7 @@ from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.core.memory import connect_wide_fifo
 from blysk.hdl.core.shapes import normal_shape, span_normals_shape
 from blysk.hdl.core.stream import SLICE_LATENCY
-from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
+from blysk.hdl.methods.interpolator import NormalInterpolatorUnit, flag_spans
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 from blysk.hdl.normals.line_setup import LineSetupUnit, line_shape
 from blysk.hdl.normals.renormaliser import RenormaliserUnit, vector_shape
@@ -119,14 +119,4 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
             normals.valid.eq(renormaliser.o.valid),
             renormaliser.o.ready.eq(normals.ready),
         ]
-        # The bit alternates from span to span, 0 in the first: the state starts as after a span with 1.
-        last, flagged, out_of_range = Signal(init=1), Signal(), Signal()
-        before = flagged & (last == result.span)
-        m.d.sync += out_of_range.eq(0)
-        with m.If(normals.valid & normals.ready):
-            m.d.sync += [
-                out_of_range.eq(result.out_of_range & ~before),
-                flagged.eq(result.out_of_range | before),
-                last.eq(result.span),
-            ]
-        return normals, out_of_range
+        return normals, flag_spans(m, normals.valid & normals.ready, result)
