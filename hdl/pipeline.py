@@ -256,6 +256,8 @@ class ShadingPipelineUnit(wiring.Component):
         """Frame constants, units from spans to colours, coordinates past them, admission, counters."""
         m = Module()
         p = self.parameters
+        # Whether a write was taken on the cycle before.
+        self._written = Signal(name="written")
         m.submodules.pixel_assembler = assembler = self._assembler
         m.submodules.frame_constants = frame = FrameConstantsUnit(
             p.lights, p.materials, p.threshold_format, p.banks
@@ -300,7 +302,8 @@ class ShadingPipelineUnit(wiring.Component):
         sinks : list of tuple of Value
             Valid and ready of each unit that takes spans.
         """
-        admit, nonempty, settled, unlocked, written = (Signal() for _ in range(5))
+        admit, nonempty, settled, unlocked = (Signal() for _ in range(4))
+        written = self._written
         idle, write_waits = Signal(name="idle", init=1), self.write.valid
         hold = ~idle
         if (begun := getattr(self._interpolator, "begun", None)) is not None:
@@ -421,11 +424,13 @@ class ShadingPipelineUnit(wiring.Component):
         for light, read in zip(self._lights, tables.reads, strict=True):
             wiring.connect(m, light.table, read)
         if tables.tables is None:
-            taken = self.write.valid & self.write.ready
+            # Whether a write was taken and which address it had, by two registers.
+            of_table = Signal(name="of_table")
             m.d.sync += [
-                tables.write.valid.eq(taken & (self.write.payload.address == LOBE_ADDRESS)),
+                of_table.eq(self.write.payload.address == LOBE_ADDRESS),
                 Value.cast(tables.write.payload).eq(self.write.payload.data),
             ]
+            m.d.comb += tables.write.valid.eq(self._written & of_table)
 
     def _connect_lights(self, m: Module, operands: stream.Interface) -> None:
         """Handshakes from the operands through all lights to the intensity unit.
