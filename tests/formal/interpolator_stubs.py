@@ -10,6 +10,7 @@ import blysk.hdl.methods.chord_spans
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
 import blysk.hdl.methods.quadratic_interpolator
+import blysk.hdl.methods.quotient_interpolator
 import blysk.hdl.methods.recurrence_interpolator
 import blysk.hdl.methods.renormalise_interpolator
 import blysk.hdl.normals.difference_accumulator
@@ -18,6 +19,7 @@ from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.core.stream import connect_slice
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
+from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
@@ -104,6 +106,14 @@ def itself(pixel):
     return pixel
 
 
+def vector_start(span):
+    return span.start[0]
+
+
+def vector_line(pixel):
+    return pixel.line[0]
+
+
 def normal(pixel):
     return pixel[0]
 
@@ -152,6 +162,10 @@ def renormaliser(vector, gives):
 
 def products(vector, gives):
     yield put(gives[0].cosine, word(vector[0]))
+
+
+def quotients(words, gives):
+    yield put(gives.lights[0].cosine, word(vector_line(words)))
 
 
 def angular_setup(span, gives):
@@ -228,6 +242,18 @@ class Evaluator(Line):
     quadratics = walk(constant_coefficient, normal)
 
 
+class Vectors(Line):
+    """Its setup is proved by itself."""
+
+    initiation_interval = INTERVAL
+    quadratics = walk(vector_start, vector_line)
+
+    def __init__(self, *parameters):
+        self.OF = lambda parameters: QuotientSpansUnit(*parameters)
+        super().__init__(parameters)
+        self.begun, self.constants = Signal(name="begun"), QuotientSpansUnit(*parameters).constants
+
+
 def gate() -> ValueGateUnit:
     """A gate of one cycle."""
     return short(ValueGateUnit, value_gate, 1)()
@@ -250,6 +276,7 @@ def replace_parts(monkeypatch) -> None:
         (blysk.hdl.methods.chord_interpolator, "SpanLimitUnit", nothing, 2),
         (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
         (blysk.hdl.methods.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
+        (blysk.hdl.methods.quotient_interpolator, "QuotientUnit", quotients, 3),
     ):
         monkeypatch.setattr(module, name, short(getattr(module, name), hand_on, latency))
     # Of the same capacity and latency, by the same claims of a stream: proofs of a wide memory take long.
@@ -266,3 +293,4 @@ def replace_parts(monkeypatch) -> None:
     monkeypatch.setattr(RecurrenceUnit, "_reinsch", loop)
     monkeypatch.setattr(blysk.hdl.methods.bisection_interpolator, "AdaptiveNormaliserUnit", Normaliser)
     monkeypatch.setattr(blysk.hdl.methods.quadratic_interpolator, "QuadraticEvaluatorUnit", Evaluator)
+    monkeypatch.setattr(blysk.hdl.methods.quotient_interpolator, "QuotientSpansUnit", Vectors)

@@ -24,6 +24,7 @@ import blysk.hdl.methods.chord_interpolator
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
 import blysk.hdl.methods.quadratic_interpolator
+import blysk.hdl.methods.quotient_interpolator
 import blysk.hdl.methods.recurrence_interpolator
 import blysk.hdl.normals.difference_accumulator
 from blysk.golden.methods.angular_interpolator import AngularInterpolator
@@ -31,6 +32,7 @@ from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
 from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
@@ -41,6 +43,7 @@ from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
 from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
+from blysk.hdl.methods.quotient_interpolator import QuotientInterpolatorUnit
 from blysk.hdl.methods.recurrence_interpolator import RecurrenceInterpolatorUnit
 from blysk.hdl.methods.renormalise_interpolator import RenormaliseInterpolatorUnit
 
@@ -63,6 +66,8 @@ from .interpolator_stubs import (
     start,
     tag,
     value,
+    vector_line,
+    vector_start,
     word,
 )
 from .prover import Harness
@@ -231,6 +236,13 @@ def bisection_stretches(unit) -> Iterator[Stretch]:
     yield Stretch(products.i, unit.o, normal, cosine, held(products))
 
 
+def quotient_stretches(unit) -> Iterator[Stretch]:
+    """Spans of vectors, quotients."""
+    spans, quotient = unit._spans, unit._quotient
+    yield Stretch(unit.i, quotient.i, vector_start, vector_line, pixels_held(spans))
+    yield Stretch(quotient.i, unit.o, vector_line, cosine, held(quotient))
+
+
 OPTIONS = {"setup_interval": INTERVAL, "length_bits": LENGTH_BITS}
 
 
@@ -268,6 +280,10 @@ UNITS = {
     "bisection_interpolator": (
         partial(BisectionInterpolatorUnit, BisectionInterpolator(), 1, length_bits=LENGTH_BITS),
         bisection_stretches,
+    ),
+    "quotient_interpolator": (
+        partial(QuotientInterpolatorUnit, QuotientInterpolator(), 1, length_bits=LENGTH_BITS),
+        quotient_stretches,
     ),
 }
 
@@ -346,6 +362,7 @@ STRETCHES = {
     "angular": 6,
     "recurrence_interpolator": 5,
     "bisection_interpolator": 2,
+    "quotient_interpolator": 2,
 }
 
 
@@ -438,6 +455,16 @@ BUGS = {
         "bisection_interpolator",
         "normaliser.o.ready.eq(normals.ready)",
         "normaliser.o.ready.eq(1)",
+    ),
+    "vectors are lost at the input": (
+        "quotient_interpolator",
+        "self.i.ready.eq(spans.i.ready)",
+        "self.i.ready.eq(1)",
+    ),
+    "quotients are lost": (
+        "quotient_interpolator",
+        "quotient.o.ready.eq(self.o.ready)",
+        "quotient.o.ready.eq(1)",
     ),
 }
 
