@@ -46,7 +46,7 @@ class Quotient:
     r            UQ(0, 17)   1/2 to 1; rounded; saturates
     r^2          UQ(0, 17)   1/4 to 1; cut
     line         SQ(2, 16)   l 2^k, cut
-    N·L          SQ(2, 33)   exact product
+    N·L          SQ(2, 18)   cut, behind the bit by which `Diffuse` rounds
     numerator    17 bits     14 to 17 of them count; cut
     place        UQ(i, 12)   cut
     ============ =========== =====================================================================
@@ -57,7 +57,8 @@ class Quotient:
     *Error of r*, in 2^-20: 3.0 by the chord, halved by its move; 1 by the rounding of base and slope; 1 by
     the cut of the product; 1 by the cut of q; 4 by the rounding of r. Relative to r, which is 1/2 at least:
     `ROOT_ERROR`. *Error of s*, relative: twice that, 2^-15 by the cut of r^2, 2^-13 by that of the numerator,
-    2^-16 by that of the place: `SINE_ERROR`. *Error of N·L*: `ROOT_ERROR`, and 2^-16 by the cut of the line.
+    2^-16 by that of the place: `SINE_ERROR`. *Error of N·L*: `ROOT_ERROR`, and 2^-16 by the cut of the line;
+    that of N·L itself does not change the term, which is rounded to 2^-17.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ class Quotient:
     ROOT_FORMAT = UQ(0, 17)
     SQUARE_ROOT_FORMAT = UQ(0, 17)
     LINE_FORMAT = SQ(2, 16)
-    COSINE_FORMAT = SQ(2, 33)
+    COSINE_FORMAT = SQ(2, 18)
     PIXEL_FRACTION = 40
     SHIFTS = 7
     GROUPS = 6
@@ -145,7 +146,7 @@ class Quotient:
 
         Returns
         -------
-        cosine : Fixed, shape (pixels, lights), SQ(2, 33)
+        cosine : Fixed, shape (pixels, lights), SQ(2, 18)
             N·L.
         place : Fixed, shape (pixels, lights), `place_format`
             Place of s, or of 1 - s, in a lobe's table; without highlights all past the end.
@@ -161,6 +162,7 @@ class Quotient:
         root, shift = root[:, np.newaxis], shift[:, np.newaxis]
         line = (pixels.line.codes << shift) >> (self.spans.LINE_FORMAT.width - self.LINE_FORMAT.width)
         cosine = Fixed(self.LINE_FORMAT, self.LINE_FORMAT.wrap(line)) * Fixed(self.ROOT_FORMAT, root)
+        cosine = cosine.truncate(self.COSINE_FORMAT.fraction_bits)
         past = (self.parts * (OCTAVES + 1) * STEPS) << FRACTION_BITS
         if not self.spans.highlights:
             return cosine, Fixed(self.place_format, np.full(line.shape, past)), too_small

@@ -15,6 +15,8 @@ from blysk.hdl.core.word import Word
 _FRACTION, _NUMERATOR = UQ(0, 12), UQ(0, 17)
 """Formats of the place within a step of the table, and of the numerator."""
 
+_CUT = Quotient.COSINE_FORMAT.fraction_bits
+
 __all__ = ["QuotientUnit", "pixel_words_shape", "quotients_shape"]
 
 
@@ -59,7 +61,7 @@ class QuotientUnit(PipelinedUnit):
     there is no r^2, and no s. With an initiation interval of 1 each product has a multiplier. With a longer
     one they share ``ceil((2 + 2 lights) / initiation_interval)``, without highlights
     ``ceil((1 + lights) / initiation_interval)``. The latency follows from the graph. At intervals of 1 to 5
-    it is 15, 21, 20, 23, 24 cycles with one light, and 15, 21, 21, 22, 20 with two; without highlights 10 at
+    it is 16, 22, 21, 24, 25 cycles with one light, and 16, 22, 22, 23, 21 with two; without highlights 10 at
     an interval of 1.
 
     Parameters
@@ -81,7 +83,7 @@ class QuotientUnit(PipelinedUnit):
 
     def __init__(self, parameters: Quotient | None = None, initiation_interval: int = 1):
         self.parameters = p = parameters or Quotient()
-        self._graph = Dataflow(initiation_interval)
+        self._graph = Dataflow(initiation_interval, memories=True)
         self._results = self._describe()
         super().__init__(
             pixel_words_shape(p.spans),
@@ -137,7 +139,7 @@ class QuotientUnit(PipelinedUnit):
 
         normal = g.register("normal", shifted, square, shift, formula="2^2k·q")
         root = self._root(normal)
-        results = {"span": span, "out_of_range": too_small}
+        results = {}
         for k in range(spans.lights):
             line = g.input(f"line_{k}", lambda operands, k=k: operands.line[k], "l")
 
@@ -148,12 +150,26 @@ class QuotientUnit(PipelinedUnit):
                 return FixedValue(p.LINE_FORMAT, select(words, shift))
 
             normal_line = g.register(f"normal_line_{k}", shifted_line, line, shift, formula="2^k·l")
-            results[f"cosine_{k}"] = self._product(f"cosine_{k}", normal_line, root)
+            cosine = self._product(f"cosine_{k}", normal_line, root)
+            results[f"cosine_{k}"] = g.wire(f"cut_{k}", lambda x: x.truncate(_CUT), cosine)
+        marks, compared = {"span": span, "out_of_range": too_small}, []
+        for k in range(spans.lights * spans.highlights):
+            compared.append(self._compare(k, numerators, rest))
+            if not spans.mirror:
+                marks[f"second_{k}"] = compared[-1][1]
+                marks[f"away_{k}"] = g.input(f"away_{k}", lambda operands, k=k: operands.away[k], "z < 0")
+        # Bits that wait for the end do so in one word.
+        together = g.register("marks", lambda *bits: Cat(bits), *marks.values())
+        marks = {
+            name: g.wire(f"mark_{name}", lambda bits, place=place: bits[place], together)
+            for place, name in enumerate(marks)
+        }
         if spans.highlights:
             square_root = self._product("square_root", root, root)
-            for k in range(spans.lights):
-                results[f"highlight_{k}"] = self._place(k, numerators, rest, shift, square_root)
-        return results
+            for k, (chosen, _) in enumerate(compared):
+                further = [marks[f"{name}_{k}"] for name in ("second", "away") if not spans.mirror]
+                results[f"highlight_{k}"] = self._place(k, chosen, shift, square_root, further)
+        return results | {name: marks[name] for name in ("span", "out_of_range")}
 
     def _root(self, normal: Word) -> Word:
         """Word of r, from that of q shifted."""
@@ -181,8 +197,8 @@ class QuotientUnit(PipelinedUnit):
 
         return g.register("root", rounded, entry, bend, formula="r")
 
-    def _place(self, light: int, numerators: list[Word], rest: Word, shift: Word, square_root: Word) -> Word:
-        """Word of the place of a light."""
+    def _compare(self, light: int, numerators: list[Word], rest: Word) -> tuple[Word, Word | None]:
+        """The smaller of m and w of a light, and whether it is w; of R·V it is m."""
         p, g, mirror = self.parameters, self._graph, self.parameters.spans.mirror
         numerator, name = numerators[light], f"{light}"
         cut, width = p.PIXEL_FRACTION, p.PIXEL_FRACTION + 2
@@ -201,23 +217,32 @@ class QuotientUnit(PipelinedUnit):
             # Two integer bits: the sign and one more.
             return Value.cast(word.truncate(cut))[:width].as_signed()
 
-        if mirror:
-            second = g.register(f"second_{name}", lambda m: Const(0, 1), numerator)
-        else:
-            first = width - p.COMPARED
-            second = g.register(
-                f"second_{name}",
-                lambda m, w: code(m)[first:].as_signed() > code(w)[first:].as_signed(),
-                numerator,
-                rest,
-                formula="m > w",
-            )
-
-        def chosen(numerator, rest, second):
-            word = code(numerator) if mirror else Mux(second, code(rest), code(numerator))
+        def positive(word):
             return Mux(word[width - 1], 0, word[: width - 1])[: width - 1]
 
-        chosen = g.register(f"chosen_{name}", chosen, numerator, rest, second, formula="min(m, w)")
+        if mirror:
+            return g.register(f"chosen_{name}", lambda m: positive(code(m)), numerator, formula="m"), None
+        first = width - p.COMPARED
+
+        def is_larger(m, w):
+            # The sign of a difference is at the end of its carries; a comparison looks at them again.
+            return (code(w)[first:].as_signed() - code(m)[first:].as_signed())[p.COMPARED]
+
+        second = g.register(f"second_{name}", is_larger, numerator, rest, formula="m > w")
+        chosen = g.register(
+            f"chosen_{name}",
+            lambda m, w, second: positive(Mux(second, code(w), code(m))),
+            numerator,
+            rest,
+            second,
+            formula="min(m, w)",
+        )
+        return chosen, second
+
+    def _place(self, light: int, chosen: Word, shift: Word, square_root: Word, marks: list[Word]) -> Word:
+        """Word of the place of a light; marks: the part, and ``z < 0``, but for R·V."""
+        p, g, mirror = self.parameters, self._graph, self.parameters.spans.mirror
+        width, name = p.PIXEL_FRACTION + 2, f"{light}"
 
         def group_of(chosen):
             word = Cat(chosen, Const(0, 1))[width - 4 * p.GROUPS :]
@@ -253,20 +278,20 @@ class QuotientUnit(PipelinedUnit):
         octaves = g.register(
             f"octaves_{name}", lambda octave, zeros: (octave + zeros)[:6].as_signed(), octave, zeros
         )
-        away = None
-        if p.spans.takes_heights:
-            away = g.input(f"away_{name}", lambda operands, light=light: operands.away[light], "z < 0")
 
-        def place(mantissa, octaves, second, *away):
-            # Under the octaves the leading one counts, too.
-            under = octaves >= OCTAVES
-            low = (octaves - (OCTAVES - 1))[:5]
-            row = Mux(under, 0, (OCTAVES - octaves)[:4])[:4]
-            rest = Mux(under, mantissa >> low, mantissa)[:16]
-            past = octaves[5] | (~octaves.any() if mirror else away[0])
-            format = p.place_format
-            inside = Cat(rest, row) if mirror else Cat(rest, row, second)
-            return FixedValue(format, Cat(Mux(past, 0, inside), past))
+        def row(octaves, away=0):
+            # Under the octaves, from OCTAVES = 15 on, the leading one counts, too. The largest octave is
+            # 4 GROUPS + 5.
+            under = ~octaves[5] & (octaves[4] | octaves[:4].all())
+            low = Mux(under, octaves[:4] - (OCTAVES - 1), 0)[:4]
+            past = octaves[5] | (~octaves.any() if mirror else away)
+            return Cat(low, Mux(under, 0, ~octaves[:4])[:4], past)
 
-        operands = (mantissa, octaves, second) + ((away,) if away is not None else ())
-        return g.register(f"place_{name}", place, *operands)
+        def place(mantissa, row, second=0):
+            low, row, past = row[:4], row[4:8], row[8]
+            inside = (mantissa >> low)[:16], row, second
+            return FixedValue(p.place_format, Cat(Mux(past, 0, Cat(inside[: 3 - mirror])), past))
+
+        second, away = marks[:1], marks[1:]
+        row = g.register(f"row_{name}", row, octaves, *away)
+        return g.register(f"place_{name}", place, mantissa, row, *second)

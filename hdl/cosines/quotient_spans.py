@@ -1,10 +1,11 @@
 """Spans of the quotient method: vectors in, m, w, l and z of a pixel out on every cycle."""
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
-from amaranth.lib import data, enum, stream, wiring
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.cosines.quotient_spans import QuotientSpans
@@ -15,14 +16,6 @@ from blysk.hdl.core.memory import HEADED_FIFO_LATENCY, connect_headed_fifo
 from blysk.hdl.cosines.quotient import pixel_words_shape
 
 __all__ = ["QuotientSpansUnit", "line_directions_shape", "vectors_shape"]
-
-
-class _Kind(enum.Enum, shape=unsigned(2)):
-    """What the multipliers make, in turns: starts, first differences, second differences."""
-
-    START = 0
-    FIRST = 1
-    SECOND = 2
 
 
 def vectors_shape(parameters: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
@@ -56,6 +49,11 @@ class QuotientSpansUnit(wiring.Component):
     3. Differences wait in registers behind the shifts, starts in a memory of `DEPTH` words. So the
     differences of a span pass the starts of those before it.
 
+    *Serial setup.* One multiplier makes all products of a span one by one: those of second differences, of
+    first ones, of the start; each turn once the words of its kind before were taken. With P products a turn,
+    two a line and one a square, a span takes 3 P cycles, or ``P + 6`` if it has one pixel. All sums have
+    one shift, and a start waits in registers.
+
     *Accumulators.* Second differences are taken while the last three pixels of a span leave, first ones with
     the last two, the start with the last. So a span follows the other without a gap: a run
     of n spans with p pixels takes p cycles, if no more than a third of them have two pixels. A second
@@ -71,11 +69,13 @@ class QuotientSpansUnit(wiring.Component):
         Bit-accurate model.
     length_bits : int
         Bits of the length.
+    serial : bool
+        Whether all products share one multiplier.
 
     Members
     -------
     i : :py:`In(stream.Signature(vectors_shape(parameters, length_bits)))`
-        Spans of length 1 or more. A span of two pixels or more waits for two cycles before it is accepted.
+        Spans of length 1 or more. A span is accepted with its last turn: one of two pixels or more waits.
         Payload and constants have to stay from the first cycle on which it is valid; valid may fall.
     o : :py:`Out(stream.Signature(pixel_words_shape(parameters)))`
         Words of pixels, and a bit that alternates from span to span, 1 in the first.
@@ -93,13 +93,17 @@ class QuotientSpansUnit(wiring.Component):
     _SUMS, _SHIFTED = 3, 5
     """Stages of the sums, and of the shifted differences."""
 
-    latency = _SHIFTED + 2
-    short_latency = _SUMS + HEADED_FIFO_LATENCY + 1
-    initiation_interval = 3
-
-    def __init__(self, parameters: QuotientSpans | None = None, length_bits: int = LENGTH_BITS):
+    def __init__(
+        self,
+        parameters: QuotientSpans | None = None,
+        length_bits: int = LENGTH_BITS,
+        serial: bool = False,
+    ):
         self.parameters = p = parameters or QuotientSpans()
-        self.length_bits = length_bits
+        self.length_bits, self.serial = length_bits, serial
+        self.latency = self._SHIFTED + (1 if serial else 2)
+        self.short_latency = self.latency if serial else self._SUMS + HEADED_FIFO_LATENCY + 1
+        self.initiation_interval = 3 * self._products if serial else 3
         members = {
             "i": In(stream.Signature(vectors_shape(p, length_bits))),
             "o": Out(stream.Signature(pixel_words_shape(p))),
@@ -110,21 +114,26 @@ class QuotientSpansUnit(wiring.Component):
         super().__init__(members)
 
     @property
+    def _products(self) -> int:
+        """Products of a turn of the serial setup; without highlights those of lines are with a constant."""
+        p = self.parameters
+        return sum(len(names) for names in p.squares) + p.lights * (2 if p.highlights else 1)
+
+    @property
     def multipliers(self) -> int:
         """Number of multipliers."""
-        squares = sum(len(names) for names in self.parameters.squares)
-        return squares + 2 * self.parameters.lights * self.parameters.highlights
+        p = self.parameters
+        return 1 if self.serial else self._products - p.lights * (not p.highlights)
 
     @property
     def spans_inside(self) -> int:
         """Largest number of spans inside."""
-        return self.DEPTH + self._SUMS + 2
+        return 2 if self.serial else self.DEPTH + self._SUMS + 2
 
     def elaborate(self, platform):
         """Turns of the setup; the accumulators, and which words they take."""
         m = Module()
         p, pixel = self.parameters, self.o.payload
-        moves = Signal()
         # Registers of differences that wait, and the FIFO of starts.
         waiting = data.StructLayout(
             {
@@ -135,23 +144,25 @@ class QuotientSpansUnit(wiring.Component):
         second, first = (Signal(waiting, name=name, reset_less=True) for name in ("second", "first"))
         second_waits, first_waits = (Signal(name=f"{name}_waits") for name in ("second", "first"))
         start = stream.Signature(self._start_shape()).create(path=("start",))
-        self._set_up(m, moves, (second, second_waits), (first, first_waits), start)
-
         advance = Signal()
         takes_second, takes_first, takes_start = takes = [
             Signal(name=f"takes_{name}") for name in ("second", "first", "start")
         ]
-        with m.If(advance & takes_second):
-            m.d.sync += second_waits.eq(0)
-        with m.If(advance & takes_first):
-            m.d.sync += first_waits.eq(0)
         m.d.comb += start.ready.eq(advance & takes_start)
+        taken = advance & takes_second, advance & takes_first, start.ready
+        for waits, is_taken in zip((second_waits, first_waits), taken, strict=False):
+            with m.If(is_taken):
+                m.d.sync += waits.eq(0)
+        if self.serial:
+            self._set_up_serially(m, taken, (second, second_waits), (first, first_waits), start)
+        else:
+            self._set_up(m, (second, second_waits), (first, first_waits), start)
         self._take(m, advance, takes, (second_waits, first_waits), start)
-        # Half of the second difference is added on the cycle after the first one was taken.
+        # Half of the second difference is added on the cycle after the first one was taken; then it waits.
         halves, ready = Signal(name="halves"), self._ready
         with m.If(advance):
             m.d.sync += halves.eq(takes_first)
-        steps = advance & (takes_first | halves | ~ready)
+        steps = advance & (halves | ~ready)
         for number in range(len(p.squares)):
             names = (f"{name}_{number}" for name in ("square", "difference", "change"))
             value, difference, change = (
@@ -206,19 +217,20 @@ class QuotientSpansUnit(wiring.Component):
             members["heights"] = data.ArrayLayout(signed(p.COMPONENT_FORMAT.width), p.lights)
         return data.StructLayout(members)
 
-    def _set_up(self, m: Module, moves: Signal, second, first, start: stream.Interface) -> None:
+    def _set_up(self, m: Module, second, first, start: stream.Interface) -> None:
         """Turns, products, sums and shifts, up to the registers of differences and the memory of starts."""
-        p, span = self.parameters, self.i.payload
+        p, span, moves = self.parameters, self.i.payload, Signal(name="moves")
         place = {name: index for index, name in enumerate(p.components)}
-        # The turn is a register: it drives the multiplexers of all operands.
-        kind, ends = Signal(_Kind, name="kind"), Signal(name="ends")
+        # The turns are starts, second differences, first ones. Registers tell the first and the second turn:
+        # they drive the multiplexers of all operands.
+        begun, is_second, ends = (Signal(name=name) for name in ("has_begun", "is_second", "ends"))
         m.d.comb += [
-            ends.eq(Mux(kind == _Kind.START, ~span.length[1:].any(), kind == _Kind.SECOND)),
+            ends.eq(Mux(begun, ~is_second, ~span.length[1:].any())),
             self.i.ready.eq(moves & ends),
-            self.begun.eq(kind != _Kind.START),
+            self.begun.eq(begun),
         ]
         with m.If(self.i.valid & moves):
-            m.d.sync += Value.cast(kind).eq(Mux(ends, 0, Value.cast(kind) + 1))
+            m.d.sync += [begun.eq(~ends), is_second.eq(~begun & ~ends)]
 
         def register(value, name):
             result = Signal(Value.cast(value).shape(), name=name, reset_less=True)
@@ -234,11 +246,10 @@ class QuotientSpansUnit(wiring.Component):
         def product(a, b, name):
             return register(register(a, f"{name}_a") * register(b, f"{name}_b"), name)
 
-        # Which word each stage holds, one bit a kind.
-        kinds = _Kind.SECOND, _Kind.FIRST, _Kind.START
-        here = [[self.i.valid & (kind == each) for each in kinds]]
+        # Which word each stage holds, one bit for each of the three.
+        here = [[self.i.valid & turn for turn in (is_second, begun & ~is_second, ~begun)]]
         for stage in range(1, self._SHIFTED):
-            held = [Signal(name=f"{each.name.lower()}_at_{stage}") for each in kinds]
+            held = [Signal(name=f"{name}_at_{stage}") for name in ("second", "first", "start")]
             with m.If(moves):
                 m.d.sync += [signal.eq(before) for signal, before in zip(held, here[-1], strict=True)]
             here.append(held)
@@ -246,9 +257,8 @@ class QuotientSpansUnit(wiring.Component):
         begin, step = (
             {name: vector[at].as_value() for name, at in place.items()} for vector in (span.start, span.step)
         )
-        is_second, is_start = (kind == each for each in (_Kind.SECOND, _Kind.START))
         a = {name: Mux(is_second, step[name], begin[name]) for name in place}
-        b = {name: Mux(is_start, begin[name], step[name]) for name in place}
+        b = {name: Mux(begun, step[name], begin[name]) for name in place}
         squares = []
         for number, names in enumerate(p.squares):
             products = [product(a[name], b[name], f"square_{name}") for name in names]
@@ -270,14 +280,15 @@ class QuotientSpansUnit(wiring.Component):
             for light, height in enumerate(to_start.payload.heights):
                 m.d.comb += height.eq(delayed(begin[f"z{light}"], f"height_{light}", self._SUMS))
         # What decides when a start is taken is in a register.
-        length = to_start.payload.length
-        few = Cat(length[1:].any(), ~length[2:].any() & ~length[:2].all(), ~length[2:].any())
+        few = self._few_of(to_start.payload.length)
         self._few = connect_headed_fifo(m, "starts", to_start, start, few, self.DEPTH)
 
-        # Differences are shifted by their exponent.
-        exponent = delayed(span.exponent, "exponent", self._SUMS)
+        # Differences are shifted by their exponent, second ones of squares by twice that.
         at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
-        amount = Mux(at_sums[0], Cat(Const(0, 1), exponent), exponent)[:5]
+        before = delayed(span.exponent, "exponent", self._SUMS - 1)
+        exponent = register(before, f"exponent_{self._SUMS}")
+        is_twice = here[self._SUMS - 1][0]
+        amount = register(Mux(is_twice, Cat(Const(0, 1), before), before)[:5], "amount")
         free = p.square_format.fraction_bits - 34
         shifted = [
             self._shift(register, total, free + 1, amount, f"square_{k}") for k, total in enumerate(squares)
@@ -286,14 +297,122 @@ class QuotientSpansUnit(wiring.Component):
         shifted += [
             self._shift(register, total, more, exponent, f"line_{k}") for k, total in enumerate(lines)
         ]
-        m.d.comb += moves.eq(
-            ~((at_coarse[0] & second[1]) | (at_coarse[1] & first[1]) | (at_sums[2] & ~to_start.ready))
-        )
+        # Second differences wait until the first ones before them are taken, and so the second ones before.
+        m.d.comb += moves.eq(~((at_coarse[0] & first[1]) | (at_sums[2] & ~to_start.ready)))
         for which, (word, waits) in enumerate((second, first)):
             with m.If(moves & at_coarse[which]):
                 m.d.sync += waits.eq(1)
                 for target, value in zip((*word.squares, *word.lines), shifted, strict=True):
                     m.d.sync += target.eq(value[: len(target)])
+
+    def _set_up_serially(self, m: Module, taken: Any, second, first, start: stream.Interface) -> None:
+        """Products one by one, their sums, one shift, and the registers that sums wait in.
+
+        A turn begins while no words of its kind are inside, so that nothing behind the multiplier waits.
+        """
+        p, span = self.parameters, self.i.payload
+        place = {name: index for index, name in enumerate(p.components)}
+        begin, change = (
+            {name: vector[at].as_value() for name, at in place.items()} for vector in (span.start, span.step)
+        )
+        squares = [name for names in p.squares for name in names]
+        factors = self._factors()
+        sizes = [*map(len, p.squares), *[len(factors) // p.lights] * p.lights]
+        lasts = [sum(sizes[: k + 1]) - 1 for k in range(len(sizes))]
+        steps = lasts[-1] + 1
+
+        # The turns are second differences, first ones, the start.
+        kinds = data.StructLayout({"second": 1, "first": 1, "start": 1})
+        note = data.StructLayout({"turn": kinds, "step": range(steps)})
+        busy, made = Signal(kinds, name="busy"), Signal(2, name="made")
+        step, ends = Signal(range(steps), name="step"), Signal(name="ends")
+        is_start = made[1] | ~span.length[1:].any()
+        turn = Cat(~made[0] & ~is_start, made[0] & ~is_start, is_start)
+        may_go = step.any() | ~(busy.as_value() & turn).any()
+        goes = self.i.valid & may_go
+        notes = [Signal(note, name=f"note_{stage}") for stage in range(self._SHIFTED)]
+        m.d.comb += [
+            ends.eq(step == steps - 1),
+            # A pipeline drops a span without a pixel, which is not valid here.
+            self.i.ready.eq(Mux(span.length.any(), may_go & ends & is_start, ~self.begun)),
+            self.begun.eq(step.any() | made.any()),
+            notes[0].turn.as_value().eq(Mux(goes, turn, 0)),
+            notes[0].step.eq(step),
+        ]
+        m.d.sync += [after.eq(before) for before, after in itertools.pairwise(notes)]
+        with m.If(goes):
+            m.d.sync += step.eq(Mux(ends, 0, step + 1))
+            with m.If(ends):
+                m.d.sync += made.eq(Mux(is_start, 0, Cat(1, made[0])))
+        multiplied, shifting = notes[2], notes[4]
+
+        def register(value, name):
+            result = Signal(Value.cast(value).shape(), name=name, reset_less=True)
+            m.d.sync += result.eq(value)
+            return result
+
+        left = [Mux(turn[0], change[name], begin[name]) for name in squares]
+        left += [Mux(turn[0], later, factor)[:18] if p.highlights else factor for _, factor, later in factors]
+        right = [Mux(is_start, begin[name], change[name]) for name in (*squares, *(f[0] for f in factors))]
+        a, b = (
+            register(select([word.as_unsigned() for word in words], step).as_signed(), name)
+            for words, name in ((left, "factor"), (right, "component"))
+        )
+        product = register(a * b, "product")
+        total = Signal(signed(len(product) + 2), name="total", reset_less=True)
+        continues = ~Cat(multiplied.step == last + 1 for last in (-1, *lasts[:-1])).any()
+        m.d.sync += total.eq(Mux(continues, total, 0) + product)
+        # The payload stays for the turn of the start, while the last differences are shifted. Second ones of
+        # squares are shifted by twice the exponent.
+        twice = multiplied.turn.second & (multiplied.step < len(squares))
+        exponent = Mux(multiplied.turn.start, 0, span.exponent)
+        amount = register(Mux(twice, Cat(Const(0, 1), exponent), exponent)[:5], "amount")
+        free, more = p.square_format.fraction_bits - 34, p.LINE_FORMAT.fraction_bits - 34
+        shifted = self._shift(register, total, free + 1, amount, "total")
+
+        words, start_waits = Signal(self._start_shape(), name="start_words"), Signal(name="start_waits")
+        self._few, length = Signal(3, name="few"), span.length
+        m.d.comb += [start.payload.eq(words), start.valid.eq(start_waits)]
+        with m.If(taken[2]):
+            m.d.sync += start_waits.eq(0)
+        with m.If(goes & ends & is_start):
+            m.d.sync += [words.length.eq(length), self._few.eq(self._few_of(length))]
+            if p.takes_heights:
+                m.d.sync += [word.eq(begin[f"z{light}"]) for light, word in enumerate(words.heights)]
+        for kind, (word, waits) in enumerate((second, first, (words, start_waits))):
+            arrives = shifting.turn.as_value()[kind]
+            lows = (0, free + 1 - more) if kind < 2 else (free + 1, free + 1)
+            targets = [(target, lows[0]) for target in word.squares]
+            targets += [(target, lows[1]) for target in word.lines]
+            for last, (target, low) in zip(lasts, targets, strict=True):
+                with m.If(arrives & (shifting.step == last)):
+                    m.d.sync += target.eq(shifted[low : low + len(target)])
+            with m.If(arrives & (shifting.step == steps - 1)):
+                m.d.sync += waits.eq(1)
+            with m.If(taken[kind]):
+                m.d.sync += busy.as_value()[kind].eq(0)
+            with m.If(goes & turn[kind]):
+                m.d.sync += busy.as_value()[kind].eq(1)
+
+    def _factors(self) -> list[tuple[str, Value, Any]]:
+        """Of each product of a line its component, the factor, and that with the second differences.
+
+        Second differences are accompanied by z, times 2^16, where it is taken.
+        """
+        p = self.parameters
+        if not p.highlights:
+            return [(f"z{light}", Const(p.ONE, signed(18)), None) for light in range(p.lights)]
+        pairs = [zip("xz", self.constants[light], (0, 1 << 16), strict=True) for light in range(p.lights)]
+        return [
+            (f"{axis}{light}", part.as_value(), later)
+            for light, of_light in enumerate(pairs)
+            for axis, part, later in of_light
+        ]
+
+    @staticmethod
+    def _few_of(length: Value) -> Value:
+        """Whether a span has two pixels or more; at most two; at most three."""
+        return Cat(length[1:].any(), ~length[2:].any() & ~length[:2].all(), ~length[2:].any())
 
     def _line(
         self, register: Callable, product: Callable, light: int, b: dict[str, Value], is_second
@@ -326,39 +445,34 @@ class QuotientSpansUnit(wiring.Component):
         # Whether at most one, two, three pixels of a span are left, the one on the output among them.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
         left, valid = Signal(self.length_bits, name="left"), Signal(name="valid")
-        # Whether the second, the first differences of the next span were taken.
+        # Whether the second, the first differences of the next span were taken, and whether they may be.
         has_second, self._ready = Signal(name="has_second"), Signal(name="ready")
+        may_second, may_first = Signal(name="may_second", init=1), Signal(name="may_first")
         # Of the start that waits: two pixels and more; at most two; at most three.
         is_long, at_most_two, at_most_three = self._few
         m.d.comb += [
-            takes[0].eq(waits[0] & three & ~has_second),
-            takes[1].eq(waits[1] & two & (has_second | takes[0]) & ~self._ready),
+            takes[0].eq(waits[0] & may_second),
+            takes[1].eq(waits[1] & may_first),
             takes[2].eq(start.valid & last & (self._ready | ~is_long)),
             advance.eq(~valid | self.o.ready),
             self.o.valid.eq(valid),
         ]
+        starts_long = takes[2] & is_long
+        following = [
+            Mux(takes[2], ~is_long, two),
+            Mux(takes[2], at_most_two, three),
+            Mux(takes[2], at_most_three, three | (left == 4)),
+            (takes[0] | has_second) & ~starts_long,
+            (takes[1] | self._ready) & ~starts_long,
+        ]
         with m.If(advance):
-            starts_long = takes[2] & is_long
             m.d.sync += [
-                has_second.eq((takes[0] | has_second) & ~starts_long),
-                self._ready.eq((takes[1] | self._ready) & ~starts_long),
+                valid.eq(takes[2] | ~last),
+                left.eq(Mux(takes[2], start.payload.length, left - 1)),
+                Cat(last, two, three, has_second, self._ready).eq(Cat(following)),
+                may_second.eq(following[2] & ~following[3]),
+                may_first.eq(following[1] & following[3] & ~following[4]),
             ]
-            with m.If(takes[2]):
-                m.d.sync += [
-                    valid.eq(1),
-                    left.eq(start.payload.length),
-                    last.eq(~is_long),
-                    two.eq(at_most_two),
-                    three.eq(at_most_three),
-                ]
-            with m.Else():
-                m.d.sync += [
-                    valid.eq(~last),
-                    left.eq(left - 1),
-                    last.eq(two),
-                    two.eq(three),
-                    three.eq(three | (left == 4)),
-                ]
 
     def _height(self, m: Module, light: int, advance: Value, takes: Any, given: Any) -> Value:
         """Sign of z of a light."""

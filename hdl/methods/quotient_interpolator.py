@@ -1,6 +1,6 @@
 """The quotient method: N·L and highlights as quotients of quadratics, without a unit normal."""
 
-from amaranth.hdl import Module, Signal
+from amaranth.hdl import Module
 from amaranth.lib.wiring import Out
 
 from blysk.golden.cosines.quotient import Quotient
@@ -10,7 +10,7 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
 from blysk.hdl.cosines.quotient import QuotientUnit
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit, vectors_shape
-from blysk.hdl.methods.interpolator import InterpolatorUnit
+from blysk.hdl.methods.interpolator import InterpolatorUnit, flag_spans
 
 __all__ = ["QuotientInterpolatorUnit"]
 
@@ -58,7 +58,8 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
     def __init__(self, parameters: QuotientInterpolator, lights: int, **options):
         super().__init__(parameters, lights, **options)
         spans = parameters.spans(lights, self.highlights)
-        self._spans = QuotientSpansUnit(spans, self.length_bits)
+        # Where a pixel takes several cycles, one multiplier has the time for a span.
+        self._spans = QuotientSpansUnit(spans, self.length_bits, serial=self.product_interval > 1)
         self._quotient = QuotientUnit(Quotient(spans), self.product_interval)
         self.setup_interval = self._spans.initiation_interval
         self.cycles_per_pixel = self.product_interval
@@ -80,23 +81,13 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
             for given, light in zip(spans.constants, self.constants, strict=True):
                 m.d.comb += [given[0].eq(light.direction[0]), given[1].eq(light.direction[2])]
         connect(m, spans.o, quotient.i)
-        result, accepted = quotient.o.payload, Signal()
+        result = quotient.o.payload
         for light, operands in zip(result.lights, self.o.payload, strict=True):
             for name in light.shape().members:
                 m.d.comb += operands[name].eq(light[name])
         m.d.comb += [
             self.o.valid.eq(quotient.o.valid),
             quotient.o.ready.eq(self.o.ready),
-            accepted.eq(self.o.valid & self.o.ready),
+            self.out_of_range.eq(flag_spans(m, self.o.valid & self.o.ready, result)),
         ]
-        # The bit alternates from span to span, 1 in the first: the state starts as after a span with 0.
-        last, flagged = Signal(name="last"), Signal(name="flagged")
-        before = flagged & (last == result.span)
-        m.d.sync += self.out_of_range.eq(0)
-        with m.If(accepted):
-            m.d.sync += [
-                self.out_of_range.eq(result.out_of_range & ~before),
-                flagged.eq(result.out_of_range | before),
-                last.eq(result.span),
-            ]
         return m

@@ -73,7 +73,7 @@ class ShortSpansUnit(wiring.Component):
 
 LONGEST = (1 << LENGTH_BITS) - 1
 DEPTH = 4
-"""Words of the memory of starts, in place of 16; with 2 a start would wait for its own differences."""
+"""Words of the memory of starts, in place of 16."""
 
 
 def words_of(span, place):
@@ -113,13 +113,18 @@ def times(value, count):
 def of_spans(*, multiplies=False, held=True):
     """Spans of 1 to 3 pixels; a span that was offered stays until it is accepted, but may pause."""
     h = Harness(unit := ShortSpansUnit(), multiplies=multiplies)
-    given = Value.cast(unit.i.payload)
-    offered, before = Signal(), Signal.like(given)
-    h.m.d.sync += [offered.eq((offered | unit.i.valid) & ~taken(unit.i)), before.eq(given)]
     h.assume(unit.i.payload.length != 0)
     if held:
-        h.assume(~offered | (given == before))
+        hold_payload(h)
     return h
+
+
+def hold_payload(h):
+    """Assume that a span that was offered stays until it is accepted."""
+    source, given = h.unit.i, Value.cast(h.unit.i.payload)
+    offered, before = Signal(), Signal.like(given)
+    h.m.d.sync += [offered.eq((offered | source.valid) & ~taken(source)), before.eq(given)]
+    h.assume(~offered | (given == before))
 
 
 def of_words(*, held=True):
@@ -166,13 +171,14 @@ def test_progress(prove):
 
 
 def test_stability_and_admission(prove):
-    """Inductive: what waits stays; a span is accepted in 9 cycles while the output is ready.
+    """Inductive: what waits stays; a span is accepted in 12 cycles while the output is ready.
 
-    These are its three turns, and two spans of three pixels before it.
+    These are its three turns, and three spans of three pixels before it, until so small a memory tells of
+    room.
     """
     h = of_spans()
     stays(h, h.unit.o)
-    answers(h, h.unit.i.valid, h.unit.i.ready, 9, h.unit.o.ready)
+    answers(h, h.unit.i.valid, h.unit.i.ready, 12, h.unit.o.ready)
     prove(h)
 
 
@@ -189,26 +195,43 @@ def test_bugs_are_found(refute, inject, bug):
     refute(of_words(), CYCLES)
 
 
-def of_waiting():
-    """Differences that wait, second and first ones, are the same as a cycle before if they waited then."""
-    h = Harness(QuotientSpansUnit(length_bits=LENGTH_BITS))
-    for name in ("second", "first"):
-        waits, word = h.register(f"{name}_waits"), Value.cast(h.register(name))
+def of_waiting(serial=False):
+    """Differences that wait, second and first ones, are the same as a cycle before if they waited then.
+
+    In spans of 4 pixels and more second ones may wait, too.
+    """
+    h = Harness(QuotientSpansUnit(length_bits=LENGTH_BITS + 1, serial=serial))
+    if serial:
+        hold_payload(h)
+    for name, words in (("second", "second"), ("first", "first"), *[("start", "start_words")] * serial):
+        waits, word = h.register(f"{name}_waits"), Value.cast(h.register(words))
         waited, before = Signal(), Signal(len(word))
         h.m.d.sync += [waited.eq(waits), before.eq(word)]
         h.claim(~(waited & waits) | (word == before))
     return h
 
 
-def test_differences_that_wait_stay(prove):
-    """Inductive, of the whole unit: none is overwritten before it is taken."""
-    prove(of_waiting())
+@pytest.mark.parametrize("serial", [False, True])
+def test_differences_that_wait_stay(prove, serial):
+    """Inductive, of the whole unit: none is overwritten before it is taken; nor is a serial setup's start."""
+    prove(of_waiting(serial))
 
 
 def test_overwritten_differences_are_found(refute, inject):
-    """Without the stall that holds first ones off. Second ones never come before their register is free."""
-    inject(QuotientSpansUnit, "_set_up", "(at_coarse[1] & first[1]) | ", "")
+    """Without the stall that holds second ones off until the first ones before them are taken."""
+    inject(QuotientSpansUnit, "_set_up", "(at_coarse[0] & first[1]) | ", "")
     refute(of_waiting(), 30)
+
+
+def test_an_early_turn_is_found(refute, inject):
+    """A turn of the serial setup that does not wait for the words of its kind before to be taken."""
+    inject(
+        QuotientSpansUnit,
+        "_set_up_serially",
+        "may_go = step.any() | ~(busy.as_value() & turn).any()",
+        "may_go = 1",
+    )
+    refute(of_waiting(serial=True), 40)
 
 
 def test_a_span_that_changes_is_found(refute):

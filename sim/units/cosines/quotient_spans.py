@@ -130,6 +130,13 @@ RECORD = Record(
         "2 lights, no highlights": Variant(
             partial(QuotientSpansUnit, QuotientSpans(2, highlights=False)), long=True
         ),
+        "N.H, serial": Variant(partial(QuotientSpansUnit, _DEFAULT, serial=True)),
+        "2 lights of R.V, serial": Variant(
+            partial(QuotientSpansUnit, QuotientSpans(2, mirror=True), 9, serial=True), long=True
+        ),
+        "no highlights, serial": Variant(
+            partial(QuotientSpansUnit, QuotientSpans(highlights=False), serial=True), long=True
+        ),
     },
     expect=_expect,
     stimuli={
@@ -140,7 +147,6 @@ RECORD = Record(
     axis="pixels of the span",
     logarithmic=True,
     still={
-        "a word of the memory stays free": "starts_level[4]",
         "w's second difference is positive and under 2": "second[97] change_1[48]",
         "that of z is a multiple of 2^3": "second[98-100]",
         "cos a is not negative": "line_z0_b[17]",
