@@ -16,11 +16,11 @@ __all__ = ["METHODS", "QuotientErrors", "QuotientInterpolator"]
 
 @dataclass(frozen=True)
 class QuotientInterpolator(Interpolator):
-    """N·L and the place of ``sin^2 gamma`` in a lobe's table, from ``v = N/W``.
+    """Exact N·L and highlights from ``v = N/W``, without a unit normal: quotients of quadratics.
 
-    v is linear on the screen. `QuotientSpans` computes the words of each pixel by forward differences,
-    `Quotient` the operands. The curve is the exact one: normals are those of a perspective-correct
-    interpolation, at every angle and width.
+    v is linear on the screen. A highlight is the place of ``sin^2 gamma`` in a lobe's table. `QuotientSpans`
+    computes the words of each pixel by forward differences, `Quotient` the operands. The curve is the exact
+    one: normals are those of a perspective-correct interpolation, at every angle and width.
 
     A source of spans has to halve a span of three pixels or more, and to split a span of two, where
 
