@@ -32,7 +32,7 @@ WHOLE = (
     *("geometry", "render", "pixel_pipelines", "framing", "registers", "serialiser", "motion"),
     *("draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )
-"""Units that are no parts: parts of geometry run in it, those of pipelines in pipelines of every method."""
+"""Units that are no parts: parts of geometry and of pipelines run in these, in Verilator, too."""
 
 UNITS = [
     pytest.param(

@@ -174,7 +174,6 @@ def test_without_a_compiler(monkeypatch, uninstalled):
 @pytest.mark.parametrize(
     "options",
     [
-        {"method": "linear"},
         {"method": "linear", "specialise": True},
         {},
     ],
