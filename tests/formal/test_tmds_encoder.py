@@ -8,7 +8,7 @@ from blysk.hdl.video.tmds_encoder import TmdsEncoderUnit
 
 from .prover import Harness
 
-pytestmark = pytest.mark.prove
+pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 
 def of_balance(bound):
