@@ -125,7 +125,7 @@ def test_buttons_count_from_the_next_frame_on(simulator):
 @pytest.mark.long
 def test_highlights_of_phong_follow_the_light():
     """The light changes after the first frame: L of the new one counts before the first triangle."""
-    drawing = drawing_of(60, (48, 32), preset("quotient", "phong", materials=2))
+    drawing = drawing_of(64, (48, 32), preset("quotient", "phong", materials=2))
     bands = [*range(drawing.bands)] * 3
     buttons = [0, 1 << BUTTONS.index("light"), *[0] * (len(bands) - 2)]
     found = DrawingSimulator(drawing).run(bands, buttons)
