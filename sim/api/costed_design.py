@@ -101,7 +101,8 @@ class Design(pipeline.Design):
             words = design_of(entry["design"])
             if words is None or words[:2] != (self.method, self.model):
                 continue
-            if preset(*words[:2], operand=words[2] if len(words) > 2 else None) == self:
+            operand: Any = words[2] if len(words) > 2 else None
+            if preset(words[0], words[1], operand=operand) == self:
                 return {
                     **{name: entry[name] for name in ("luts", "flip_flops", "block_rams", "device")},
                     "clock_mhz": median(entry["fmax_mhz"]),
