@@ -9,6 +9,7 @@ from blysk.bench.report import phong_blinn
 from blysk.bench.report.cosine_quadratic import PUBLISHED, coefficients, errors, slopes
 from blysk.bench.report.errata import ERRATA, KINDS, evidence, matters
 from blysk.bench.report.errata_evidence import factor_quadratics
+from blysk.bench.report.phong_blinn_hardware import half_angle
 from blysk.bench.report.thesis import CLAIMS, software
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax
 from blysk.golden.reference.reflection import exponent_ratio
@@ -104,7 +105,7 @@ def _phong_widths() -> str:
         rows.append([f"{2 * degrees}", f"{4 * math.cos(math.radians(degrees)) ** 2:.3f}"])
         for way in ((1, 0), (0, 1)):
             for exponent in (10, 100, 1000):
-                gamma = phong_blinn.half_angle(way, degrees, exponent)
+                gamma = half_angle(way, degrees, exponent)
                 rows[-1].append(f"{math.log(0.5) / math.log(math.cos(gamma)) / exponent:.3f}")
     ways = [f"{way}, n = {n}" for way in ("along", "across") for n in (10, 100, 1000)]
     return table(["L to V, degrees", "4 cos^2 a", *ways], rows, 0)

@@ -17,14 +17,16 @@ from blysk.bench.report.phong_blinn import (
     WAYS,
     exponents,
     frame_times,
-    half_angle,
-    hardware_cost,
-    hardware_frames,
     operations,
-    picture,
     section,
     shading_times,
     tasks,
+)
+from blysk.bench.report.phong_blinn_hardware import (
+    half_angle,
+    hardware_cost,
+    hardware_frames,
+    picture,
     widths,
 )
 from blysk.bench.store import Task

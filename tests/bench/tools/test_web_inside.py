@@ -396,6 +396,7 @@ def test_missing_file_is_told(open_page, live_site):
         page = open_page(waits=True)
         # The browser says so on its console, too.
         open_page.allowed = "ERR_FILE_NOT_FOUND"
+        page.locator("#method").select_option("chord")
         page.locator("#model").select_option("exp")
         page.wait_for_selector("#failure:not([hidden])")
         assert "models/exp.js is missing" in page.locator("#failure").inner_text()
