@@ -100,7 +100,8 @@ class ShadingPipelineUnit(wiring.Component):
 
     In the *compact* style there is one multiplier for the colours, one for the specular terms of each light,
     two for its products with a normal (if the method finds normals), and one or two for the setup (as many as
-    its longest interval needs). A pixel takes a cycle a channel for each of its diffuse and specular terms
+    its longest interval needs). ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for
+    the setup. A pixel takes a cycle a channel for each of its diffuse and specular terms
     that is not 0, and for one term at least; or, if a light is in front and the span not dark, as many cycles
     as the specular model has products (a power 42), if those are more. So pixels without a highlight take
     fewer cycles. The pixels are the same to the bit.
