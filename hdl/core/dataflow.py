@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cache, partial, reduce
 from operator import mul, or_
 from typing import Any
 
@@ -85,8 +85,7 @@ class Dataflow:
     low_latency : bool
         Whether a product takes a single register, two cycles in all.
     memories : bool
-        Whether a wide word that waits for long does so in a memory of look-up tables in place of registers,
-        with an interval of 1.
+        Whether wide words that wait for long do so in memories of look-up tables, with an interval of 1.
 
     Raises
     ------
@@ -438,7 +437,7 @@ class _Build:
         self.graph, self.m, self.unit, self.operands = graph, m, unit, operands
         self.values: dict[Word, dict[int, Any]] = {}
         self._instances: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
-        self._turns: dict[int, Signal] = {}
+        self._turn_of = cache(partial(turn_of, m))
         self._issued: dict[tuple[FunctionalUnit, int], list[tuple[Value | None, Sequence[Any]]]] = {}
 
     def when(self, stage: int) -> Value | None:
@@ -450,7 +449,8 @@ class _Build:
         copies = self.values[word]
         first = max(start for start in copies if start <= stage)
         if self.graph.memories and stage - first >= _LONG and len(Value.cast(copies[first])) >= _WIDE:
-            copies[stage] = self._delay(f"{word.name}_{stage}", copies[first], stage - first)
+            name, cycles = f"{word.name}_{stage}", stage - first
+            copies[stage] = delayed(self.m, name, copies[first], cycles, self._turn_of(cycles))
             return copies[stage]
         lifetime = word.lifetime if first == word.stage else self.unit.initiation_interval
         while stage >= first + lifetime:
@@ -461,12 +461,6 @@ class _Build:
             )
             lifetime = self.unit.initiation_interval
         return copies[first]
-
-    def _delay(self, name: str, value: Any, cycles: int) -> Any:
-        """A word some cycles later, from a memory."""
-        if cycles not in self._turns:
-            self._turns[cycles] = turn_of(self.m, cycles)
-        return delayed(self.m, name, value, cycles, self._turns[cycles])
 
     def issue(self, functional_unit: FunctionalUnit, use: Word, operands: Sequence[Any]) -> Any:
         """Issue operands to an instance of a functional unit; return its result, which all its uses read."""

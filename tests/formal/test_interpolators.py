@@ -24,7 +24,6 @@ import blysk.hdl.methods.chord_interpolator
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
 import blysk.hdl.methods.quadratic_interpolator
-import blysk.hdl.methods.quotient_interpolator
 import blysk.hdl.methods.recurrence_interpolator
 import blysk.hdl.normals.difference_accumulator
 from blysk.golden.methods.angular_interpolator import AngularInterpolator
@@ -455,11 +454,6 @@ BUGS = {
         "bisection_interpolator",
         "normaliser.o.ready.eq(normals.ready)",
         "normaliser.o.ready.eq(1)",
-    ),
-    "vectors are lost at the input": (
-        "quotient_interpolator",
-        "self.i.ready.eq(spans.i.ready)",
-        "self.i.ready.eq(1)",
     ),
     "quotients are lost": (
         "quotient_interpolator",
