@@ -5,7 +5,7 @@ import contextlib
 import io
 import json
 import shlex
-from dataclasses import asdict
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -31,12 +31,15 @@ from blysk.bench.report.points import BEST, DESIGNS, GROUPS, QUICK_SIMULATED, se
 from blysk.bench.report.points_text import front, readme_table
 from blysk.bench.store import Task
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
+from blysk.golden.reference.metrics import ErrorFigures
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import SHADINGS, render
 from blysk.sim.cli.main import main
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.teapot import teapot
+
+FIGURES = [field.name for field in fields(ErrorFigures)]
 
 PLACE = {"source": "teapot", "triangles": 400, "digest": "of a test", "width": 64, "height": 48}
 
@@ -166,7 +169,8 @@ def test_simulated_point_is_that_of_the_frame_runner(found):
     for exponent, frame, result in accuracy.measure(mesh, design, (10, 100), 64, 48):
         point = found[f"teapot/chord-local/cosquad/{exponent}"]
         for kind in ("arithmetic", "method", "total"):
-            for name, value in asdict(getattr(result, f"{kind}_error")).items():
+            for name in FIGURES:
+                value = getattr(getattr(result, f"{kind}_error"), name)
                 assert point["errors"][f"{kind}_{name}"] == pytest.approx(value, rel=1e-12)
         assert point["times"]["cycles_per_pixel"] == frame.cycles / frame.pixels
         assert point["counts"]["cycles"] == frame.cycles
@@ -405,8 +409,9 @@ def test_command_makes_the_point_again(found, name, tmp_path, monkeypatch, capsy
     capsys.readouterr()
     figures = json.loads(Path("figures.json").read_text())
     for kind in ("arithmetic", "method", "total"):
-        for key, value in figures[f"{kind}_error"].items():
-            assert point["errors"][f"{kind}_{key}"] == pytest.approx(value, rel=1e-9)
+        for name in FIGURES:
+            value = figures[f"{kind}_error"][name]
+            assert point["errors"][f"{kind}_{name}"] == pytest.approx(value, rel=1e-9)
     assert figures["pixels"] == point["counts"]["pixels"]
     assert figures["visible_pixels"] == point["counts"]["shown"]
 
