@@ -67,11 +67,8 @@ def pytest_make_collect_report(collector):
     return report
 
 
-# Modules and tests stay until the end: collection of garbage need not look at them again and again.
-gc.set_threshold(100_000, 20, 20)
-
-
 def pytest_collection_finish():
+    """Modules and tests stay until the end: collection of garbage need not look at them again and again."""
     gc.freeze()
 
 
