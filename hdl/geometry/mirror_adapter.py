@@ -88,10 +88,10 @@ class MirrorAdapterUnit(wiring.Component):
         start, step = (Value.cast(given[name][1]) for name in ("start", "step"))
         y = register(Mux(turn[-1] & ~single, step, start).as_signed(), "y")
         cosine, sine = (Value.cast(self.constants[name]).as_signed() for name in ("cosine", "sine"))
-        factors = [Mux(turn[0], sine, cosine).as_signed()] if self.serial else [cosine, sine]
-        products = [
-            register(y * register(factor, f"factor_{k}"), f"product_{k}") for k, factor in enumerate(factors)
-        ]
+        factors = [cosine, sine]
+        if self.serial:
+            factors = [register(Mux(turn[0], sine, cosine).as_signed(), "factor")]
+        products = [register(y * factor, f"product_{k}") for k, factor in enumerate(factors)]
         rounded = [((product + (1 << (bits - 1))) >> bits)[: p.FORMAT.width] for product in products]
         words = self._delayed(register, given, single)
         if self.serial:
