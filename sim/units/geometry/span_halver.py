@@ -103,6 +103,6 @@ RECORD = Record(
     },
     axis="",
     still={
-        "a counter counts more than a run has": "count_cut[11-31]",
+        "a counter counts more than a run has": "count_cut[10-31]",
     },
 )
