@@ -98,9 +98,8 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
         # coarse = false                    # with hardware: drop hidden spans before shading
         # pipes = 1                         # pipelines for different scanlines, 1, 2, 4 or 8
 
-    Each value may be a text of the command line, too: ``size = "640x480"``. The ranges are those of the
-    command line. Neither the mesh file nor conflicts between values are
-    checked.
+    The values' ranges are those of the command line. Its texts serve, too: ``size = "640x480"``.
+    Neither the mesh file nor conflicts between values are checked.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ def pattern_on(board):
             "distant viewer",
         ),
         (
-            ["ulx3s-25f", "--method", "quotient", "--model", "cosquad", "--exponent", "1", "-o", "x.bit"],
+            ["ulx3s-25f", "--method=quotient", "--model=cosquad", "--exponent=1", "--simulate=1", "-o", "x"],
             "--mesh teapot: cosquad with exponent 1 is 0.25 beyond a right angle of N and H, where the "
             "method quotient has no highlight; take another method or model",
         ),
