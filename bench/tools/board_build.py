@@ -154,9 +154,9 @@ BOARDS = {
             lines=8,
             loader="ulx3s",
             compact=True,
-            known="none with quotient so far: on commit 11bcba4 it took 19,888 of 24,288 look-up tables, "
-            "mapped, and one placement was begun and not routed to its end; with chord commit c815b08 gave "
-            "one, commit 3148f9d none; an ulx3s-85f has room, and --simulate routes nothing",
+            known="none with quotient so far: on commit 142fa70 it took 19,888 of 24,288 look-up tables, "
+            "mapped; one placement had 1,423 wires used twice when 15 minutes of routing ended; with chord "
+            "commit c815b08 gave one, 3148f9d none; an ulx3s-85f has room, --simulate routes nothing",
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
