@@ -248,10 +248,10 @@ class Vectors(Line):
     initiation_interval = INTERVAL
     quadratics = walk(vector_start, vector_line)
 
-    def __init__(self, *parameters):
-        self.OF = lambda parameters: QuotientSpansUnit(*parameters)
+    def __init__(self, *parameters, **options):
+        self.OF = lambda parameters: QuotientSpansUnit(*parameters, **options)
         super().__init__(parameters)
-        self.begun, self.constants = Signal(name="begun"), QuotientSpansUnit(*parameters).constants
+        self.begun, self.constants = Signal(name="begun"), self.OF(parameters).constants
 
 
 def gate() -> ValueGateUnit:

@@ -2,9 +2,9 @@
 """Proofs about the span halver: no pixel of a span is lost or drawn twice."""
 
 import pytest
-from amaranth.hdl import Mux, Signal
+from amaranth.hdl import Cat, Mux, Signal
 
-from blysk.golden.geometry.triangles import PIXEL_BITS
+from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
 from blysk.hdl.geometry.span_halver import SpanHalverUnit
 
 from .prover import Harness
@@ -44,6 +44,27 @@ def of_pixels():
 def test_pixels_are_those_of_the_span(prove):
     """Inductive: pieces are the span's pixels, in their order from the long edge, each once."""
     prove(of_pixels())
+
+
+def of_waiting():
+    """Registers of a piece that waits keep their words; the piece is a function of them alone."""
+    h = Harness(SpanHalverUnit())
+    found, waits = h.unit.o, Signal(name="waits")
+    ends = (f"{name}_{k}" for name in ("near", "far", "last", "step") for k in range(ATTRIBUTES))
+    marks = (f"size_{end}_{k}" for end in range(2) for k in range(ATTRIBUTES - 1))
+    names = "valid", "known", "whole", "x", "left", "pixels", "y", "right", "flip", "material", "shift"
+    held = Cat(*map(h.register, (*names, *ends, *marks, *(f"same_{k}" for k in range(ATTRIBUTES - 1)))))
+    before = Signal.like(held, name="before")
+    h.m.d.sync += [waits.eq(found.valid & ~found.ready), before.eq(held)]
+    h.claim(~waits | (held == before))
+    return h
+
+
+def test_a_piece_that_waits_stays(prove, refute, inject):
+    """Inductive; and what leaves without being taken is found."""
+    prove(of_waiting())
+    inject(SpanHalverUnit, "elaborate", "leaves.eq(self.o.valid & self.o.ready)", "leaves.eq(self.o.valid)")
+    refute(of_waiting())
 
 
 @pytest.mark.parametrize(
