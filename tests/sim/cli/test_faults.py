@@ -256,10 +256,13 @@ def test_killed_worker_of_a_command(cache):
     output, errors = process.communicate(timeout=60)
     assert (process.returncode, output) == (2, "")
     reason = "a process died, perhaps for want of memory; use fewer, or smaller pictures"
-    assert errors == f"blysk: --jobs 2: {reason}\n"
+    told = [line for line in errors.splitlines() if "measurements]" not in line]
+    assert told == [f"blysk: --jobs 2: {reason}"]
     kept = {path: path.stat().st_mtime_ns for path in left_in(cache / "results")}
     assert kept
     done = subprocess.run(arguments, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
+    # On a busy machine it takes over 10 s, and tells of its progress.
+    lines = [line for line in done.stderr.splitlines() if "measurements]" not in line]
+    assert (done.returncode, lines) == (0, [])
     assert "designs     6 of 6 have" in done.stdout
     assert kept.items() < {path: path.stat().st_mtime_ns for path in left_in(cache / "results")}.items()
