@@ -6,6 +6,7 @@ import numpy as np
 
 from blysk.golden.frames.missed import component_error, nearest
 from blysk.golden.frames.prepare import span_vectors
+from blysk.golden.geometry.plane_setup import PlaneSetup
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTE
@@ -95,8 +96,8 @@ def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
     height = y[:, 2] - y[:, 0]
     share = ((y[:, 1] - y[:, 0]) / height)[:, np.newaxis]
     across = normal[:, 1] - (1 - share) * normal[:, 0] - share * normal[:, 2]
-    steps = renderer.geometry.grid.steps
-    return np.where(drawn.area * 256 <= height * steps, np.abs(across).max(axis=1), 0)
+    sliver = PlaneSetup(renderer.geometry.grid).is_sliver(drawn.area, height)
+    return np.where(sliver, np.abs(across).max(axis=1), 0)
 
 
 def _bound(scene: Scene, design: Design, errors: QuotientErrors) -> float:

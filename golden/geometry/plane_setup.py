@@ -96,6 +96,16 @@ class PlaneSetup:
     HEIGHT_ERROR = 2 * Reciprocal.ERROR
     WIDTH_ERROR = HEIGHT_ERROR + 2.0**-25 + 2 * 2.0**-25
 
+    def is_sliver(self, area: np.ndarray, height: np.ndarray) -> np.ndarray:
+        """Whether triangles are slivers, bool array: ``W <= 1/256``.
+
+        Parameters
+        ----------
+        area, height : int64 arrays, shape (T,)
+            Area as in `SortedTriangles`, and height of the long edge, in steps of the grid.
+        """
+        return (area << (8 - self.grid.subpixel_bits)) <= height
+
     def compute(self, triangles: SortedTriangles, edges: Edges) -> PlaneScales:
         """Bit-accurate scales.
 
@@ -120,7 +130,7 @@ class PlaneSetup:
         area_reciprocal = table.compute(Fixed(table.FORMAT, area_mantissa))
         ratio = wide_product(mantissa, area_reciprocal, self.HEIGHT_LOW, self.RECIPROCAL_LOW, point).codes
         halved = ratio >> point
-        sliver = (area << (8 - s)) <= height
+        sliver = self.is_sliver(area, height)
         width = np.where(sliver, 0, np.where(halved == 1, ratio >> 1, ratio))
         return PlaneScales(
             height_reciprocal=height_reciprocal,

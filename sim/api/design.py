@@ -52,7 +52,6 @@ __all__ = [
 _LIMIT = "2048 sin(a / 2), rounded down, for spans of at most the angle a"
 _FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
 
-
 ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 """A unit from spans to pixels: one pipeline or several."""
 
