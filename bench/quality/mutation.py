@@ -29,7 +29,7 @@ from blysk.sim.engines.simulate import stimulus_of
 from blysk.sim.units.record import Record
 from blysk.sim.units.registry import RECORDS
 
-__all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "units_inside", "vectors_of"]
+__all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "stimuli_of", "units_inside", "vectors_of"]
 
 _KINDS = {record.kind for record in RECORDS.values()}
 
@@ -51,33 +51,33 @@ def units_inside(fragment: Fragment, path: str = "") -> Iterator[str]:
             yield from units_inside(inner, f"{path}{name}.")
 
 
-def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
-    """Stimulus and trace of every run of a record's default variant, those with the fewest input beats first.
+def stimuli_of(record: Record, unit: Component) -> list[Stimulus]:
+    """Stimulus of every run of a record's default variant, those with the fewest input beats first.
 
-    Stimuli of the long run are left out. The traces are those of the unit in the compiled engine.
+    Stimuli of the long run are left out.
 
     Parameters
     ----------
     record : Record
         The unit.
+    unit : Component
+        Its default variant.
     """
+    runs = [
+        run
+        for name, stimulus in record.stimuli_of(record.default).items()
+        if not stimulus.long
+        for run in record.runs(unit, name)
+    ]
+    sent = [stimulus_of(unit, run.case.beats, count=run.count, **run.case.sent, **run.stalls) for run in runs]
+    return sorted(sent, key=lambda stimulus: len(stimulus.input))
+
+
+def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
+    """The stimuli of `stimuli_of`, each with its trace in the compiled engine."""
     unit = record.variants[record.default].unit()
     model = cxxrtl.Model(unit)
-    found = []
-    for name, stimulus in record.stimuli_of(record.default).items():
-        if stimulus.long:
-            continue
-        for run in record.runs(unit, name):
-            case = run.case
-            sent = stimulus_of(
-                unit,
-                case.beats,
-                count=run.count,
-                **case.sent,
-                **run.stalls,
-            )
-            found.append((sent, model.run(sent)))
-    return sorted(found, key=lambda run: len(run[0].input))
+    return [(sent, model.run(sent)) for sent in stimuli_of(record, unit)]
 
 
 class Wrapped(Component):

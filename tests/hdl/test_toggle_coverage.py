@@ -13,7 +13,7 @@ from amaranth.hdl import Fragment, Signal
 from amaranth.lib import data
 from amaranth.lib.wiring import Out
 
-from blysk.bench.quality.mutation import Wrapped, units_inside, vectors_of
+from blysk.bench.quality.mutation import Wrapped, stimuli_of, units_inside
 from blysk.sim.engines.cxxrtl import Model
 from blysk.sim.engines.toggles import _registers, _words
 from blysk.sim.units.registry import RECORDS
@@ -52,13 +52,16 @@ class Edges(Wrapped):
         return m
 
 
-def still_bits(unit, vectors):
-    """Names of the register bits that do not rise, or do not fall."""
+def still_bits(record):
+    """Names of the register bits of a record's default variant that do not rise, or do not fall."""
+    unit = record.variants[record.default].unit()
     edges = Edges(unit)
     if not edges.names:
         pytest.skip("all its registers are in parts that have a record")
     model = Model(edges)
-    seen = np.bitwise_or.reduce([model.run(stimulus, None).status[0] for stimulus, _ in vectors])
+    seen = np.bitwise_or.reduce(
+        [model.run(stimulus, None).status[0] for stimulus in stimuli_of(record, unit)]
+    )
     toggled = np.unpackbits(seen.astype("<u4").view(np.uint8), bitorder="little")
     return [name for name, both in zip(edges.names, toggled, strict=False) if not both]
 
@@ -98,7 +101,7 @@ def pattern_of(word, bit):
 def test_every_register_bit_rises_and_falls(name):
     """Every waiver is needed: each matches a bit that does not."""
     record = RECORDS[name]
-    still = still_bits(record.variants[record.default].unit(), vectors_of(record))
+    still = still_bits(record)
     waived = [n for words in record.still.values() for word in words.split() for n in expanded(word)]
     patterns = [pattern_of(*re.fullmatch(r"(.*)\[(.*)\]", bit).groups()) for bit in waived]
     # A copy of a signal for a later stage has the name of the signal and a number.
