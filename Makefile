@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
-.PHONY: demo test test-all test-long test-ci prove prove-ci mutants soak coverage bench pages site lint clean
+.PHONY: demo test test-all test-long test-ci prove prove-ci decided mutants soak coverage bench pages site lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -40,6 +40,14 @@ prove-ci: $(VENV)/.installed-test
 
 prove: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder -m prove tests/formal
+
+# Decides what is not in the list of what was decided, and writes the list anew; with an empty list all of it.
+decided: $(VENV)/.installed-test
+	mkdir -p build
+	rm -f build/decided
+	DECIDED=$(CURDIR)/build/decided $(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder \
+		-m prove tests/formal
+	LC_ALL=C sort -u build/decided > tests/formal/decided.txt
 
 mutants: $(VENV)/.installed-test
 	$(BIN)/python -m blysk.bench.quality.mutants

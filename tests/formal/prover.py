@@ -1,8 +1,10 @@
 """Proofs of hardware: what is claimed of a unit for all inputs, decided by Yosys and ABC (package pyosys)."""
 
+import hashlib
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +15,7 @@ from amaranth.lib.wiring import Component, In
 
 from blysk.sim.installation import install_extra
 
-__all__ = ["Harness", "Verdict", "decide", "missing_tool"]
+__all__ = ["Harness", "Record", "Verdict", "decide", "missing_tool"]
 
 _YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
 
@@ -153,13 +155,63 @@ def _run_yosys(script: str, folder: Path) -> None:
         raise RuntimeError(f"Yosys failed: {done.stderr[-2000:] or done.stdout[-2000:]}")
 
 
-def decide(harness: Harness, folder: Path, cycles: int | None = None) -> Verdict:
-    """Decide whether the claims of a harness hold.
+class Record:
+    """Statements that were decided before, each with the verdict that was expected of it, by their digests.
+
+    A digest is that of all that a verdict depends on: the netlist with its claims, but for the places in the
+    source, the commands of Yosys and ABC with the number of cycles, and the expected verdict. Where a unit or
+    a claim changes, its statements have other digests, and are decided anew.
 
     Parameters
     ----------
-    harness : Harness
-        The claims.
+    digests : iterable of str
+        Those that are known.
+
+    Attributes
+    ----------
+    used : set
+        Digests that were asked for, and were there or were decided as expected.
+    """
+
+    def __init__(self, digests: Iterable[str]):
+        self._known = set(digests)
+        self.used: set[str] = set()
+
+    @staticmethod
+    def digest(netlist: str, cycles: int | None, multiplies: bool, holds: bool) -> str:
+        """Digest of a statement and of its expected verdict."""
+        text = re.sub(r"^ *attribute \\src .*\n", "", netlist, flags=re.MULTILINE)
+        parts = text, *_commands(cycles, multiplies), str(holds)
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+    def expect(self, holds: bool, harness: Harness, folder: Path, cycles: int | None = None) -> Verdict:
+        """The expected verdict if it is known, otherwise that of `decide`."""
+        netlist = harness.netlist()
+        digest = self.digest(netlist, cycles, harness.multiplies, holds)
+        known = digest in self._known
+        verdict = Verdict(holds, 0) if known else decide(netlist, folder, cycles, harness.multiplies)
+        if verdict.holds is holds:
+            self.used.add(digest)
+        return verdict
+
+
+def _commands(cycles: int | None, multiplies: bool) -> tuple[str, str]:
+    """What Yosys and ABC do."""
+    cut = "t:$mem_v2 r:WR_PORTS=0 %i" + ("" if multiplies else " t:$mul %u")
+    engine = f"lcorr; pdr -T {_SECONDS}" if cycles is None else f"bmc3 -F {cycles} -T {_SECONDS}"
+    return (
+        _SCRIPT.replace("CUT", cut),
+        f"read_aiger top.aig; fold; {engine}; print_status; write_cex -n top.cex",
+    )
+
+
+def decide(netlist: str, folder: Path, cycles: int | None = None, multiplies: bool = False) -> Verdict:
+    """Decide whether the claims of a netlist hold.
+
+    Parameters
+    ----------
+    netlist : str
+        RTLIL text of a harness.
     folder : path
         For the netlist.
     cycles : int or None
@@ -167,18 +219,18 @@ def decide(harness: Harness, folder: Path, cycles: int | None = None) -> Verdict
         ``None``: prove the claims for runs of any length, by property-directed reachability (IC3), which
         finds an inductive invariant and verifies it. Registers that are always equal, as of two chains in
         step, are made one before: it would have to find that bit by bit.
+    multiplies : bool
+        See `Harness`.
 
     Raises
     ------
     RuntimeError
         If Yosys or ABC fails.
     """
-    (folder / "top.il").write_text(harness.netlist())
-    cut = "t:$mem_v2 r:WR_PORTS=0 %i" + ("" if harness.multiplies else " t:$mul %u")
-    _run_yosys(_SCRIPT.replace("CUT", cut), folder)
-    engine = f"lcorr; pdr -T {_SECONDS}" if cycles is None else f"bmc3 -F {cycles} -T {_SECONDS}"
+    (folder / "top.il").write_text(netlist)
+    script, command = _commands(cycles, multiplies)
+    _run_yosys(script, folder)
     abc = Path(find_spec("pyosys").origin).parent / "yosys-abc"
-    command = f"read_aiger top.aig; fold; {engine}; print_status; write_cex -n top.cex"
     done = subprocess.run([abc, "-c", command], capture_output=True, encoding="utf-8", cwd=folder)
     status = re.search(r"Status = (-?\d+) +Frames = (-?\d+)", done.stdout)
     if done.returncode or status is None:

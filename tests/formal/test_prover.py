@@ -1,0 +1,37 @@
+"""What was decided before is known by its digest; whatever differs is decided."""
+
+import pytest
+from amaranth.hdl import Mux, Signal, unsigned
+
+from .prover import Harness, Record, missing_tool
+
+pytestmark = [pytest.mark.prove, pytest.mark.skipif(bool(missing_tool()), reason=missing_tool())]
+
+
+def of_counter(last):
+    """A counter from 0 to 5, which is claimed not to pass a number."""
+    harness = Harness()
+    count = Signal(unsigned(3))
+    harness.m.d.sync += count.eq(Mux(count == 5, 0, count + 1))
+    harness.claim(count <= last)
+    return harness
+
+
+def test_what_was_decided_is_known_and_nothing_else(tmp_path):
+    first = Record([])
+    assert first.expect(True, of_counter(5), tmp_path).holds is True
+    assert (tmp_path / "top.aig").is_file()
+    for k, (harness, cycles) in enumerate([(of_counter(5), None), (of_counter(4), None), (of_counter(5), 4)]):
+        (folder := tmp_path / str(k)).mkdir()
+        verdict = Record(first.used).expect(True, harness, folder, cycles)
+        assert verdict.holds is (k != 1)
+        # Only what is not known is decided.
+        assert any(folder.iterdir()) == (k != 0)
+
+
+def test_a_verdict_that_is_not_expected_is_not_kept(tmp_path):
+    record = Record([])
+    assert record.expect(True, of_counter(4), tmp_path).holds is False
+    assert not record.used
+    assert record.expect(False, of_counter(4), tmp_path).holds is False
+    assert Record(record.used).expect(True, of_counter(4), tmp_path).holds is False
