@@ -109,6 +109,7 @@ RECORD = Record(
     },
     axis="",
     still={
+        "every place that 4 and 3 bits name is in the picture": "read_outside[0]",
         "the depth of a pixel is found a stage later": "pixel_0[31-54]",
         "a counter counts more events than a run has": "count_{pixels,hidden}[10-31]",
     },

@@ -36,8 +36,8 @@ def _case(rng, length, angle):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, the short ones mixed; a light 50 degrees from the viewer."""
-    return _case(rng, np.maximum(4095 >> rng.integers(0, 13, count), 1), np.radians(25))
+    """Spans of every length, the short ones mixed; sine and cosine of 26 degrees, which are odd codes."""
+    return _case(rng, np.maximum(4095 >> rng.integers(0, 13, count), 1), np.radians(26))
 
 
 def _points(unit, rng, count):
