@@ -98,7 +98,7 @@ class Renderer:
             raise ValueError(f"triangles give normals, and {design.method} takes values; use another method")
         if vectors and design.lights > 1:
             reason = f"triangles give vectors for one light, not {design.lights}"
-            raise ValueError(f"{reason}; give one light, or use method chord")
+            raise ValueError(f"{reason}; give one light, or use method renormalise")
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
             raise ValueError(f"method {design.method} takes {taken}, the geometry gives {given}")

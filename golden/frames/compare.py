@@ -195,7 +195,8 @@ def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> floa
     float or None
         The bound of the method error; ``None`` where no bound is known: of another method than ``chord``,
         ``chord-local``, ``renormalise`` and ``quotient``, of a pipeline that was not made for the scene's
-        materials, of a measured curve, and of a roughness under `LEAST_ROUGHNESS`.
+        materials, of a measured curve, and of a roughness under `LEAST_ROUGHNESS`. ``renormalise`` has none
+        either where `Lobe.scale_of` gives a scale: its words of 1 - N·H are too coarse for so sharp a lobe.
     """
     if design.takes_vectors and design.specular is not None and design.lights and cut is not None:
         return quotient_bound(scene, design, cut)
@@ -209,9 +210,10 @@ def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> floa
         own = made.specular
         if model.name not in TABLE_MODELS or replace(own, banks=lobe.banks) != lobe:
             return None
-        if model.PARAMETER == "roughness" and any(
-            design.highlight_parameter(material) < LEAST_ROUGHNESS for material in scene.materials
-        ):
+        parameters = [design.highlight_parameter(material) for material in scene.materials]
+        if model.PARAMETER == "roughness" and min(parameters) < LEAST_ROUGHNESS:
+            return None
+        if not hasattr(design.interpolator, "scale") and own.scale_of(parameters):
             return None
     viewer, brightness = scene.distant_viewer, 0.0
     for material in scene.materials:

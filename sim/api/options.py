@@ -310,8 +310,8 @@ DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
         None,
-        "Interpolation along a span.  [default: quotient; chord with --gate, --operand, --setup-interval, or "
-        "a model that is from no table]",
+        "Interpolation along a span.  [default: quotient; quadratic with --gate; renormalise with --operand, "
+        "--setup-interval, or a model that is from no table]",
         "pipeline.method",
     ),
     "model": Option(

@@ -40,7 +40,7 @@ _REMEDIES = {
     "short_normals": "use geometry software, or divide the triangles",
     "wide_spans": "use smaller triangles",
     "out_of_range_spans": "pixels of theirs are wrong: use another method, or divide the triangles",
-    "sharp_lobes": "use method chord",
+    "sharp_lobes": "use method chord-local",
 }
 """What helps against a count; after a semicolon."""
 

@@ -128,7 +128,7 @@ def test_empty_spans_give_nothing():
 def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
         preset("quadratic", "cosquad", operand="sine")
-    for method in ("angular", "chord", "quotient"):
+    for method in ("angular", "chord-local", "quotient"):
         with pytest.raises(ValueError, match=rf"^method {method} finds no normals, so it has one operand$"):
             preset(method, "cosquad", operand="cosine")
     with pytest.raises(ValueError, match=r"^lights must be 0 to 16, not -1$"):
@@ -137,7 +137,7 @@ def test_bad_arguments_are_refused():
     spans.length[:] = 2
     constants = constants_of([(UP, 0.5, 0.5)])
     with pytest.raises(ValueError, match=r"exceed SQ\(1, 17\)$"):
-        preset(model="cosquad").compute(spans, constants)
+        preset("quadratic", "cosquad").compute(spans, constants)
     with pytest.raises(ValueError, match=r"^the constants are for 1 lights, not 2$"):
         preset(model="cosquad", lights=2).compute(spans, constants)
 
@@ -145,7 +145,7 @@ def test_bad_arguments_are_refused():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"terms": 3}, "method chord has no option terms"),
+        ({"terms": 3}, "method renormalise has no option terms"),
         ({"method": "quadratic", "fraction_bits": 36}, "method quadratic has no option fraction_bits"),
         ({"materials": 0}, "materials must be 1 to 1024, not 0"),
         ({"materials": 1025}, "materials must be 1 to 1024, not 1025"),

@@ -45,16 +45,24 @@ CURVE = TabulatedModel.of_points("curve", np.array([0.0, 0.5, 1.0]), np.array([0
 def test_the_default_method_serves_every_model(model):
     """By the unit that the model has: ``quotient`` where that is a table."""
     made = preset(model=model)
-    assert made.method == ("chord" if model in MODELS else "quotient")
+    assert made.method == ("renormalise" if model in MODELS else "quotient")
     assert made == preset(default_method(model), model)
     assert made.loads_tables == (model is not None and model not in MODELS)
     assert Design() == preset()
 
 
 @pytest.mark.parametrize(
-    "asked", [{"gate": True}, {"operand": "one_minus_cosine"}, {"setup_interval": 9}], ids=str
+    ("asked", "method"),
+    [
+        ({"gate": True}, "quadratic"),
+        ({"gate": True, "model": "cosquad", "operand": "one_minus_cosine"}, "quadratic"),
+        ({"operand": "cosine"}, "renormalise"),
+        ({"setup_interval": 6}, "renormalise"),
+    ],
+    ids=str,
 )
-def test_chord_is_the_default_of_what_quotient_lacks(asked):
-    assert preset(**asked) == preset("chord", **asked)
-    assert default_method("phong", **asked) == "quotient"
+def test_the_default_of_what_quotient_lacks(asked, method):
+    assert preset(**asked) == preset(method, **asked)
+    assert default_method(**asked | {"model": "phong"}) == "quotient"
     assert not METHODS["quotient"].serves_gate
+    assert not METHODS["renormalise"].serves_gate
