@@ -3,7 +3,15 @@
 from blysk.golden.presets import MODELS
 from blysk.golden.reference.reflection import REFLECTION_MODELS, AngleCosine, PolynomialModel
 
-__all__ = ["COSCOS_MODELS", "FURTHER_MODELS", "KINDS", "LINE_MODELS", "OF_DOCUMENTS", "SPECULAR_MODELS"]
+__all__ = [
+    "COSCOS_MODELS",
+    "FURTHER_MODELS",
+    "KINDS",
+    "LINE_MODELS",
+    "OF_DOCUMENTS",
+    "SPECULAR_MODELS",
+    "WHOLE",
+]
 
 SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
 """Those of the documents' figures, all of one latency."""
@@ -39,3 +47,9 @@ OF_DOCUMENTS = (
     *("half_chord", "difference_setup", "linear_interpolator"),
 )
 """Units of the documents' methods alone, which change seldom."""
+
+WHOLE = (
+    *("geometry", "render", "pixel_pipelines", "framing", "registers", "serialiser", "motion"),
+    *("draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
+)
+"""Units that are no parts: parts of geometry and of pipelines are in these."""

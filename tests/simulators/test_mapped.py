@@ -74,7 +74,7 @@ def check(tmp_path, mapped):
         expected = record.expect(unit, case)
         netlist, absorbed = absorb_registers(mapped(name, variant))
         change(netlist["modules"]["top"]["cells"])
-        bench = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)))
+        bench = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)), clean=False)
         sent = {"constants": case.constants, "write": case.write, **pauses(rng)}
         found = bench.run("icarus", case.beats, length_of(expected), **sent)
         assert_beats(found.beats, expected)
@@ -151,7 +151,7 @@ def test_a_frame_of_a_pipeline(design, tmp_path):
         # Icarus simulates some ten cycles a second of such a netlist; the proof is of every cycle.
         spans = spans[:: len(spans) // 20]
         pixels = design.compute(spans, constants)
-    found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path))).run(
+    found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)), clean=False).run(
         "icarus",
         beats_of(unit, spans),
         len(pixels.x),

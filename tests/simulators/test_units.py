@@ -17,7 +17,7 @@ from blysk.sim.engines.simulate import simulate
 from blysk.sim.units.record import length_of
 from blysk.sim.units.registry import RECORDS
 
-from ..lists import OF_DOCUMENTS
+from ..lists import OF_DOCUMENTS, WHOLE
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool, pauses
 
 QUICK = (("intensity", "3 lights, compact"),)
@@ -27,12 +27,6 @@ BEATS = {"verilator": 200_000, "icarus": 1000}
 
 FEWER = 1000
 """Of the others, whose many beats the compiled engine has."""
-
-WHOLE = (
-    *("geometry", "render", "pixel_pipelines", "framing", "registers", "serialiser", "motion"),
-    *("draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
-)
-"""Units that are no parts: parts of geometry and of pipelines run in these, in Verilator, too."""
 
 UNITS = [
     pytest.param(

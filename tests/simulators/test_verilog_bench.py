@@ -152,7 +152,14 @@ def test_the_register_itself_is_right(icarus, tmp_path):
     np.testing.assert_array_equal(found.beats, np.arange(100))
 
 
-def test_says_what_failed(icarus, tmp_path):
-    bench = VerilogBench(Register(), tmp_path, register(VALID="nowhere + ("))
-    with pytest.raises(BenchError, match=r"^iverilog ends with status \d+: "):
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ({"VALID": "nowhere + ("}, r"^iverilog ends with status \d+: "),
+        ({"PAYLOAD": "held, unknown = held"}, r"^iverilog warns: .*implicit definition of wire 'unknown'"),
+    ],
+)
+def test_says_what_failed(icarus, tmp_path, fault, says):
+    bench = VerilogBench(Register(), tmp_path, register(**fault))
+    with pytest.raises(BenchError, match=says):
         bench.run("icarus", np.arange(2), 2)

@@ -203,13 +203,21 @@ class VerilogBench:
         Verilog of the module ``core``; by default the component's, as `emit` writes it.
     optimise : bool
         Whether Verilator's model is to be fast rather than soon compiled.
+    clean : bool
+        Whether Icarus is to have no warning of the text.
     """
 
     def __init__(
-        self, component: Component, folder: Path, text: str | None = None, *, optimise: bool = False
+        self,
+        component: Component,
+        folder: Path,
+        text: str | None = None,
+        *,
+        optimise: bool = False,
+        clean: bool = True,
     ):
         self.shapes = Ports(component)
-        self._optimise = optimise
+        self._optimise, self._clean = optimise, clean
         self._folder = folder
         self._built: dict[str, list[str]] = {}
         text = text or emit(component, "core")
@@ -235,7 +243,7 @@ class VerilogBench:
         ------
         BenchError
             If an output is undefined, changes or is withdrawn while it waits, or comes when none is due; if
-            nothing moves for ``idle_timeout`` cycles; if a simulator fails.
+            nothing moves for ``idle_timeout`` cycles; if a simulator fails, or Icarus warns of the text.
         """
         shapes, folder = self.shapes, self._folder
         numbers = {"count": count, "idle_timeout": idle_timeout, "settle": settle}
@@ -250,7 +258,9 @@ class VerilogBench:
         (folder / "constants.hex").write_bytes(held)
         if simulator not in self._built:
             self._built[simulator] = (
-                _build_icarus(folder) if simulator == "icarus" else _build_verilated(folder, self._optimise)
+                _build_icarus(folder, self._clean)
+                if simulator == "icarus"
+                else _build_verilated(folder, self._optimise)
             )
         options = [f"+{name}={number}" for name, number in numbers.items()]
         printed = _run([*self._built[simulator], *options], folder)
@@ -375,11 +385,12 @@ def _run(command: list, folder: Path, **environment: str) -> str:
     return done.stdout
 
 
-def _build_icarus(folder: Path) -> list[str]:
+def _build_icarus(folder: Path, clean: bool) -> list[str]:
     (folder / "clock.v").write_text(_ICARUS_CLOCK)
-    _run(
-        ["iverilog", "-g2001", "-s", "oscillator", "-o", "bench.vvp", "clock.v", "bench.v", "core.v"], folder
-    )
+    files = "clock.v", "bench.v", "core.v"
+    said = _run(["iverilog", "-g2001", "-Wall", "-s", "oscillator", "-o", "bench.vvp", *files], folder)
+    if clean and said.strip():
+        raise BenchError(f"iverilog warns: {said.strip()[:2000]}")
     return ["vvp", "-n", "bench.vvp"]
 
 

