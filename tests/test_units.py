@@ -3,8 +3,8 @@
 
 The quick run has all stimuli of the default variants and of the default design, but those of `SELDOM` and
 `SELDOM_STIMULI`, compiled: the engine itself compares the first beats with Amaranth's simulator. CI has every
-default variant. The long run has all variants, whose models are compared so, too, and of default variants
-both simulators under every pattern of stalls.
+default variant. The long run has all variants, whose models are compared so, too. Under stalls other
+simulators have the units in `tests/simulators`.
 """
 
 import inspect
@@ -15,7 +15,7 @@ import pytest
 
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import STALLS, UnitRun, first
+from blysk.sim.units.record import first
 from blysk.sim.units.registry import RECORDS
 
 from .checks import assert_equals_model, assert_keeps_rate, known, resets
@@ -95,36 +95,6 @@ def test_equals_model(name, variant, stimulus):
         found = assert_equals_model(unit, run)
         if not run.stalls:
             free = found
-
-
-def _with_own_control():
-    """Pipelined units share theirs: one of them stands for all."""
-    for name, record in RECORDS.items():
-        pipelined = isinstance(record.kind, type) and issubclass(record.kind, PipelinedUnit)
-        if not pipelined or name == "chord":
-            yield name
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", list(_with_own_control()))
-def test_few_beats_equal_model(name):
-    """In Amaranth's simulator, and compiled: on the same cycles, under the patterns of stalls, one by one.
-
-    One run has them all, as the simulator takes most of its time to begin.
-    """
-    record = RECORDS[name]
-    unit = default_of(name)
-    case, rng = few_of(record, record.default, unit), np.random.default_rng(2026)
-    stalls = {
-        end: np.concatenate([rng.random(31) < shares[place] for shares in STALLS[1:]])
-        for place, end in enumerate(("input_stalls", "output_stalls"))
-    }
-    status = None if record.status is None else record.status(unit, case)
-    run = UnitRun(case, record.expect(unit, case), status, stalls)
-    slow = assert_equals_model(unit, run, engine="pysim")
-    fast = assert_equals_model(unit, run)
-    for cycles in ("cycles", "input_cycles"):
-        np.testing.assert_array_equal(getattr(slow, cycles), getattr(fast, cycles))
 
 
 def few_of(record, variant, unit):
