@@ -28,7 +28,7 @@ _MODELS = ("cosquad7", "cosquad_lin", "lyon3_refitted", "exp", "blinn_product", 
 
 DESIGNS = [("quotient", "blinn"), ("quotient", "phong")]
 DESIGNS += [(method, model_of(method)) for method in METHODS if method != "quotient"]
-DESIGNS += [("chord", model) for model in _MODELS]
+DESIGNS += [("renormalise", model) for model in _MODELS]
 """Method and model of each row of the table of errors in docs/guide/accuracy.md."""
 
 

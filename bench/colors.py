@@ -39,8 +39,7 @@ STYLES = {
     "quadratic-horner": Style("#0072b2", "#4fb3ea", ":", "8"),
     "angular": Style("#00805c", "#23c397", marker="P"),
     "recurrence": Style("#3b95c4", "#8fd0f5", "--", "X"),
-    "chord": Style("#b0508a", "#e08fc0", marker="D"),
-    "chord-local": Style("#b0508a", "#e08fc0", "--", "d"),
+    "chord-local": Style("#b0508a", "#e08fc0", marker="D"),
     "quotient": Style("#d55e00", "#ff8b3d", marker="*"),
 }
 """Style of each method."""

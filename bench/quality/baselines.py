@@ -20,7 +20,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from blysk.bench.accuracy import scene_for
+from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.command import progress, run
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.blocks import ENTRIES as UNITS
@@ -103,7 +103,7 @@ def cycles_of(design: Design, style: str = "throughput") -> dict[str, int]:
 class _Pipeline:
     """A pipeline of one light."""
 
-    method: str = "chord"
+    method: str = "renormalise"
     model: str = "cosquad"
     style: str = "throughput"
     gate: bool = False
@@ -128,12 +128,13 @@ def _parts_of_unit(entry: Entry) -> dict[str, int]:
 
 
 def _entries() -> dict[str, Callable[[], dict[str, int]]]:
-    pipelines = [_Pipeline(method, style=style) for style in STYLES for method in METHODS]
-    pipelines += [_Pipeline(gate=True), _Pipeline("linear", gate=True)]
-    pipelines += [_Pipeline(model="blinn_product", style="compact", gate=gate) for gate in (False, True)]
+    pipelines = [_Pipeline(method, model_of(method), style) for style in STYLES for method in METHODS]
+    pipelines += [_Pipeline(method, gate=True) for method in ("quadratic", "linear")]
+    pipelines += [_Pipeline("quadratic", "blinn_product", "compact", gate) for gate in (False, True)]
     entries = {f"frames: {pipeline.name}": pipeline.cycles for pipeline in pipelines}
     # In this style a model moves the cycles by its latency alone.
     pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]
+    pipelines += [_Pipeline("quotient", "phong")]
     entries |= {f"parts: {pipeline.name}": pipeline.parts for pipeline in pipelines}
     # Pipelines have lines of their own, with styles and gates.
     of_units = [entry for entry in UNITS if entry.record.kind is not ShadingPipelineUnit]
@@ -147,7 +148,8 @@ ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
 """Entries to measure: for each a function that returns its figures.
 
 ``frames``: `cycles_of` the pipelines of each method in both styles, and of some with a gate. ``parts``:
-`Cost.totals` of these, of a pipeline of each model, and of every measured variant of every other unit.
+`Cost.totals` of these, of a pipeline of each model, of true Phong, and of every measured variant of every
+other unit.
 """
 
 

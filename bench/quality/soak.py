@@ -76,9 +76,9 @@ DESIGNS = (
         for name, method in METHODS.items()
         if name != "bisection" and not method.TAKES_VALUES
     ),
-    ("chord", "cosquad", True),
-    ("chord", "cosquad_q", False),
-    ("chord", "blinn", True),
+    ("quadratic", "cosquad", True),
+    ("renormalise", "cosquad_q", False),
+    ("quadratic", "blinn", True),
     ("quotient", "blinn", False),
 )
 """Method, model and whether there is a highlight gate: every method of one pixel a cycle that takes normals

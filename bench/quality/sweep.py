@@ -23,7 +23,7 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.prepare import constants_of, spans_for
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.camera import Camera
@@ -46,9 +46,9 @@ FEW_EXPONENTS += (470, 500, 600, 700, 800, 900, 1000)
 LARGEST = 1.0
 """Target: the largest error of a channel, in LSB."""
 
-LARGEST_COSINE = ChordInterpolator.DIFFUSE_BUDGET / 255 + 2.0**-15
-"""Largest ``|N·L|``, 5e-4, whose sign a method may change: the error of the chord method's fit, and errors of
-vectors and words; of ``quotient`` less."""
+LARGEST_COSINE = LocalChordInterpolator.DIFFUSE_BUDGET / 255 + 2.0**-15
+"""Largest ``|N·L|``, 5e-4, whose sign a method may change: the error of the fit of ``chord-local``, and
+errors of vectors and words; of ``quotient`` less."""
 
 
 def models_of(method: str) -> tuple[str, ...]:

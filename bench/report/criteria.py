@@ -199,6 +199,6 @@ def _drawing(frames: Sequence[tuple]) -> Drawing:
         f"One light, exponent {EXPONENT}, about {size:,} pixels shaded. Small triangles have short spans: "
         f"what is done "
         "once a span then weighs more than the pixels. A span of `quotient` takes three cycles at least, "
-        "but of one pixel one; with `chord` a span enters every cycle at most."
+        "but of one pixel one."
     )
     return Drawing("criteria-triangles", "Cycles a pixel against the number of triangles", svg(figure), note)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.gate import MODELS, frames, same_pixels
+from blysk.bench.report.gate import METHOD, METHODS, MODELS, frames, same_pixels
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
@@ -27,23 +27,25 @@ BLOCKS: dict[str, tuple[str, ...]] = {
     "frame constants": ("frame_constants", "slope", "tables"),
     "admission": ("top", "coordinates"),
     "setup of spans": ("interpolator",),
-    "highlight gate": ("interpolator.chord_spans.value_gate", "interpolator.chord_spans.decisions"),
-    "sums of pixels": ("interpolator.chord_spans.chord_accumulator",),
-    "quotients of pixels": ("interpolator.quotient",),
+    "highlight gate": ("highlight_gate", "decisions", "lengths", "undecided"),
+    "cosines of pixels": (
+        *("interpolator.quotient", "interpolator.difference_accumulator", "interpolator.evaluator"),
+        *("interpolator.cosine_direction_0", "interpolator.cosine_halfway_0", "interpolator.recurrence_0"),
+        "interpolator.products",
+    ),
     "diffuse": ("light_0.diffuse",),
     "specular": ("light_0.specular",),
     "intensity": ("intensity",),
     "assembler": ("shaded", "pixel_assembler"),
 }
 """Submodules of the pipeline by block, in the stream's order; an inner one counts for its own block. The sums
-of ``quotient`` are in its setup of spans."""
+of ``quotient``, and the normals of ``bisection``, are in the setup of spans."""
 
 DESIGN = ("quotient", "blinn")
-"""Method and model of the default pipeline, which has no gate; those of the gate are of the method chord."""
-
+"""Method and model of the default pipeline, which has no gate."""
 _FULL, _QUICK = (320, 240, 10_000), (48, 36, 64)
 _COLORS = (
-    *("#9aa0a6", "#5f6368", "#d62728", "#1f77b4", "#6baed6"),
+    *("#9aa0a6", "#5f6368", "#d62728", "#1f77b4"),
     *("#17a2a2", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#000000"),
 )
 
@@ -112,17 +114,17 @@ def measure(
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Measurements of `DESIGN`, then of each model of the method chord without and with the gate.
+    """Measurements of `DESIGN`, then without and with the gate of each model and each method.
 
-    Quick ones are in Amaranth's own simulator.
+    Quick ones are of one model and method, and in Amaranth's own simulator.
     """
     exponents = EXPONENTS[1:2] if quick else EXPONENTS
     common = {"exponents": list(exponents), "size": list(_QUICK if quick else _FULL)}
     common["engine"] = "pysim" if quick else "auto"
-    designs = [(*DESIGN, False)]
-    designs += [
-        ("chord", model, gate) for model in (MODELS[:1] if quick else MODELS) for gate in (False, True)
-    ]
+    pairs = [(METHOD, model) for model in MODELS]
+    pairs += [(method, MODELS[0]) for method in METHODS if method != METHOD]
+    pairs = pairs[:1] if quick else pairs
+    designs = [(*DESIGN, False), *((*pair, gate) for pair in pairs for gate in (False, True))]
     names = ("method", "model", "gate")
     return [Task(measure, dict(zip(names, design, strict=True)) | common) for design in designs]
 
@@ -140,19 +142,19 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     best, worst = max(saved, key=saved.get), min(saved, key=saved.get)
     width, height, _ = tasks[0].settings["size"]
     (method, model, exponent), pair = next(iter(found.items()))
-    rival = next(of[False] for key, of in found.items() if key[0] == "chord" and key[2] == exponent)
+    (rival, other, _), gated = next(of for of in found.items() if True in of[1] and of[0][2] == exponent)
     shares = {block: _a_pixel(pair[False], block) / _total(pair[False]) for block in blocks}
     largest = max(shares, key=shares.get)
     text = [
         f"Register bits that change, on the teapot at {width}x{height} in one light, one pixel a cycle: what "
         "a pixel costs in switching, block by block, from simulation.",
         f"The default pipeline, `{method}` with `{model}`, switches {_total(pair[False]):.0f} bits a pixel "
-        f"at exponent {exponent}, one of `chord` {_total(rival):.0f}. Most is in the block *{largest}*: "
-        f"{shares[largest]:.0%}. What is done once a span weighs more, the shorter spans are: these have "
-        f"{pair[False]['pixels'] / pair[False]['spans']:.1f} pixels.",
-        "A highlight gate, which `chord` can have, makes the specular unit stand still in spans without a "
-        "highlight, and itself switches once a span. With it the whole pipeline's count changes by "
-        f"{' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}.",
+        f"at exponent {exponent}, `{rival}` with `{other}` {_total(gated[False]):.0f}. Most is in the block "
+        f"*{largest}*: {shares[largest]:.0%}. What is done once a span weighs more, the shorter spans are: "
+        f"these have {pair[False]['pixels'] / pair[False]['spans']:.1f} pixels.",
+        "A highlight gate, which methods of unit normals can have, makes the specular unit stand still in "
+        "spans without a highlight, and itself switches once a span. With it the whole pipeline's count "
+        f"changes by {' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}.",
         "**Not counted**: bits inside multipliers and other logic between two registers, glitches, wires, "
         "the clock's own tree, and the bits inside memories. It compares designs; it is no number of joules.",
     ]
@@ -163,7 +165,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _change(key: tuple[str, str, int], saved: dict) -> str:
-    return f"{0 - saved[key]:+.1%} (`{key[1]}`, exponent {key[2]})"
+    return f"{0 - saved[key]:+.1%} (`{key[0]}`, `{key[1]}`, exponent {key[2]})"
 
 
 def _total(frame: dict) -> float:
@@ -220,6 +222,6 @@ def _drawing(found: dict, blocks: Sequence[str]) -> Drawing:
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
     note = (
         "Blocks in the order in which a span passes them, from left to right. The sums of `quotient` are in "
-        "its setup of spans."
+        "its setup of spans, and so are the normals of `bisection`."
     )
     return Drawing("energy-blocks", "Register bits that toggle a pixel, by block", svg(figure), note)

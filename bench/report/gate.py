@@ -1,12 +1,13 @@
 """Savings of the highlight gate: pixels, cycles of the compact style, and toggled register bits.
 
 ``python -m blysk.bench.report.gate [MESH ...]`` renders each mesh (the teapot by default) at 320x240 by the
-chord method with one light, for the models cosquad, coscos4 and blinn and the exponents 2, 10, 50, 200 and
-1000, in the compact and the throughput style, without and with the gate. It prints three tables in Markdown:
+method quadratic, or another one that serves a gate (``--method``), with one light, for the models cosquad,
+coscos4 and blinn_product and the exponents 2, 10, 50, 200 and 1000, in the compact and the throughput style,
+without and with the gate. It prints three tables in Markdown:
 gated spans and pixels, cycles, and toggled register bits. The exit status is 1 if a frame is not equal, to
 the bit, in all four simulations and by the bit-accurate model; 2 for bad input.
 
-The method quotient has no gate: its vectors bring neither unit normals nor values at three places.
+The methods quotient and renormalise have no gate: their spans bring no unit normals.
 
 Toggles are of registers: changes inside a multiplier between two registers are not counted. The gate works
 once a span and saves once a pixel, so the lengths of the frame's spans decide whether it saves toggles.
@@ -29,6 +30,7 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.pipeline import Design, Pixels, Spans
+from blysk.golden.presets import METHODS as ALL_METHODS
 from blysk.golden.presets import MODELS as ALL_MODELS
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
@@ -42,6 +44,8 @@ from blysk.sim.value_types import Size
 
 __all__ = [
     "EXPONENTS",
+    "METHOD",
+    "METHODS",
     "MODELS",
     "Activity",
     "GateRow",
@@ -52,11 +56,17 @@ __all__ = [
     "shares_of",
 ]
 
+METHODS = tuple(name for name, of in ALL_METHODS.items() if of.serves_gate and of.ORIGIN != "own")
+"""Methods of unit normals, which serve the gate: those of the documents, and linear."""
+
+METHOD = "quadratic"
+"""The method of `METHODS` that is measured if none is named."""
+
 MODELS = ("cosquad", "coscos4", "blinn_product")
 EXPONENTS = (2, 10, 50, 200, 1000)
 
 _SPECULAR = ("light_0.specular",)
-_GATE = ("interpolator.chord_spans.value_gate", "interpolator.chord_spans.decisions")
+_GATE = ("highlight_gate", "decisions", "lengths", "undecided")
 
 
 @dataclass(frozen=True)
@@ -95,7 +105,7 @@ class Activity(NamedTuple):
     specular : int
         Inside the specular unit.
     gate : int
-        Inside the gate and the FIFO of its decisions.
+        Inside the gate and the FIFOs about it.
     pipeline : int
         In the whole pipeline, with specular unit and gate.
     """
@@ -186,19 +196,21 @@ def same_pixels(run: Run, expected: Pixels) -> bool:
 
 
 class GateUnits:
-    """The four pipelines of a model, which serve every mesh and exponent.
+    """The four pipelines of a model and a method, which serve every mesh and exponent.
 
     Parameters
     ----------
     model : str
         Reflection model.
+    method : str
+        One of `METHODS`.
     engine : str
         As `simulate` takes it.
     """
 
-    def __init__(self, model: str, engine: str = "cxxrtl"):
+    def __init__(self, model: str, method: str = METHOD, engine: str = "cxxrtl"):
         self.model, self.engine = model, engine
-        designs = [preset("chord", model, gate=gate) for gate in (False, True)]
+        designs = [preset(method, model, gate=gate) for gate in (False, True)]
         self.design = designs[0]
         self._counters = [ToggleCounter(ShadingPipelineUnit(design)) for design in designs]
         self._compact = [ShadingPipelineUnit(design.built(style="compact")) for design in designs]
@@ -243,6 +255,7 @@ def measure(
     exponents: Sequence[int] = EXPONENTS,
     width: int = 320,
     height: int = 240,
+    method: str = METHOD,
     engine: str = "cxxrtl",
 ) -> Iterator[GateRow]:
     """Rows of every model, mesh and exponent.
@@ -255,11 +268,13 @@ def measure(
         Reflection models and exponents. An exponent is a frame constant, and needs no pipeline of its own.
     width, height : int
         Size of a frame.
+    method : str
+        One of `METHODS`.
     engine : str
         As `simulate` takes it.
     """
     for model in models:
-        units = GateUnits(model, engine)
+        units = GateUnits(model, method, engine)
         for loaded in meshes:
             for exponent in exponents:
                 yield units.compare(loaded.name, scene_for(loaded.mesh, exponent, width, height))
@@ -336,6 +351,13 @@ def _print(rows: Sequence[GateRow]) -> None:
 
 @click.command()
 @click.argument("meshes", nargs=-1)
+@click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default=METHOD,
+    show_default=True,
+    help="Interpolation along a span.",
+)
 @click.option("--size", type=Size(), default="320x240", show_default=True, help="Of the frames.")
 @click.option(
     "--model", "models", type=click.Choice(ALL_MODELS), multiple=True, default=MODELS, help="Repeat for more."
@@ -349,15 +371,16 @@ def _print(rows: Sequence[GateRow]) -> None:
     help="Repeat for more.",
 )
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
-def _command(meshes, size, models, exponents, figures) -> int:
+def _command(meshes, method, size, models, exponents, figures) -> int:
     """Measure the savings of the highlight gate: pixels, cycles, and toggled register bits."""
     if figures:
         check_writable(figures)
     loaded = [load_mesh(source) for source in meshes or ["teapot"]]
     count = len(loaded) * len(models) * len(exponents)
-    rows = list(progress(measure(loaded, models, exponents, *size), total=count, unit="frames"))
+    rows = list(progress(measure(loaded, models, exponents, *size, method), total=count, unit="frames"))
     if figures:
-        write_json(figures, {"width": size[0], "height": size[1], "frames": [_figures(row) for row in rows]})
+        settings = {"method": method, "width": size[0], "height": size[1]}
+        write_json(figures, settings | {"frames": [_figures(row) for row in rows]})
     _print(rows)
     return 0 if all(row.identical for row in rows) else 1
 

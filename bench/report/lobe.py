@@ -60,7 +60,7 @@ MESHES = ("teapot", "sphere", "torus", "waves")
 
 FRONT = (
     *(("quotient", model) for model in ("blinn", "phong")),
-    *(("chord", model) for model in ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")),
+    *(("renormalise", model) for model in ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")),
 )
 """Method and model of the pipelines that are compared: with a table, and the baselines by other circuits."""
 
@@ -250,7 +250,7 @@ def tasks(quick: bool) -> list[Task]:
         frames += [
             (method, model, list(ROUGHNESSES))
             for model in ("ggx", "beckmann")
-            for method in ("quotient", "chord")
+            for method in ("quotient", "renormalise")
         ]
         found += [
             Task(frame_errors, {"mesh": mesh, **dict(zip(names, frame, strict=True)), "size": size})
@@ -274,27 +274,25 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         design: max(row["total"] for _, of, row in frames if of == design)
         for design in dict.fromkeys(of for _, of, _ in frames)
     }
-    table, chord, cosquad = (pipelines[of] for of in (("quotient", "blinn"), *_BASELINES))
-    worst_chord, worst_cosquad = (worst[of] for of in _BASELINES)
+    table, normal, cosquad = (pipelines[of] for of in (("quotient", "blinn"), *_BASELINES))
+    worst_normal, worst_cosquad = (worst[of] for of in _BASELINES)
     sharp = _serves(frames, "ggx"), _serves(frames, "beckmann")
     text = [
         "A small table, addressed by octaves, with one multiplier gives Blinn's power at every exponent, and "
         "any other curve of N·H: Beckmann's and GGX among them. With `quotient` it is addressed by sin² and "
         "cos² of the angle and has 512 words, and by sin² of half the angle it gives true Phong, (R·V)^n; "
         "with the other methods it is addressed by 1 - N·H and has 336.",
-        f"A pipeline by `quotient` with it has {table['multipliers']} multipliers, by `chord` "
-        f"{chord['multipliers']}, by `chord` with `cosquad` {cosquad['multipliers']}; they take a span to "
-        f"its first pixel in {table['latency']}, {chord['latency']} and {cosquad['latency']} cycles. Largest "
-        "errors against exact shading with Blinn's power: "
-        f"{worst['quotient', 'blinn']:.2f}, {worst_chord:.2f} and {worst_cosquad:.2f} LSB. True Phong, "
+        f"A pipeline by `quotient` with it has {table['multipliers']} multipliers, by "
+        f"`renormalise` {normal['multipliers']}, by `renormalise` with `cosquad` {cosquad['multipliers']}; "
+        f"they take a span to its first pixel in {table['latency']}, {normal['latency']} and "
+        f"{cosquad['latency']} cycles. Largest errors against exact shading with Blinn's power: "
+        f"{worst['quotient', 'blinn']:.2f}, {worst_normal:.2f} and {worst_cosquad:.2f} LSB. True Phong, "
         f"against itself: {worst['quotient', 'phong']:.2f}.",
-        "What is left with `chord` is the method's: it turns normals evenly along a span on the screen, and "
-        "the exact frame evenly on the surface. The column *spans alone* has that error by itself; spans of "
-        "`quotient` have none.",
+        "The column *spans alone* has the error of the normals that the spans give in exact arithmetic. "
+        "Spans of both methods follow the true line of N/W, and have that of the words of their ends alone.",
         f"Sharp lobes: frames of `quotient` are within 1 LSB with ggx from roughness {sharp[0]:g} on, with "
         f"beckmann from {sharp[1]:g}, of those measured. Below 0.2 its words of 18 bits promise no such "
-        "error; "
-        "`chord` has finer words for such lobes.",
+        "error.",
     ]
     heads = [f"{case.model.name} {case.label} = {value:g}, LSB" for case in CASES for value in case.values]
     sizes = [
@@ -359,7 +357,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     return Section("lobe", "Exact highlights from one small table", text, parts)
 
 
-_BASELINES = ("chord", "blinn"), ("chord", "cosquad")
+_BASELINES = ("renormalise", "blinn"), ("renormalise", "cosquad")
 
 
 def _serves(frames: Sequence[tuple[str, tuple[str, str], dict]], model: str) -> float:

@@ -76,7 +76,7 @@ def _lamp(width: int, height: int, triangles: int) -> Scene:
     return Scene(teapot(triangles), camera, width, height, clay, lights, viewer="near")
 
 
-_GATED = {"method": "chord", "model": "cosquad", "gate": True}
+_GATED = {"method": "quadratic", "model": "cosquad", "gate": True}
 """A method whose spans stay the same without highlights, and can be proved to hold none."""
 
 SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]] = {

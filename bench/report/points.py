@@ -64,9 +64,9 @@ DESIGNS = [(method, model_of(method)) for method in METHODS]
 
 DESIGNS += [("quotient", "phong")]
 
-DESIGNS += [("chord", model) for model in ("blinn", *MODELS) if model != "cosquad"]
+DESIGNS += [("renormalise", model) for model in ("blinn", *MODELS) if model != "cosquad"]
 
-DESIGNS += [("renormalise", "exp"), ("renormalise", "blinn_product"), ("linear", "blinn_product")]
+DESIGNS += [("linear", "blinn_product")]
 
 DESIGNS += [(method, "cosquad") for method in PUBLISHED]
 """Method and model of the hardware's points, with the method's own operand of the specular unit."""

@@ -225,9 +225,8 @@ def _range_table(ranges: dict[str, dict]) -> Table:
     note = (
         "`blysk` cuts wider spans before the pipeline, and counts them; the pipeline counts those that it "
         f"gets and can tell, some or all. Errors at exponent {SWEEP_EXPONENT}, spans of 16 pixels with the "
-        "highlight in them; no figure where every span is flagged. Of `chord` the widest span is the widest "
-        "lit one that the pipeline does not count as wide; of `chord-local`, where it depends on "
-        "the light, and of `quotient` it is measured: that of which none of a sample is cut."
+        "highlight in them; no figure where every span is flagged. Of `chord-local`, where the widest span "
+        "depends on the light, and of `quotient` it is measured: that of which none of a sample is cut."
     )
     title = "Range of each method: served whole, exact to a step, flagged; and what it does outside"
     columns += ["pixels of a span", "exponents"]

@@ -81,21 +81,11 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
         f"its "
         "documentation states."
     )
-    ends = {
-        method: [ranges[method]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS]
-        for method in ("quotient", "chord")
-        if method in ranges
-    }
-    if "quotient" in ends:
+    if "quotient" in ranges:
+        end = min(ranges["quotient"]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS)
         sentence += (
-            f" The range of `quotient` ends at spans that turn by {min(ends['quotient']):.3g} degrees, at "
+            f" The range of `quotient` ends at spans that turn by {end:.3g} degrees, at "
             "every exponent, or whose ends have lengths of more than 2:1; others are halved before it."
-        )
-    if "chord" in ends:
-        first, *_, last = ends["chord"]
-        sentence += (
-            f" That of `chord` ends at {first:.3g} degrees at exponent {RANGE_EXPONENTS[0]} and {last:.3g} "
-            f"at {RANGE_EXPONENTS[-1]}; wider spans are cut before the pipeline, or flagged by it."
         )
     return Conclusion(
         "Where is it exact, and where does that end?", sentence, _drawing(cases, ranges, worst, lit)

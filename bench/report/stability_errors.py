@@ -130,7 +130,7 @@ def _flagged(design: Design, spans: Spans, constants: FrameConstants) -> np.ndar
 def _three_values(
     design: Design, spans: Spans, constants: FrameConstants
 ) -> tuple[SpanValues, tuple[Fixed, Fixed, Fixed]]:
-    """Values of the chord method, and the three normals of which they are computed."""
+    """Values of a method with true middle normals, and the three normals of which they are computed."""
     codes = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
     *normals, direction, halfway = (Fixed(COMPONENT, of) for of in codes)
     return design.interpolator.values(*normals, direction, halfway), tuple(normals)

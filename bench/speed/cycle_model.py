@@ -118,7 +118,7 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     """Cycles of a frame of one material without stalls, from the first write of a constant to the last pixel.
 
     It equals the cycles of a simulation if the interval of spans is constant, and by `compare` for
-    ``quotient``. It is within 3 % for ``chord``, ``chord-local``, ``bisection`` and ``quadratic-eval``,
+    ``quotient``. It is within 3 % for ``chord-local``, ``bisection`` and ``quadratic-eval``,
     within 12 % for ``quadratic-horner``.
 
     Parameters

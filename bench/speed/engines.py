@@ -2,10 +2,10 @@
 
 ``python -m blysk.bench.speed.engines`` sends the longer spans of a teapot at 4000x3000 through the
 quotient pipeline of one light in both engines and in Verilator's model of the emitted Verilog, and through
-the chord pipeline with a highlight gate in the compiled engine. It prints cycles and pixels a second of each,
-and the seconds of ``blysk render`` for a teapot of 50,000 triangles with its model in the cache. The exit
-status is 1 if the compiled engine makes less than 5 million pixels a second on one core, is less than 200
-times as fast as pysim, or is slower than Verilator, or if the picture takes 2 s or more.
+the quadratic pipeline with a highlight gate in the compiled engine. It prints cycles and pixels a second of
+each, and the seconds of ``blysk render`` for a teapot of 50,000 triangles with its model in the cache. The
+exit status is 1 if the compiled engine makes less than 5 million pixels a second on one core, is less than
+200 times as fast as pysim, or is slower than Verilator, or if the picture takes 2 s or more.
 
 Seconds are processor time of this process, which has one thread: other work on the machine does not count. A
 run of an engine is the whole call, with packing and unpacking of beats; a run of Verilator is only the loop
@@ -286,7 +286,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     int
         0, or 1 when the compiled engine missed a target.
     """
-    designs = preset("quotient", "blinn"), preset("chord", "cosquad", gate=True)
+    designs = preset("quotient", "blinn"), preset("quadratic", "cosquad", gate=True)
     given = [teapot_spans(design, width, height, LEAST_LENGTH) for design in designs]
     shaded = [design.compute(*of) for design, of in zip(designs, given, strict=True)]
     # An empty cache: the build is a part of what is measured.
@@ -294,7 +294,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
         mock.patch.dict(os.environ, BLYSK_CACHE=folder),
     ):
-        speed, chord = (
+        speed, gated = (
             measure(
                 unit,
                 beats_of(unit, spans),
@@ -318,7 +318,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
         "cxxrtl": speed.cxxrtl_beats,
         "verilator": speed.verilator_beats,
         "pysim": speed.pysim_beats,
-        "cxxrtl, chord": chord.cxxrtl_beats,
+        "cxxrtl, gate": gated.cxxrtl_beats,
     }
     for name, rate in rates.items():
         print(f"{name:<14}{rate:>14,.0f}{speed.cxxrtl_beats / rate:>19,.2f}x")

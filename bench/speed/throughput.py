@@ -2,9 +2,9 @@
 
 ``python -m blysk.bench.speed.throughput [TRIANGLES ...]`` draws teapots of 1,000, 10,000, 100,000 and
 1,000,000 triangles at 1920x1080, and sends their spans through the simulated pipelines of the methods
-quotient, chord and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each method has. It
-prints two tables in Markdown: lengths of the spans, and cycles. ``--json`` prints the same as JSON. The exit
-status is 1 if spans of 16 pixels or more take over 1.05 cycles a pixel.
+quotient, renormalise and quadratic, with those of the setup intervals 1, 2, 3, 4, 7 and 9 that each method
+has. It prints two tables in Markdown: lengths of the spans, and cycles. ``--json`` prints the same as JSON.
+The exit status is 1 if spans of 16 pixels or more take over 1.05 cycles a pixel.
 """
 
 import argparse
@@ -33,7 +33,7 @@ __all__ = ["BINS", "INTERVALS", "LARGEST", "LONG", "METHODS", "TRIANGLES", "Leng
 __all__ += ["main", "measure", "spans_of"]
 
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
-METHODS = ("quotient", "chord", "quadratic")
+METHODS = ("quotient", "renormalise", "quadratic")
 INTERVALS = (1, 2, 3, 4, 7, 9)
 """Setup intervals to measure; for each method, those that it can be built for."""
 

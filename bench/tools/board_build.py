@@ -155,8 +155,8 @@ BOARDS = {
             loader="ulx3s",
             compact=True,
             known="none with quotient so far: on commit 142fa70 it took 19,888 of 24,288 look-up tables, "
-            "mapped; one placement had 1,423 wires used twice when 15 minutes of routing ended; with chord "
-            "commit c815b08 gave one, 3148f9d none; an ulx3s-85f has room, --simulate routes nothing",
+            "mapped; one placement had 1,423 wires used twice when 15 minutes of routing ended; an "
+            "ulx3s-85f has room, --simulate routes nothing",
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
@@ -169,8 +169,8 @@ BOARDS = {
             lines=16,
             loader="ulx3s",
             compact=False,
-            known="commit c815b08 gave one with chord, at the first placement, of a third of the device; not "
-            "made since",
+            known="not tried with quotient so far; commit c815b08 gave one with a method that is gone, at "
+            "the first placement, of a third of the device",
         ),
         Board(
             *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
@@ -183,8 +183,8 @@ BOARDS = {
             lines=8,
             loader="icepi-zero",
             compact=True,
-            known="commit c815b08 gave one with chord, at the first placement; not made since, and the same "
-            "device on an ulx3s-25f gave none on commit 3148f9d",
+            known="not tried with quotient so far; commit c815b08 gave one with a method that is gone; the "
+            "same device on an ulx3s-25f gave none on commit 142fa70",
         ),
     )
 }

@@ -43,7 +43,7 @@ _LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup
 
 _DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
 
-_METHOD = "Interpolation along a span.  [default: quotient; chord with a model that is from no table]"
+_METHOD = "Interpolation along a span.  [default: quotient; renormalise with a model that is from no table]"
 
 OPTIONS = {
     name: option._replace(default=_DEFAULTS.get(name, option.default))
@@ -56,7 +56,7 @@ The size is that of the display, and the camera a perspective one.
 """
 
 _COMPACT_INTERVAL = 9
-"""Setup interval on a small device, of methods that have it: 5 multipliers fewer than at 3, of ``chord``."""
+"""Setup interval on a small device; with it ``renormalise`` takes 2 multipliers fewer than with 3."""
 
 MAX_LIGHTS = 4
 """Largest number of lights of a board's scene."""

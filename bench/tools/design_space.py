@@ -16,8 +16,8 @@ from blysk.bench.store import Task
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Operand
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.pipeline import STYLES, Design
@@ -78,7 +78,7 @@ class Candidate:
         Degree of the method's polynomial in the angle: for the middle normal (``quadratic`` and its forms: 2,
         a plain minimax fit, or 3), or for the bisection's factor (1 or 2).
     fraction_bits : int, optional
-        Fraction bits of the chord method's differences.
+        Fraction bits of the differences of ``chord-local``.
     style : str
         See `ShadingPipelineUnit`.
 
@@ -106,7 +106,7 @@ class Candidate:
         interpolator, changes = usual.interpolator, {}
         if usual.takes_vectors and self.model in MODELS:
             raise ValueError(f"method {self.method} has tables of lobes, and no circuits of other models")
-        if self.fraction_bits is not None and not isinstance(interpolator, ChordInterpolator):
+        if self.fraction_bits is not None and not isinstance(interpolator, LocalChordInterpolator):
             raise ValueError(f"method {self.method} has no choice of words")
         if self.degree not in (None, *_degrees(self.method)):
             raise ValueError(f"method {self.method} has no polynomial of degree {self.degree}")
@@ -166,7 +166,7 @@ class Sweep(NamedTuple):
         refused: dict[str, list[str]] = {}
         for method in self.methods:
             degrees = self.degrees if _degrees(method) else (None,)
-            words = self.fraction_bits if method == "chord" else (None,)
+            words = self.fraction_bits if method == "chord-local" else (None,)
             usual = (METHODS | PUBLISHED)[method].operand
             operands = [None if operand == usual else operand for operand in self.operands]
             if usual not in OPERANDS:

@@ -59,7 +59,7 @@ __all__ = [
 
 
 _WORDS = range(36, 47, 2)
-"""Fraction bits of the chord method's differences."""
+"""Fraction bits of the differences of ``chord-local``."""
 
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
 
@@ -90,7 +90,7 @@ def tasks(quick: bool) -> list[Task]:
         one = {"operands": (None,), "degrees": (3,), "fraction_bits": (46,), "styles": ("throughput",)}
         sweeps = [
             Sweep(methods=("quotient",), models=("blinn", "phong"), **one),
-            Sweep(("linear", "renormalise", "chord", "chord-local"), models=("blinn", "cosquad"), **one),
+            Sweep(("linear", "renormalise", "quadratic", "chord-local"), models=("blinn", "cosquad"), **one),
         ]
         view = view_of("teapot", 992, 160, 120)
     else:
@@ -112,7 +112,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     text = [
         f"{len(designs)} pipelines draw {view['source']} at {view['width']}x{view['height']}, exponent "
         f"{EXPONENT}: methods, reflection models, operands of the specular unit, degrees of the methods' "
-        "polynomials, words of the chord method's differences, and styles, each with each where that is "
+        "polynomials, words of the differences of `chord-local`, and styles, each with each where that is "
         "possible. The frames are those of the bit-accurate model, which equals the simulation to the bit; "
         "what a design takes is counted in its netlist before technology mapping. `blysk explore` does the "
         "same for any mesh, and for more choices."
@@ -318,9 +318,11 @@ _USUAL = Sweep()
     "--degrees",
     sorted({degree for degrees in DEGREES.values() for degree in degrees}),
     _USUAL.degrees,
-    "Of the polynomial: chord 1 to 3, quadratic in its forms 2 and 3, bisection 1 and 2.",
+    "Of the polynomial: quadratic in its forms 2 and 3, bisection 1 and 2.",
 )
-@_option("--fraction-bits", _WORDS, _USUAL.fraction_bits, "Of the differences of chord: 36 to 46, even.")
+@_option(
+    "--fraction-bits", _WORDS, _USUAL.fraction_bits, "Of the differences of chord-local: 36 to 46, even."
+)
 @_option("--styles", STYLES, _USUAL.styles, "One pixel a cycle, or few multipliers.")
 @click.option("--limit", type=Whole(1, 1000), default=10, show_default=True, help="Designs that are listed.")
 @click.option("--jobs", type=Whole(1, 1024), help="Processes.  [default: processors]")
@@ -340,7 +342,7 @@ def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, fi
 
     \b
     Example:
-        blysk explore --methods quotient,chord --models blinn --largest-error 0.6 --cost multipliers
+        blysk explore --methods quotient,renormalise --models blinn --largest-error 0.6 --cost multipliers
     """
     if jobs and address is not None:
         raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")

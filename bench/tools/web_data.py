@@ -90,7 +90,7 @@ turned into its frame by the page."""
 
 DESIGNS = (
     *(pair for pair in accuracy.DESIGNS if pair[0] in SERVED),
-    *(("quotient", "ggx"), ("chord", "ggx"), ("linear", "blinn")),
+    *(("quotient", "ggx"), ("renormalise", "ggx"), ("linear", "blinn")),
 )
 """Method and model of each module; the rival has the model of the first one, too."""
 

@@ -25,7 +25,7 @@ from blysk.bench.store import Task
 from blysk.bench.svg import svg
 from blysk.sim.cli.main import main
 
-DESIGNS = [*points.DESIGNS[:10], ("chord", "exp"), ("renormalise", "blinn_product"), points.DESIGNS[-1]]
+DESIGNS = [*points.DESIGNS[:10], ("renormalise", "exp"), ("renormalise", "blinn_product"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
 
 

@@ -32,7 +32,7 @@ def test_measures_every_exponent():
     [
         (0, {}),
         (1, {"model": "phong"}),
-        (2, {"method": "chord"}),
+        (2, {"method": "renormalise"}),
         (3, {"method": "renormalise"}),
         (4, {"method": "quadratic", "operand": "one_minus_cosine"}),
         (5, {"method": "quadratic", "model": "cosquad"}),

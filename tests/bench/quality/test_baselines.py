@@ -6,6 +6,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
+from blysk.bench.accuracy import model_of
 from blysk.bench.quality import baselines
 from blysk.bench.quality.baselines import (
     ENTRIES,
@@ -65,10 +66,9 @@ def test_entries_are_every_unit_method_model_and_style():
         assert any(f"{name} {variant}".rstrip().split(",")[0] in titles for variant in record.variants)
     for method in METHODS:
         for style in STYLES:
-            assert {f"{kind}: pipeline {method}, cosquad, {style}" for kind in ("frames", "parts")} <= set(
-                ENTRIES
-            )
-    assert {f"parts: pipeline chord, {model}, throughput" for model in MODELS} <= set(ENTRIES)
+            name = f"pipeline {method}, {model_of(method)}, {style}"
+            assert {f"{kind}: {name}" for kind in ("frames", "parts")} <= set(ENTRIES)
+    assert {f"parts: pipeline renormalise, {model}, throughput" for model in MODELS} <= set(ENTRIES)
     gates = {name.removesuffix(", gate") for name in ENTRIES if name.endswith(", gate")}
     assert gates <= set(ENTRIES)
     assert {name.split(":")[0] for name in gates} == {"frames", "parts"}

@@ -32,7 +32,7 @@ from blysk.sim.units.record import Case, length_of, once
 from blysk.sim.units.registry import RECORDS
 from blysk.sim.units.triangles import frame_of
 
-DESIGN = {"method": "chord", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "baseline": None}
+DESIGN = {"method": "quadratic", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "baseline": None}
 
 
 def test_every_method_of_a_pixel_a_cycle_that_takes_normals():
@@ -79,7 +79,7 @@ def test_beats_are_counted_and_a_wrong_one_stops_the_run(monkeypatch):
 
     monkeypatch.setattr(Design, "compute", wrong)
     with pytest.raises(
-        SimulationError, match=r"^cxxrtl: chord, cosquad, part 0 of seed 1, .*: beat 77: b is"
+        SimulationError, match=r"^cxxrtl: quadratic, cosquad, part 0 of seed 1, .*: beat 77: b is"
     ):
         measure(pixels=3000, **DESIGN)
 

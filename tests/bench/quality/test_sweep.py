@@ -43,7 +43,7 @@ def test_reference_is_the_renderer(model, exponent):
     np.testing.assert_allclose(frame.golden(model, exponent), 255 * image[shown], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("method", ["quotient", "chord", "chord-local", "quadratic"])
+@pytest.mark.parametrize("method", ["quotient", "renormalise", "chord-local", "quadratic"])
 def test_spans_are_those_of_a_frame(method):
     """The raster is kept; the rest is as for a frame by itself."""
     frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), preset(method, accuracy.model_of(method))
@@ -61,7 +61,7 @@ def test_spans_are_those_of_a_frame(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("design", [("quotient", "phong"), ("chord", "cosquad")])
+@pytest.mark.parametrize("design", [("quotient", "phong"), ("renormalise", "cosquad")])
 def test_errors_are_those_of_the_simulated_frame(design):
     mesh, (method, model) = teapot(500), design
     frame = Frame(mesh, 64, 48)
@@ -90,7 +90,7 @@ def test_switched_pixels_are_told_apart(side):
     product = quantise(normals) @ quantise(light)
     # The model's N·L is cut to 25 of these 34 fraction bits.
     (normal, *_) = normals[side * product < -(2**10)]
-    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"], "chord")
+    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"], "renormalise")
     assert point.over == point.switched == point.pixels > 20
     assert point.switched_cosine == pytest.approx(1e-9, rel=0.01)
     assert point.max_lsb > 5
@@ -106,7 +106,7 @@ def test_a_wrong_sign_is_no_excuse(monkeypatch):
     constants = FrameConstants.of(frame.scene, 1)
     behind = replace(constants, direction=-constants.direction)
     monkeypatch.setattr(sweep, "constants_of", lambda *_: [behind])
-    (point,) = frame.points(1, ["blinn_product"], "chord")
+    (point,) = frame.points(1, ["blinn_product"], "renormalise")
     assert point.over == point.pixels > 20
     assert point.switched == 0
     assert point.steady_lsb == point.max_lsb > 5
@@ -130,16 +130,16 @@ def test_other_scenes():
 
 
 def test_light_from_behind(capsys):
-    """Of the pixels where N·L is about 0 some switch by quadratics, none by chords; no other is off."""
+    """Of the pixels where N·L is about 0 some switch by quadratics, none by lines; no other is off."""
     rows = {}
-    for method in ("quadratic", "chord"):
+    for method in ("quadratic", "renormalise"):
         chosen = ["--models", "cosquad", "--exponents", "1", "--view", "1", "0.2", "0.3", "--method", method]
         assert main([STRESS, *chosen, "--light", "-0.3", "0.2", "-1"]) == 0
         rows[method] = cells = capsys.readouterr().out.splitlines()[2].strip("| ").split(" | ")
         assert float(cells[4]) <= LARGEST
         assert cells[6] == "0"
-    assert rows["chord"][9] == "0"
-    assert float(rows["chord"][7]) <= LARGEST
+    assert rows["renormalise"][9] == "0"
+    assert float(rows["renormalise"][7]) <= LARGEST
     cells = rows["quadratic"]
     assert float(cells[7]) > LARGEST
     assert 0 < int(cells[9]) < 30
@@ -172,7 +172,7 @@ SMALL = [STRESS, "--width", "64", "--height", "48"]
 
 def test_table(tmp_path, capsys):
     file = tmp_path / "sweep.json"
-    chosen = ["--models", "exp", "cosquad", "--exponents", "1", "1000", "--method", "chord"]
+    chosen = ["--models", "exp", "cosquad", "--exponents", "1", "1000", "--method", "renormalise"]
     assert main([*SMALL, *chosen, "--json", str(file)]) == 0
     rows = [line.split(" | ") for line in capsys.readouterr().out.splitlines()[2:]]
     assert [row[:3] for row in rows] == [["| teapot992", model, "2"] for model in ("exp", "cosquad")]
@@ -203,7 +203,7 @@ def test_true_phong_and_blinn_by_default(capsys):
     assert all(float(row[4]) < 0.6 and row[6] == row[9] == "0" for row in rows)
 
 
-@pytest.mark.parametrize(("method", "model"), [("quotient", "cosquad"), ("chord", "phong")])
+@pytest.mark.parametrize(("method", "model"), [("quotient", "cosquad"), ("renormalise", "phong")])
 def test_a_model_that_the_method_is_not_swept_with(method, model, capsys):
     assert main([STRESS, "--method", method, "--models", model]) == 2
     served = ", ".join(sweep.models_of(method))
@@ -217,7 +217,7 @@ def test_bad_mesh_is_one_line(capsys):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", ["quotient", "chord"])
+@pytest.mark.parametrize("method", ["quotient", "renormalise"])
 @pytest.mark.parametrize("mesh", ["teapot", STRESS], ids=["teapot", "stress"])
 def test_methods_are_within_an_lsb(mesh, method, capsys):
     """Part of what the command sweeps by itself: every model, and an exponent in thirteen."""

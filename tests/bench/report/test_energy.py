@@ -4,7 +4,7 @@
 import pytest
 
 from blysk.bench.report.energy import BLOCKS, DESIGN, EXPONENTS, by_block, measure, section, tasks
-from blysk.bench.report.gate import MODELS
+from blysk.bench.report.gate import METHOD, METHODS, MODELS
 from blysk.bench.report.section import Drawing, Table
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -15,18 +15,21 @@ def test_every_register_of_the_default_is_in_a_block():
     unit = ToggleCounter(ShadingPipelineUnit(preset(*DESIGN)))
     found = by_block(dict.fromkeys(unit.status.shape().members, 1))
     assert set(found) == set(BLOCKS)
-    assert {block for block, count in found.items() if not count} == {"highlight gate", "sums of pixels"}
+    assert {block for block, count in found.items() if not count} == {"highlight gate"}
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_every_register_is_in_a_block(model):
+@pytest.mark.parametrize(
+    ("method", "model"),
+    [*((METHOD, model) for model in MODELS), *((name, MODELS[0]) for name in METHODS if name != METHOD)],
+)
+def test_every_register_is_in_a_block(method, model):
     """Of the real pipeline, with a gate and without; the gate's are those that it has more."""
     found = {}
     for gate in (False, True):
-        unit = ToggleCounter(ShadingPipelineUnit(preset("chord", model, gate=gate)))
+        unit = ToggleCounter(ShadingPipelineUnit(preset(method, model, gate=gate)))
         found[gate] = by_block(dict.fromkeys(unit.status.shape().members, 1))
         assert set(found[gate]) == set(BLOCKS)
-        none = {"quotients of pixels", *["highlight gate"] * (not gate)}
+        none = {"highlight gate"} if not gate else set()
         assert {block for block, count in found[gate].items() if not count} == none
         assert sum(found[gate].values()) == len(unit.status.shape().members)
     assert found[False] | {"highlight gate": found[True]["highlight gate"]} == found[True]
@@ -38,8 +41,8 @@ def test_inner_submodules_count():
         "light_0.specular": 2,
         "light_0.specular.datapath": 4,
         "light_0.diffuse": 8,
-        "interpolator.chord_spans.chord_setup.datapath.reciprocals": 16,
-        "interpolator.chord_spans.chord_accumulator": 32,
+        "interpolator.difference_setup.datapath.reciprocals": 16,
+        "interpolator.difference_accumulator": 32,
         "something": 64,
     }
     found = by_block(toggles)
@@ -48,7 +51,7 @@ def test_inner_submodules_count():
         "specular": 6,
         "diffuse": 8,
         "setup of spans": 16,
-        "sums of pixels": 32,
+        "cosines of pixels": 32,
         "others": 64,
     }
 
@@ -56,7 +59,7 @@ def test_inner_submodules_count():
 @pytest.mark.long
 def test_counts_of_a_small_frame():
     """The pixels are the model's, and every block has something to do."""
-    for design in (("chord", "cosquad", True), (*DESIGN, False)):
+    for design in ((METHOD, "cosquad", True), (*DESIGN, False)):
         [found] = measure(*design, [50], [20, 15, 64], "pysim")
         assert found["same"]
         assert 20 < found["spans"] <= found["pixels"] < found["cycles"]
@@ -65,7 +68,7 @@ def test_counts_of_a_small_frame():
 
 @pytest.mark.long
 def test_the_gate_spares_the_specular_unit():
-    off, on = (measure("chord", "cosquad", gate, [2, 1000], [64, 48, 64], "auto") for gate in (False, True))
+    off, on = (measure(METHOD, "cosquad", gate, [2, 1000], [64, 48, 64], "auto") for gate in (False, True))
     for without, gated in zip(off, on, strict=True):
         assert without["same"]
         assert gated["same"]
@@ -85,7 +88,7 @@ def test_section():
     own, off, on = (
         frame(intensity=100, **{"interpolator.quotient": 60}),
         frame(intensity=300, slope=100),
-        frame(intensity=280, slope=100, **{"interpolator.chord_spans.value_gate": 40}),
+        frame(intensity=280, slope=100, highlight_gate=40),
     )
     made = section(quick, [[own], [off], [on]])
     assert made.name == "energy"
@@ -93,8 +96,8 @@ def test_section():
     assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["energy-blocks"]
     default, first, second = table.records()
     assert (default["method"], default["model"], default["gate"]) == (*DESIGN, "off")
-    assert (default["quotients of pixels, bits a pixel"], default["saved, share"]) == (3, None)
-    assert "switches 8 bits a pixel at exponent 50, one of `chord` 20. Most" in made.text[1]
+    assert (default["cosines of pixels, bits a pixel"], default["saved, share"]) == (3, None)
+    assert "switches 8 bits a pixel at exponent 50, `quadratic` with `cosquad` 20. Most" in made.text[1]
     assert (first["gate"], second["gate"]) == ("off", "on")
     assert (first["intensity, bits a pixel"], first["pipeline, bits a pixel"]) == (15, 20)
     assert second["highlight gate, bits a pixel"] == 2
@@ -109,9 +112,10 @@ def test_tasks():
     full = tasks(quick=False)
     assert [tuple(task.settings[name] for name in ("method", "model", "gate")) for task in full] == [
         (*DESIGN, False),
-        *(("chord", model, gate) for model in MODELS for gate in (False, True)),
+        *((METHOD, model, gate) for model in MODELS for gate in (False, True)),
+        *((method, MODELS[0], gate) for method in METHODS if method != METHOD for gate in (False, True)),
     ]
     assert all(task.settings["exponents"] == list(EXPONENTS) for task in full)
     results = [[frame(top=10), frame(top=20), frame(top=40 - 20 * task.settings["gate"])] for task in full]
     made = section(full, results)
-    assert len(made.parts[0].rows) == (2 * len(MODELS) + 1) * len(EXPONENTS)
+    assert len(made.parts[0].rows) == len(full) * len(EXPONENTS)

@@ -52,7 +52,7 @@ def dark_pixels(design, spans, constants, term):
 @pytest.mark.parametrize(("model", "exponent"), [("cosquad", 20), ("coscos4", 200), ("blinn_product", 50)])
 def test_shares_are_those_of_the_pixels(model, exponent):
     """Counted in pictures of the terms alone, span by span."""
-    design = preset("chord", model)
+    design = preset("quadratic", model)
     spans, constants = frame(design, 1000, exponent, 160, 120)
     dark = dark_pixels(design, spans, constants, "specular")
     behind = dark_pixels(design, spans, constants, "diffuse")
@@ -79,7 +79,7 @@ def test_shares_are_those_of_the_pixels(model, exponent):
 
 
 def test_empty_spans_do_not_count():
-    design = preset("chord", "cosquad")
+    design = preset("quadratic", "cosquad")
     spans, constants = frame(design, 300, 50, 40, 30)
     longer = spans[np.repeat(np.arange(len(spans)), 2)]
     longer.length[1::2] = 0
@@ -90,7 +90,7 @@ def test_empty_spans_do_not_count():
 @pytest.mark.long
 def test_gate_saves_cycles_of_the_compact_style_and_no_pixel_changes():
     """Blinn's power takes 42 cycles a pixel: a gated pixel takes 3, one a channel of its diffuse term."""
-    off, on = (preset("chord", "blinn_product", gate=gate) for gate in (False, True))
+    off, on = (preset("quadratic", "blinn_product", gate=gate) for gate in (False, True))
     spans, constants = frame(off, 300, 200, 10, 8)
     expected = off.compute(spans, constants)
     runs = frames(
@@ -106,7 +106,7 @@ def test_gate_saves_cycles_of_the_compact_style_and_no_pixel_changes():
 
 
 def test_a_pixel_that_differs_is_found():
-    design = preset("chord", "cosquad")
+    design = preset("quadratic", "cosquad")
     pixels = design.compute(*frame(design, 300, 50, 40, 30))
     names = ("x", "y", "r", "g", "b", "last")
     beats = np.zeros(len(pixels.x), [(name, np.int64) for name in names])
@@ -122,7 +122,7 @@ def test_a_pixel_that_differs_is_found():
 
 def test_activity_counts_every_register_once():
     """Powers of two for counts: the names of the real pipeline, each in the sum that it belongs to."""
-    unit = ToggleCounter(ShadingPipelineUnit(preset("chord", "cosquad", gate=True)))
+    unit = ToggleCounter(ShadingPipelineUnit(preset("quadratic", "cosquad", gate=True)))
     paths = list(unit.status.shape().members)
     status = np.zeros((), [(path, object) for path in paths])
     for index, path in enumerate(paths):
@@ -134,9 +134,9 @@ def test_activity_counts_every_register_once():
 
     assert named(found.pipeline) == set(paths)
     assert named(found.specular) == {"light_0.specular", "light_0.specular.datapath"}
-    inside = "interpolator.chord_spans"
-    gate_paths = {f"{inside}.value_gate{part}" for part in ("", ".datapath", ".datapath.thresholds")}
-    assert named(found.gate) == gate_paths | {f"{inside}.decisions", f"{inside}.decisions.storage"}
+    gate_paths = {f"highlight_gate{part}" for part in ("", ".datapath", ".datapath.thresholds")}
+    buffers = {f"{name}{part}" for name in ("decisions", "lengths", "undecided") for part in ("", ".storage")}
+    assert named(found.gate) == gate_paths | buffers
 
 
 SHARES = Shares(100, 1000, 40, 500, 45, 600, 700, 100)
@@ -157,8 +157,9 @@ def counted(monkeypatch):
     """Rows without a simulation; what they were asked for."""
     asked = {}
 
-    def measured(meshes, models, exponents, width, height):
+    def measured(meshes, models, exponents, width, height, method):
         asked.update(models=tuple(models), exponents=tuple(exponents), size=(width, height))
+        asked["method"] = method
         asked["meshes"] = [loaded.name for loaded in meshes]
         for loaded in meshes:
             yield dataclasses.replace(ROW, mesh=loaded.name, identical=asked.get("identical", True))
@@ -171,6 +172,7 @@ def test_tables(counted, capsys):
     assert main([]) == 0
     assert counted["meshes"] == ["teapot"]
     assert (counted["models"], counted["exponents"]) == (gate.MODELS, gate.EXPONENTS)
+    assert counted["method"] == gate.METHOD
     assert counted["size"] == (320, 240)
     lines = capsys.readouterr().out.splitlines()
     rows = [line.strip("| ").split(" | ") for line in lines if line.startswith("| teapot")]
@@ -186,11 +188,11 @@ def test_tables(counted, capsys):
 def test_json(counted, capsys, tmp_path):
     path = tmp_path / "gate.json"
     arguments = ["teapot", "--size", "64x48", "--model", "blinn_product", "--exponent", "7"]
-    arguments += ["--json", str(path)]
+    arguments += ["--json", str(path), "--method", "angular"]
     assert main(arguments) == 0
     assert (counted["models"], counted["exponents"], counted["size"]) == (("blinn_product",), (7,), (64, 48))
     figures = json.loads(path.read_text())
-    assert (figures["width"], figures["height"]) == (64, 48)
+    assert (figures["method"], figures["width"], figures["height"]) == ("angular", 64, 48)
     [row] = figures["frames"]
     assert row["activity"] == [
         {"specular": 10000, "gate": 0, "pipeline": 100000},
@@ -214,6 +216,7 @@ def test_a_frame_that_differs_fails(counted, capsys):
         (["--size", "0x9"], "--size 0x9: out of range"),
         (["--exponent", "1001"], "Invalid value for '--exponent'"),
         (["--model", "phong"], "Invalid value for '--model'"),
+        (["--method", "quotient"], "Invalid value for '--method'"),
         (["--json", "no/such/folder.json"], "no/such/folder.json: "),
     ],
 )

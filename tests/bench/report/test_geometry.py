@@ -18,7 +18,7 @@ from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
-METHODS = "quotient", "chord", "renormalise"
+METHODS = "quotient", "renormalise", "quadratic"
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_cases(cases, method):
 def test_differences_are_found():
     """A colour, a pixel that is missing, and one of another triangle."""
     drawn = next(scene for name, scene in cases_of(True) if "cross" in name)
-    renderer = Renderer(preset("chord", "blinn", x_bits=12, y_bits=12))
+    renderer = Renderer(preset("renormalise", "blinn", x_bits=12, y_bits=12))
     frame = triangle_frame(drawn, renderer)
     y, x = np.argwhere(frame.owner >= 0)[[0, 500, 900]].T
     image, owner = frame.image.copy(), frame.owner.copy()
@@ -101,14 +101,14 @@ def test_section(cases, monkeypatch):
     """Which design takes less time follows from cycles and clock rates."""
     store = [
         {"design": f"render {method}, blinn, 1 light, compact", "device": DEVICE, "fmax_mhz": rates}
-        for method, rates in (("quotient", [90, 100, 120]), ("chord", [100]), ("renormalise", [80]))
+        for method, rates in (("quotient", [90, 100, 120]), ("renormalise", [80]), ("quadratic", [100]))
     ]
     monkeypatch.setattr(geometry, "read_store", lambda: store)
     chosen = tasks(True)
-    results = [_result(10, 4000, 8000), _result(9, 4000, 4000), _result(15, 2000, 8000), *cases.values()]
+    results = [_result(10, 4000, 8000), _result(15, 2000, 8000), _result(9, 4000, 4000), *cases.values()]
     made = section(chosen, results)
-    assert made.text[1].startswith("`chord, compact` takes, of `quotient, compact`, 1.00 of the cycles, ")
-    assert made.text[2] == (
+    assert made.text[2].startswith("`quadratic, compact` takes, of `quotient, compact`, 1.00 of the cycles, ")
+    assert made.text[1] == (
         "`renormalise, compact` takes, of `quotient, compact`, 0.50 of the cycles, 0.62 of the time with 10 "
         "triangles; 1.00 of the cycles, 1.25 of the time with 1,000 triangles (clock rates of 100 and 80 "
         "MHz, medians of 3 and 1 placements), and 5 multipliers more."
@@ -116,11 +116,11 @@ def test_section(cases, monkeypatch):
     assert "0 pixels are covered" in made.text[3]
     assert made.text[3].endswith("More than 1 LSB off: slivers of 1/256 pixel.")
     designs, drawing, extreme = made.parts
-    assert [row[5] for row in designs.rows] == [100, 100, 80]
+    assert [row[5] for row in designs.rows] == [100, 80, 100]
     assert "<svg" in drawing.svg
     errors = extreme.columns.index("error, LSB")
     assert {marks[errors] for marks in extreme.marks} == {"", "stated"}
-    wrong = {"chord": [{**case, "error": 2.0, "sliver": 0} for case in cases["chord"]]}
+    wrong = {"quotient": [{**case, "error": 2.0, "sliver": 0} for case in cases["quotient"]]}
     marks = geometry._case_table(wrong).marks
     assert {row[errors] for row in marks} == {"silent"}
 
@@ -128,7 +128,7 @@ def test_section(cases, monkeypatch):
 @pytest.mark.long
 def test_measure():
     """A frame of simulated hardware, and its errors for each exponent."""
-    found = measure("chord, compact", [64], [64, 48])
+    found = measure("quotient, compact", [64], [64, 48])
     (frame,) = found["frames"]
     assert (found["multipliers"], found["geometry_multipliers"], frame["triangles"]) == (10, 5, 52)
     assert frame["cycles"] > frame["pixels"] >= frame["spans"] > 0

@@ -143,7 +143,7 @@ def test_section():
         "different_pixels": 0,
         "reasons": ["this"],
         "alone": [half],
-        "method": "chord",
+        "method": "quadratic",
         "model": "cosquad",
         "pixels": 7,
     }

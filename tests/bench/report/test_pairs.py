@@ -21,11 +21,11 @@ from blysk.sim.meshes.teapot import teapot
 from ...lists import KINDS
 
 STRESS = str(Path(__file__).parents[2] / "data" / "teapot992.obj")
-ONE = {"methods": ["chord"], "models": ["cosquad"], "width": 48, "height": 36}
+ONE = {"methods": ["renormalise"], "models": ["cosquad"], "width": 48, "height": 36}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", ["quotient", "chord", "chord-local"])
+@pytest.mark.parametrize("method", ["quotient", "renormalise", "chord-local"])
 def test_every_pixel_is_compared(method):
     meshes = [teapot(300), load_mesh(STRESS).mesh]
     pixels = sum(len(rasterise(scene_for(mesh, 1, 48, 36)).span) for mesh in meshes)
@@ -97,13 +97,13 @@ def test_every_pair_of_every_mesh(outcome, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("frame", "text"),
     [
-        ((10, 1), "| chord | exp | 3 | 30 | 3 |"),
-        (SimulationError("stuck\nhere"), "| chord | exp | 0 | 0 | 0 | SimulationError: stuck |"),
+        ((10, 1), "| renormalise | exp | 3 | 30 | 3 |"),
+        (SimulationError("stuck\nhere"), "| renormalise | exp | 0 | 0 | 0 | SimulationError: stuck |"),
     ],
 )
 def test_judged(outcome, capsys, frame, text):
     outcome["frame"] = frame
-    assert main(["teapot", "--methods", "chord", "--models", "exp"]) == 1
+    assert main(["teapot", "--methods", "renormalise", "--models", "exp"]) == 1
     assert text in capsys.readouterr().out.splitlines()
 
 
@@ -125,7 +125,7 @@ def test_what_the_documents_print_runs_as_hardware_too(method):
 @pytest.mark.long
 @pytest.mark.parametrize("method", METHODS)
 def test_every_pixel_is_that_of_the_model(method, capsys):
-    """Of every method with a model of each kind and without, of the chord with every model."""
-    models = MODELS if method == "chord" else [*KINDS, "phong"] if method == "quotient" else KINDS
+    """Of every method with a model of each kind and without, of renormalise with every model."""
+    models = MODELS if method == "renormalise" else [*KINDS, "phong"] if method == "quotient" else KINDS
     assert main(["teapot", STRESS, "--methods", method, "--models", *models, "none"]) == 0
     capsys.readouterr()

@@ -23,8 +23,8 @@ def test_table_of_the_guide_is_the_store():
         GUIDE.read_text(encoding="utf-8"),
         re.MULTILINE,
     )
-    for method, model, chord, *parts, rates in rows:
-        entry = store[f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * bool(chord)}"]
+    for method, model, other, *parts, rates in rows:
+        entry = store[f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * bool(other)}"]
         shown = [int(part.replace(",", "")) for part in parts]
         assert shown == [entry[name] for name in ("luts", "flip_flops", "multipliers", "block_rams")], entry
         assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
@@ -42,20 +42,20 @@ def measured(name, *rates):
 
 
 def test_names():
-    assert design_of("pipeline chord, cosquad, 1 light") == ("chord", "cosquad")
+    assert design_of("pipeline quotient, blinn, 1 light") == ("quotient", "blinn")
     best = "pipeline quadratic, blinn, 1 light, one_minus_cosine"
     assert design_of(best) == ("quadratic", "blinn", "one_minus_cosine")
     for other in (
         "specular",
-        "pipeline chord, cosquad, 2 lights",
-        "pipeline chord, cosquad, 1 light, compact",
+        "pipeline quotient, blinn, 2 lights",
+        "pipeline quotient, blinn, 1 light, compact",
     ):
         assert design_of(other) is None
 
 
 def test_committed_store():
     found = placed(DEVICE)
-    assert ("chord", "blinn") in found
+    assert ("quotient", "blinn") in found
     for method, model, *_ in found:
         assert method in METHODS | PUBLISHED
         assert model in MODELS | LOBES

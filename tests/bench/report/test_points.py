@@ -64,8 +64,8 @@ def measured():
         *design(*SIMULATED, simulated=True),
         *design("linear"),
         *design("angular-published"),
-        *design("chord", "exp"),
-        *design("chord", "blinn"),
+        *design("renormalise", "exp"),
+        *design("renormalise", "blinn"),
         *design("quotient", "phong"),
         Task(hardware, dict(zip(("method", "model"), SIMULATED, strict=True))),
         task(software_frames, shading="gouraud"),
@@ -84,7 +84,7 @@ def found(measured):
 
 def test_every_method_and_model_is_a_design():
     assert {method for method, _ in DESIGNS} == {*METHODS, *PUBLISHED}
-    assert {model for method, model in DESIGNS if method == "chord"} == {"blinn", *MODELS}
+    assert {model for method, model in DESIGNS if method == "renormalise"} == {"blinn", *MODELS}
     assert {model for method, model in DESIGNS if method == "quotient"} == {"blinn", "phong"}
     assert len(set(DESIGNS)) == len(DESIGNS)
     assert set(QUICK_SIMULATED) < set(DESIGNS)
@@ -197,13 +197,13 @@ def test_model_error_is_the_models_own(found):
         blinn = cosine**exponent
         models = {
             "linear/cosquad": np.maximum(1 - exponent / 2 * (1 - cosine), 0) ** 2,
-            "chord/exp": np.exp(-exponent * (1 - cosine)),
+            "renormalise/exp": np.exp(-exponent * (1 - cosine)),
         }
         for name, model in models.items():
             largest = 255 * 0.55 * np.abs(model - blinn).max()
             error = found[f"teapot/{name}/{exponent}"]["errors"]["model_max_lsb"]
             assert 0.9 * largest < error <= largest
-        errors = found[f"teapot/chord/blinn/{exponent}"]["errors"]
+        errors = found[f"teapot/renormalise/blinn/{exponent}"]["errors"]
         assert errors["model_max_lsb"] == 0
         assert errors["model_psnr_db"] is None
 
@@ -335,8 +335,8 @@ def test_section(measured):
         "chord-local, cosquad": "own",
         "linear, cosquad": "baseline",
         "angular-published, cosquad": "published",
-        "chord, exp": "own",
-        "chord, blinn": "own",
+        "renormalise, exp": "baseline",
+        "renormalise, blinn": "baseline",
         "quotient, phong": "own",
         "gouraud, software": "software",
         "phong, software": "software",
@@ -398,7 +398,7 @@ def test_smaller_pictures_keep_the_largest_error():
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "name", ["chord-local/cosquad", "angular-published/cosquad", "chord/blinn", "quotient/phong"]
+    "name", ["chord-local/cosquad", "angular-published/cosquad", "renormalise/blinn", "quotient/phong"]
 )
 def test_command_makes_the_point_again(found, name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -431,7 +431,7 @@ def test_command_of_a_file():
         **PLACE,
         "source": "my mesh.obj",
         "triangles": None,
-        "method": "chord",
+        "method": "renormalise",
         "model": "exp",
         "exponent": 7,
     }

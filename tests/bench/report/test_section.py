@@ -6,9 +6,9 @@ from blysk.bench.report.section import Table
 
 
 def test_records():
-    table = Table("errors", "Errors", ("method", "error, LSB"), (("chord", 0.5), ("linear", None)))
+    table = Table("errors", "Errors", ("method", "error, LSB"), (("quotient", 0.5), ("linear", None)))
     assert table.records() == [
-        {"method": "chord", "error, LSB": 0.5},
+        {"method": "quotient", "error, LSB": 0.5},
         {"method": "linear", "error, LSB": None},
     ]
 

@@ -25,7 +25,6 @@ from blysk.bench.report.stability_errors import (
     GOOD,
     RANGE_EXPONENTS,
     SWEEP,
-    SWEEP_EXPONENT,
     grade_of,
     measure,
     measure_case,
@@ -33,7 +32,6 @@ from blysk.bench.report.stability_errors import (
 )
 from blysk.bench.report.stability_streams import measure_stream
 from blysk.bench.store import Task
-from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import split_pairs
 from blysk.golden.number.unit_vector import quantise
@@ -67,12 +65,8 @@ def test_keeps_what_is_promised(group, method):
         prepared = found["prepared"]
         assert prepared["grade"] in ("good", "fair"), case.name
         assert prepared["flagged"] == 0, case.name
-        # The chord methods count on cut spans alone, and state less than 1 LSB for every exponent, but of the
-        # terminator, where a wide highlight goes out at once; the local one cuts spans there, too. That of
-        # the quotient is exact.
-        if method in ("chord-local", "quotient") or (
-            method == "chord" and not case.name.startswith("terminator")
-        ):
+        # The local chord method states less than 1 LSB for every exponent; the quotient is exact.
+        if method in ("chord-local", "quotient"):
             assert prepared["error"] <= GOOD, case.name
 
 
@@ -84,7 +78,7 @@ def test_quotient_is_given_pairs_as_two():
     pairs = int(np.count_nonzero(raster.length == 2))
     assert pairs > 0
     assert len(split.length) == len(raster.length) + pairs == measure_case(case, "quotient")["spans"]
-    assert measure_case(case, "chord")["spans"] == len(raster.length)
+    assert measure_case(case, "renormalise")["spans"] == len(raster.length)
     assert not np.any(split.length == 2)
     np.testing.assert_array_equal(
         np.sort(split.length[split.length > 2]), np.sort(raster.length[raster.length > 2])
@@ -109,7 +103,7 @@ def test_streams(method):
 
 @pytest.mark.long
 def test_a_stall_in_every_cycle():
-    found = {case["case"]: case for case in measure_stream("chord", quick=False)}
+    found = {case["case"]: case for case in measure_stream("quotient", quick=False)}
     for side in ("input", "output"):
         assert found[f"a single stall of the {side}"]["runs"] > 150
     assert all(case["wrong"] == 0 for case in found.values())
@@ -227,7 +221,7 @@ def test_worst_grade(grades, worst):
 @pytest.mark.parametrize(
     "method",
     [
-        name if name in ("linear", "chord", "quotient") else pytest.param(name, marks=pytest.mark.long)
+        name if name in ("linear", "renormalise", "quotient") else pytest.param(name, marks=pytest.mark.long)
         for name in METHODS
     ],
 )
@@ -240,10 +234,8 @@ def test_ranges(method):
         assert found["none_flagged"] >= 60
         assert found["all_flagged"] > interpolator.MAX_ANGLE
     elif method != "chord-local":
-        # Lit ones over the chord method's limit; a line through 0.
-        last = {"chord": SpanLimit.angle(SWEEP_EXPONENT), "renormalise": 179, "quotient": 179}.get(
-            method, interpolator.MAX_ANGLE
-        )
+        # A line through 0, or the method's widest span.
+        last = {"renormalise": 179, "quotient": 179}.get(method, interpolator.MAX_ANGLE)
         assert found["none_flagged"] == int(last)
         assert found["all_flagged"] == found["none_flagged"] + 1
     assert list(found["widest"]) == [str(exponent) for exponent in RANGE_EXPONENTS]
@@ -254,15 +246,12 @@ def test_ranges(method):
     for of in (inside, *outside):
         assert of["prepared"]["grade"] in ("good", "fair")
         assert of["prepared"]["flagged"] == 0
-    if method == "chord":
-        twice = outside[-1]["given"]
-        assert (twice["grade"], twice["flagged"]) == ("fair", outside[-1]["spans"])
 
 
 @pytest.mark.long
 def test_section():
     """Of a method's own measurements, through JSON as from the cache."""
-    chosen = [task for task in tasks(quick=True) if task.settings["method"] == "chord"]
+    chosen = [task for task in tasks(quick=True) if task.settings["method"] == "quotient"]
     assert [task.function for task in chosen] == [measure, measure_ranges, measure_stream]
     stream = [{"case": "back to back", "runs": 3, "pixels": 20, "wrong": 0}]
     stream.append({"case": "reset", "runs": 2, "pixels": 20, "wrong": None})
@@ -274,12 +263,12 @@ def test_section():
     for name in ("stability", "stability-as-given"):
         assert [row["group"] for row in tables[name].records()] == list(GROUPS)
         stalled = tables[name].records()[STREAM_GROUP - 1]
-        assert stalled["chord"] is None
+        assert stalled["quotient"] is None
         assert tables[name].grades[STREAM_GROUP - 1][-1] == "bad"
     cells = zip(tables["stability"].records(), tables["stability"].grades, strict=True)
     for row, grades in cells:
         if row["group"] not in (5, STREAM_GROUP):
-            assert row["chord"] <= GOOD
+            assert row["quotient"] <= GOOD
             assert grades[-1] == "good"
     # Colours follow the error, marks tell what is stated and what is silent.
     cases_of_method = tables["stability-cases"]
@@ -290,11 +279,11 @@ def test_section():
         if row[column] is not None:
             assert (grades[column] == "good") == (row[column] <= GOOD)
             assert (marks[column] == "") == (row[column] <= GOOD)
-    assert "`chord`" in made.conclusion.sentence
+    assert "`quotient`" in made.conclusion.sentence
     assert "silently wrong in" in made.conclusion.sentence
     assert len(tables["stability-cases"].rows) == sum(len(cases(group)) for group in FROM_SPANS)
     [row] = tables["safe-ranges"].records()
-    assert row["method"] == "chord"
+    assert row["method"] == "quotient"
     assert row["widest span at n = 1, degrees"] == 15
     errors = dict(zip(SWEEP, (of["given"]["error"] for of in results[1]["sweep"]), strict=True))
     up_to = row["error to 1 LSB up to, degrees"]

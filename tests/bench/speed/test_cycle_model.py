@@ -30,7 +30,7 @@ def test_recurrence(count, waiting):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "share"),
-    [("linear", 0), ("renormalise", 0), ("quadratic", 0), ("chord", 0.03), ("quotient", 0)],
+    [("linear", 0), ("renormalise", 0), ("quadratic", 0), ("chord-local", 0.03), ("quotient", 0)],
 )
 def test_frames(method, share):
     simulated, modelled = compare(preset(method, model_of(method)), 400, (64, 48))

@@ -86,7 +86,7 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
     def measured(unit, beats, **others):
         gate = unit.gate
         assert others["baseline"] is not gate
-        assert (unit.method, unit.model) == (("chord", "cosquad") if gate else ("quotient", "blinn"))
+        assert (unit.method, unit.model) == (("quadratic", "cosquad") if gate else ("quotient", "blinn"))
         if gate:
             assert len(others["expected"]["r"]) == beats["length"].sum()
             return Speed(6e6, 2000.0, 6e6, 2000.0, build=4.5, cycles=9000)
@@ -109,7 +109,7 @@ def test_targets(monkeypatch, capsys, cxxrtl, pysim, verilator, seconds, missed)
     assert lines[2].split() == ["cxxrtl", f"{cxxrtl:,.0f}", "1.00x"]
     assert lines[3].split() == ["verilator", f"{verilator:,.0f}", f"{cxxrtl / verilator:,.2f}x"]
     assert lines[4].split() == ["pysim", f"{pysim:,.0f}", f"{cxxrtl / pysim:,.2f}x"]
-    assert lines[5].split() == ["cxxrtl,", "chord", "6,000,000", f"{cxxrtl / 6e6:,.2f}x"]
+    assert lines[5].split() == ["cxxrtl,", "gate", "6,000,000", f"{cxxrtl / 6e6:,.2f}x"]
     assert f" {seconds[0]:.2f} s by the clock, {seconds[1]:.2f} s of the processor" in lines[7]
     assert lines[-1] == ("every target met" if missed is None else f"missed: {missed}")
 

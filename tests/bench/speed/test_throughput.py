@@ -61,7 +61,7 @@ def test_no_spans_take_no_clock():
 
 def test_lengths():
     length = [1, 1, 2, 3, 4, 7, 8, 15, 16, 31, 32, 4095]
-    row = Lengths.of(5, "chord", np.array(length))
+    row = Lengths.of(5, "renormalise", np.array(length))
     assert (row.spans, row.pixels) == (12, sum(length))
     members = [[1, 1], [2], [3], [4, 7], [8, 15], [16, 31], [32, 4095]]
     assert len(members) == len(BINS)
@@ -70,7 +70,7 @@ def test_lengths():
 
 
 def test_lengths_of_nothing():
-    row = Lengths.of(5, "chord", np.array([], dtype=int))
+    row = Lengths.of(5, "renormalise", np.array([], dtype=int))
     assert (row.spans, row.pixels, row.span_share) == (0, 0, (0.0,) * len(BINS))
 
 
@@ -79,19 +79,19 @@ def test_spans_hold_the_frame():
     scene = scene_for(teapot(1000), 1000, 160, 120)
     pixels = len(rasterise(scene).span)
     count = {}
-    for method in ("chord", "quadratic"):
+    for method in ("renormalise", "quadratic"):
         found = spans_of(scene, method)
         assert found.length.sum() == pixels
         count[method] = len(found)
-    assert count["chord"] < count["quadratic"]
+    assert count["renormalise"] < count["quadratic"]
 
 
 def test_figures():
-    row = Throughput(1000, "chord", 4, pixels=900, cycles=1000, long_pixels=800, long_cycles=820)
+    row = Throughput(1000, "renormalise", 4, pixels=900, cycles=1000, long_pixels=800, long_cycles=820)
     assert row.cycles_per_pixel == pytest.approx(10 / 9)
     assert row.setup_share == pytest.approx(0.1)
     assert row.long_cycles_per_pixel == pytest.approx(1.025)
-    none = Throughput(1000, "chord", 4, pixels=0, cycles=1, long_pixels=0, long_cycles=0)
+    none = Throughput(1000, "renormalise", 4, pixels=0, cycles=1, long_pixels=0, long_cycles=0)
     assert math.isnan(none.cycles_per_pixel)
     assert none.long_cycles_per_pixel is None
 
@@ -120,15 +120,15 @@ def test_tables(counted, capsys):
     assert table[0][4:] == ["1", "2", "3", "4-7", "8-15", "16-31", "32+ |"]
     assert [cells[1:3] for cells in table[5:]] == [
         ["quotient", "-"],
-        ["chord", "3"],
-        ["chord", "9"],
+        ["renormalise", "3"],
+        ["renormalise", "9"],
         ["quadratic", "3"],
     ]
     assert all(cells[4] == "1.040" for cells in table[5:])
 
 
 def test_json(counted, capsys):
-    assert main([*SMALL, "--json", "--methods", "chord"]) == 0
+    assert main([*SMALL, "--json", "--methods", "renormalise"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert [row["setup_interval"] for row in figures["cycles"]] == [3, 9]
     assert sum(figures["lengths"][0]["span_share"]) == pytest.approx(1)
@@ -138,5 +138,5 @@ def test_json(counted, capsys):
 
 def test_target(counted, capsys):
     counted["cycles"] = 1.06
-    assert main([*SMALL, "--methods", "chord"]) == 1
+    assert main([*SMALL, "--methods", "renormalise"]) == 1
     assert capsys.readouterr().err.count("cycles a pixel, spans of 16+: chord, setup interval") == 2

@@ -12,7 +12,7 @@ from blysk.sim.installation import install_package
 def site(tmp_path):
     """Files by which a site is known, with nothing in them."""
     (tmp_path / "modules").mkdir()
-    for name in ("index.html", "modules/chord-exp.js", "modules/linear-exp.js"):
+    for name in ("index.html", "modules/angular-exp.js", "modules/linear-exp.js"):
         (tmp_path / name).write_text("")
     return tmp_path
 
@@ -27,8 +27,8 @@ def test_help(capsys):
     [
         (["{0}/site"], "{0}/site: is no site; make one with `blysk web -o FOLDER`"),
         (
-            ["{0}", "chord-exp", "chord-exq"],
-            "chord-exq: is no module of {0}; choose from chord-exp, linear-exp",
+            ["{0}", "angular-exp", "angular-exq"],
+            "angular-exq: is no module of {0}; choose from angular-exp, linear-exp",
         ),
         (["{0}"], f"browser: playwright is not installed; {install_package('playwright')}"),
     ],

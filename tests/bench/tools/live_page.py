@@ -22,8 +22,8 @@ def has_compiler():
 
 WIDTHS = {"desktop": (1280, 800), "phone": (375, 740)}
 
-DESIGNS = [("quotient", "blinn"), ("quotient", "phong"), ("chord", "cosquad"), ("chord", "exp")]
-DESIGNS += [("linear", "cosquad"), ("chord", "ggx")]
+DESIGNS = [("quotient", "blinn"), ("quotient", "phong"), ("quadratic", "cosquad"), ("renormalise", "exp")]
+DESIGNS += [("linear", "cosquad"), ("renormalise", "ggx")]
 
 VIEWS = {"teapot": 2, "square": 1}
 

@@ -10,6 +10,7 @@ import pytest
 from amaranth.hdl import UnusedElaboratable
 from click.testing import CliRunner
 
+from blysk.bench.accuracy import model_of
 from blysk.bench.quality import baselines
 from blysk.bench.tools import design_space, explore
 from blysk.bench.tools.design_space import (
@@ -48,7 +49,9 @@ def view(width=40, height=30):
 
 
 def test_candidates_are_the_pipelines_that_they_name():
-    assert Candidate("chord", fraction_bits=40).design == preset("chord", "cosquad", fraction_bits=40)
+    assert Candidate("chord-local", fraction_bits=40).design == preset(
+        "chord-local", "cosquad", fraction_bits=40
+    )
     assert Candidate("linear", "exp", 2, "one_minus_cosine").design == preset(
         "linear", "exp", 2, operand="one_minus_cosine"
     )
@@ -68,13 +71,13 @@ def test_another_degree_keeps_the_operand():
     [
         {"method": "linear", "degree": 2},
         {"method": "quadratic", "degree": 1},
-        {"method": "chord", "degree": 3},
+        {"method": "chord-local", "degree": 3},
         {"method": "linear", "fraction_bits": 46},
-        {"method": "chord", "fraction_bits": 41},
+        {"method": "chord-local", "fraction_bits": 41},
         {"method": "angular", "operand": "cosine"},
         {"method": "quadratic-published", "degree": 3},
         {"method": "quotient", "model": "cosquad"},
-        {"method": "chord", "model": "phong"},
+        {"method": "renormalise", "model": "phong"},
     ],
 )
 def test_impossible_candidates_are_refused(values):
@@ -84,17 +87,17 @@ def test_impossible_candidates_are_refused(values):
 
 def test_quotient_is_swept_with_its_lobes():
     """Its operand is its own, and it has no choice of words or degrees."""
-    found, impossible = Sweep(methods=("quotient", "chord")).candidates()
+    found, impossible = Sweep(methods=("quotient", "renormalise")).candidates()
     quotients = [(one.model, one.style) for one in found if one.method == "quotient"]
     assert quotients == [(model, style) for model in ("blinn", "phong") for style in STYLES]
     assert impossible["quotient: has tables of lobes, and no circuits of other models"] == 3 * len(STYLES)
-    assert any(reason.startswith("chord: phong is a lobe of R·V") for reason in impossible)
+    assert any(reason.startswith("renormalise: phong is a lobe of R·V") for reason in impossible)
 
 
 def test_sweep_has_every_design_once_and_counts_the_impossible():
-    """Against a count by hand: chord and angular find no normals; the middle normal has no degree 1."""
+    """Against a count by hand: chord-local and angular find no normals; the middle normal has no degree 1."""
     sweep = Sweep(
-        methods=("linear", "angular", "chord", "quadratic"),
+        methods=("linear", "angular", "chord-local", "quadratic"),
         models=("cosquad", "exp"),
         lights=(1, 3),
         degrees=(1, 2),
@@ -104,7 +107,7 @@ def test_sweep_has_every_design_once_and_counts_the_impossible():
     found, impossible = sweep.candidates()
     assert len(set(found)) == len(found) == 4 * (2 + 1 + 3 + 2)
     assert impossible == {
-        "angular, chord: finds no normals, so it has one operand": 4 * (1 + 3),
+        "angular, chord-local: finds no normals, so it has one operand": 4 * (1 + 3),
         "quadratic: has no polynomial of degree 1": 4 * 2,
     }
     assert {one.style for one in found} == {"compact"}
@@ -125,8 +128,8 @@ def test_every_method_is_in_the_default_sweep():
         (Candidate("linear"), True),
         (Candidate("quotient", "phong"), True),
         (Candidate("quadratic", "exp", 2, "one_minus_cosine", 3, style="compact"), True),
-        (Candidate("chord", fraction_bits=46), True),
-        (Candidate("chord", "cosquad7", 2, None, None, 40, "compact"), False),
+        (Candidate("chord-local", fraction_bits=46), True),
+        (Candidate("chord-local", "cosquad7", 2, None, None, 40, "compact"), False),
         (Candidate("quadratic", operand="one_minus_cosine", degree=2), False),
         (Candidate("bisection", degree=1), False),
         (Candidate("recurrence-direct"), False),
@@ -161,10 +164,10 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
 
 @pytest.mark.long
 def test_errors_are_those_of_the_simulated_frame():
-    candidate = Candidate("chord", fraction_bits=38)
+    candidate = Candidate("chord-local", fraction_bits=38)
     (scene,) = explore.scenes_of(view(16, 12), [EXPONENT])
     frame = FrameSimulator(candidate.design, "pysim").render(scene)
-    result = errors_of({"method": "chord", "fraction_bits": 38}, view(16, 12), EXPONENT)
+    result = errors_of({"method": "chord-local", "fraction_bits": 38}, view(16, 12), EXPONENT)
     expected = compare(scene, candidate.design, frame)
     for name in ERRORS:
         figures = getattr(expected, f"{name}_error")
@@ -256,8 +259,8 @@ def test_front_by_brute_force():
 
 def test_front_without_designs_that_are_given_values():
     """As if these were not there."""
-    methods = ("linear", "renormalise", "quadratic", "angular", "chord", "chord-local")
-    designs = records(candidates=[Candidate(method) for method in methods] * 10)
+    methods = ("linear", "renormalise", "quadratic", "angular", "quotient", "chord-local")
+    designs = records(candidates=[Candidate(method, model_of(method)) for method in methods] * 10)
     chosen = front_of(designs, "total", "multipliers", given_values=False)
     others = [k for k, one in enumerate(designs) if one.candidate.method != "chord-local"]
     assert len(others) == 50

@@ -40,7 +40,7 @@ def run(*arguments):
 def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
     """The listed ones against brute force over all; the second run measures nothing."""
     path = tmp_path / "designs.json"
-    options = ("--methods", "linear,chord", "--models", "cosquad", "--degrees", "2")
+    options = ("--methods", "linear,renormalise", "--models", "cosquad", "--degrees", "2")
     options += ("--operands", "one_minus_cosine", "--fraction-bits", "46", "--json", path)
     options += ("--largest-error", "1.5", "--limit", "3")
     result = run(*options)
@@ -91,22 +91,22 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
     monkeypatch.setattr(Candidate, "unit", unit)
     costs = SimpleNamespace(totals=dict.fromkeys(COSTS.values(), 1))
     monkeypatch.setattr(design_space, "cost_of", lambda unit: costs)
-    options = ("--methods", "linear,renormalise,chord", "--models", "cosquad", "--degrees", "3")
+    options = ("--methods", "linear,renormalise,angular", "--models", "cosquad", "--degrees", "3")
     options += ("--fraction-bits", "46", "--styles", "throughput", "--operands", "one_minus_cosine")
     stopped = run(*options)
     assert stopped.exit_code == 130
     assert stopped.output == "blysk: stopped; 4 of 6 measurements are kept, run again to go on\n"
     resumed = run(*options)
     assert resumed.exit_code == 0
-    assert calls == ["linear", "renormalise", "chord", "chord"]
+    assert calls == ["linear", "renormalise", "angular", "angular"]
 
 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
         (
-            ["--methods", "chord,gouraud"],
-            "--methods chord,gouraud: 'gouraud' is none of the choices; use some of ",
+            ["--methods", "angular,gouraud"],
+            "--methods angular,gouraud: 'gouraud' is none of the choices; use some of ",
         ),
         (["--models", ""], "--models : '' is none of the choices"),
         (["--lights", "0"], "--lights 0: '0' is none of the choices; use some of 1,2,"),
@@ -125,8 +125,8 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
         (["--cluster", "nowhere"], "--cluster nowhere: not the address of a Dask scheduler"),
         (["--json", "missing/folder.json"], "missing/folder.json: cannot be written"),
         (
-            ["--methods", "chord", "--operands", "cosine"],
-            "the sweep: holds no possible design, 20 of chord: finds no normals",
+            ["--methods", "angular", "--operands", "cosine"],
+            "the sweep: holds no possible design, 10 of angular: finds no normals",
         ),
     ],
 )
@@ -170,15 +170,15 @@ def test_what_is_given_is_told(monkeypatch):
     made_up(monkeypatch)
     told = "chord-local is given values of each light with a span; to work them out is not in its cost\n"
     assert told in run("--methods", "chord-local").output
-    assert told not in run("--methods", "chord").output
+    assert told not in run("--methods", "angular").output
 
 
 def test_impossible_ones_are_told(monkeypatch):
     made_up(monkeypatch)
-    output = run("--methods", "chord,quadratic", "--models", "exp", "--styles", "compact").output
-    # chord without a dot product: 2 words; quadratic without degree 1: 2 operands.
+    output = run("--methods", "chord-local,quadratic", "--models", "exp", "--styles", "compact").output
+    # chord-local without a dot product: 2 words; quadratic without degree 1: 2 operands.
     assert output.startswith(
-        "impossible  4 combinations: 2 of chord: finds no normals, so it has one operand; "
+        "impossible  4 combinations: 2 of chord-local: finds no normals, so it has one operand; "
         "2 of quadratic: has no polynomial of degree 1\n"
     )
 
@@ -226,7 +226,9 @@ def test_section_of_real_results():
     drawing, table = made.parts
     assert ET.fromstring(drawing.svg).tag.endswith("svg")
     rows = table.records()
-    others = [(m, n) for m in ("linear", "renormalise", "chord", "chord-local") for n in ("blinn", "cosquad")]
+    others = [
+        (m, n) for m in ("linear", "renormalise", "quadratic", "chord-local") for n in ("blinn", "cosquad")
+    ]
     assert [(row["method"], row["model"]) for row in rows] == [
         *(("quotient", "blinn"), ("quotient", "phong"), *others)
     ]

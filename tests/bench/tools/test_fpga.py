@@ -161,11 +161,11 @@ def test_designs():
     assert names(fpga._units(gates)) == gates
     forms = names(fpga._units(["quadratic_evaluator"]))
     assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
-    full = {"method": "chord", "style": "compact", "setup_interval": 9, "gate": True}
-    whole = "pipeline chord, blinn, 2 lights, compact, interval 9, gate"
+    full = {"method": "quadratic", "style": "compact", "setup_interval": 7, "gate": True}
+    whole = "pipeline quadratic, blinn, 2 lights, compact, interval 7, gate"
     assert names(fpga._pipelines(full, 2, False)) == [whole]
     assert names(fpga._pipelines({}, 1, False)) == ["pipeline quotient, blinn, 1 light"]
-    assert names(fpga._pipelines({"model": "exp"}, 1, False)) == ["pipeline chord, exp, 1 light"]
+    assert names(fpga._pipelines({"model": "exp"}, 1, False)) == ["pipeline renormalise, exp, 1 light"]
     assert names(fpga._pipelines({}, 1, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
 
 
@@ -183,14 +183,14 @@ def test_designs():
         (["--seeds", "0"], "--seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "--jobs no: not a whole number; give"),
         (["--unit", "fuse"], "--unit fuse: unknown unit; use gradient_setup, halfway_vector, "),
-        (["--unit", "gpq", "--method", "chord"], "--method: is for the pipeline; leave it out, or"),
+        (["--unit", "gpq", "--method", "renormalise"], "--method: is for the pipeline; leave it out, or"),
         (["--unit", "gpq", "--every-method"], "--every-method: is for the pipeline; leave it out"),
-        (["--method", "chord", "--every-method"], "--method: is one of every method; leave it out"),
+        (["--method", "renormalise", "--every-method"], "--method: is one of every method; leave it out"),
         (["--family", "ice40"], "--family ice40: unknown family; use one of ecp5, nexus"),
         (["--method", "none"], "--method none: unknown method; use one of"),
         (
-            ["--method", "chord", "--model", "phong"],
-            "--model phong: method chord finds N.H, not R.V; use method quotient; or phong_coplanar",
+            ["--method", "renormalise", "--model", "phong"],
+            "--model phong: method renormalise finds N.H, not R.V; use method quotient; or phong_coplanar",
         ),
         (["--json", "nowhere/x"], "nowhere/x: cannot be written, there is no folder nowhere; make"),
     ],
@@ -216,7 +216,7 @@ def test_interrupt_leaves_nothing_behind(cache, tmp_path):
     folder = tmp_path / "temporary"
     folder.mkdir()
     process = subprocess.Popen(
-        [*PROGRAM, "fpga", "--method", "chord"],
+        [*PROGRAM, "fpga", "--method", "renormalise"],
         env={**os.environ, "TMPDIR": str(folder)},
         stderr=subprocess.PIPE,
         text=True,

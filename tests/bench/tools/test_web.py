@@ -27,7 +27,7 @@ from ..reader import Reader
 
 pytest.importorskip("ziglang", reason="ziglang is not installed")
 
-DESIGNS = [("quotient", "blinn"), ("chord", "cosquad"), ("linear", "exp")]
+DESIGNS = [("quotient", "blinn"), ("quadratic", "cosquad"), ("linear", "exp")]
 
 
 def unpacked(data):
@@ -54,14 +54,14 @@ def unpacked(data):
 @pytest.mark.parametrize("mesh", web_data.MESHES)
 def test_spans_as_they_are_sent(mesh):
     scene = web_data.scene_of(web_data.START | {"mesh": mesh, "view": web_data.MESHES[mesh].views - 1})
-    frame = prepare(scene, preset("chord", "cosquad"))
+    frame = prepare(scene, preset("quadratic", "cosquad"))
     ratio = frame.cut_raster.magnitude_right / frame.cut_raster.magnitude_left
     codes, visible = unpacked(web_data.encode(frame.spans, frame.cut_raster.visible, ratio))
     np.testing.assert_allclose(2 ** (codes["ratio"] / 2**19), ratio, rtol=2**-19)
     for name in ("x", "y", "length"):
         np.testing.assert_array_equal(codes[name], getattr(frame.spans, name))
     for c in range(3):
-        for place in ("left", "middle", "right"):
+        for place in ("left", "right"):
             normal = getattr(frame.spans, f"normal_{place}")
             np.testing.assert_array_equal(codes[f"normal_{place}.{c}"], normal[:, c])
     np.testing.assert_array_equal(visible, frame.cut_raster.visible)
@@ -83,7 +83,7 @@ def test_extreme_codes_are_kept():
 
 
 def test_streams_of_a_view():
-    methods = ["chord", "linear", "quadratic", "angular", "quotient"]
+    methods = ["linear", "quadratic", "angular", "quotient"]
     found = web_data.streams_of("teapot", 0, methods)
     assert json.loads(json.dumps(found)) == found
     axes = np.array(found["axes"])
@@ -104,14 +104,10 @@ def test_streams_of_a_view():
     np.testing.assert_allclose(np.maximum(*lengths), (1 << 22) - 1, atol=2)
     assert np.minimum(*lengths).min() < 0.999 * (1 << 22)
     for k, exponent in enumerate(web_data.BANDS):
-        design = preset("chord", "cosquad")
+        design = preset("quadratic", "cosquad")
         frame = prepare(web_data.scene_of(web_data.START | {"exponent": exponent}), design)
         _, spans = web_data.spans_of("teapot", 0, exponent, design)
-        # Those of the frame, cut further where another light may have its highlight.
-        assert counts["chord"][k] == len(spans) >= len(frame.spans)
-        codes = spans.normal_left, spans.normal_right
-        chord = np.linalg.norm(np.subtract(*codes), axis=1) / ((1 << 17) - 1)
-        assert np.degrees(2 * np.arcsin(chord / 2)).max() < design.span_limit.angle(exponent) + 1e-3
+        assert counts["quadratic"][k] == len(spans) == len(frame.spans)
 
 
 def test_addresses_are_those_of_the_write_port():
@@ -180,7 +176,7 @@ def test_every_block_has_a_stage(script, probes, monkeypatch):
         return b""
 
     monkeypatch.setattr(web_data, "build", uncompiled)
-    stages = {stage["name"] for stage in web_data.module_of("chord", "cosquad")["stages"]}
+    stages = {stage["name"] for stage in web_data.module_of("quadratic", "cosquad")["stages"]}
     (braces,) = re.findall(r"const stageOf = (\{.*?\})", script)
     stage_of = dict(re.findall(r'(\w+): "(\w+)"', braces))
     assert list(stage_of) == names_in(braces)
@@ -200,7 +196,7 @@ def work():
 @pytest.fixture(scope="module")
 def results(work):
     module = {"wasm": "eJw=", "bytes": 65_432, "ports": {}, "probes": [{"exact": "</script>"}], "stages": []}
-    streams = {"quotient": [0, 0], "chord": [0, 1], "linear": [0, 0]}
+    streams = {"quotient": [0, 0], "quadratic": [0, 1], "linear": [0, 0]}
     view = {"axes": np.eye(3).tolist(), "streams": streams, "data": ["a", "b"]}
     return [module if task.function is web_data.module_of else view for task in work]
 
@@ -216,14 +212,16 @@ def test_files_of_the_site(site):
     mark = json.loads((site / "site.json").read_text())
     there = sorted(path.relative_to(site).as_posix() for path in site.rglob("*") if path.is_file())
     assert there == sorted([*mark["files"], "site.json"])
-    assert {"index.html", "modules/chord-cosquad.js", "models/blinn.js", "spans/square-1-1.js"} <= set(there)
+    assert {"index.html", "modules/quadratic-cosquad.js", "models/blinn.js", "spans/square-1-1.js"} <= set(
+        there
+    )
     page = Reader((site / "index.html").read_text())
     assert len(page.ids) == len(set(page.ids))
     text = " ".join((site / "index.html").read_text().split())
     *lower, highest = web_data.BANDS
     assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
     data = json.loads(page.texts["site"])
-    assert list(data["designs"]) == ["quotient-blinn", "chord-cosquad", "linear-exp"]
+    assert list(data["designs"]) == ["quotient-blinn", "quadratic-cosquad", "linear-exp"]
     assert data["start"] == web_data.START
     assert data["mirrored"] == ["phong"]
     assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2]
@@ -232,8 +230,8 @@ def test_files_of_the_site(site):
             for names in view["streams"].values():
                 assert len(names) == len(web_data.BANDS)
                 assert all((site / "spans" / f"{name}.js").is_file() for name in names)
-    script = (site / "modules" / "chord-cosquad.js").read_text()
-    assert script.startswith('blysk.given("chord-cosquad",{')
+    script = (site / "modules" / "quadratic-cosquad.js").read_text()
+    assert script.startswith('blysk.given("quadratic-cosquad",{')
     assert "</script>" not in script
 
 
@@ -400,14 +398,14 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["--design", "chord"], "--design chord: unknown model; use one of"),
+        (["--design", "angular"], "--design angular: unknown model; use one of"),
         (
             ["--design", "chord-local/exp"],
             f"--design chord-local/exp: unknown method; use one of {next(iter(METHODS))}",
         ),
         (
-            ["--design", "chord/phong"],
-            f"--design chord/phong: unknown model; use one of {next(iter(MODELS))}",
+            ["--design", "angular/phong"],
+            f"--design angular/phong: unknown model; use one of {next(iter(MODELS))}",
         ),
         (
             ["--design", "quotient/cosquad"],

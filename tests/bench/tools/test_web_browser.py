@@ -11,10 +11,9 @@ from blysk.bench.store import results_of
 from blysk.bench.tools import web, web_data
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.number.unit_vector import ONE
-from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.golden.reference.renderer import render, shade_operands, shade_spans, visible_mask
+from blysk.golden.reference.renderer import render, shade_spans, visible_mask
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.probes import ObservedPipeline
 
@@ -71,7 +70,7 @@ def test_true_phong_follows_the_light(open_page):
 
 def test_a_gate_is_counted(open_page):
     page = open_page()
-    use(page, "chord", "cosquad")
+    use(page, "quadratic", "cosquad")
     state = state_of(page)
     image, run = natively(state)
     assert digest(picture_of(page)) == digest(image)
@@ -118,7 +117,7 @@ def test_drag_moves_the_light(open_page):
     settle(page)
     state = state_of(page)
     assert not page.locator("#inside").is_visible()
-    axes = web_data.streams_of("teapot", 0, ["chord"])["axes"]
+    axes = web_data.streams_of("teapot", 0, ["quotient"])["axes"]
     right, up, towards = np.array(axes) @ state["direction"]
     assert right > 0.4
     assert up > 0.2
@@ -137,7 +136,7 @@ def test_every_control_changes_the_frame(open_page):
         *(
             ("exponent", 100),
             ("model", "phong"),
-            ("method", "chord"),
+            ("method", "renormalise"),
             ("ambient", 0.3),
             ("diffuse", 0.5),
             ("specular", 0.9),
@@ -167,7 +166,7 @@ def test_every_control_changes_the_frame(open_page):
 def test_constants_are_those_of_python(open_page):
     """Quantised vectors, colours and the words of the write port, to the bit."""
     page = open_page()
-    use(page, "chord", "cosquad")
+    use(page, "quadratic", "cosquad")
     rng = np.random.default_rng(8)
     vectors = [*np.eye(3), *-np.eye(3), *rng.normal(size=(60, 3)), *rng.normal(size=(20, 3)) * 1e-3]
     states = []
@@ -201,9 +200,9 @@ def test_constants_are_those_of_python(open_page):
         }
         return found;
     }"""
-    kept = {"method": "chord", "model": "cosquad", "reference": "method"}
+    kept = {"method": "quadratic", "model": "cosquad", "reference": "method"}
     found = page.evaluate(script, [json.loads(json.dumps(state | kept, default=float)) for state in states])
-    shape = ObservedPipeline(web_data.design_of("chord", "cosquad")).write.payload.shape()
+    shape = ObservedPipeline(web_data.design_of("quadratic", "cosquad")).write.payload.shape()
     for state, of_page in zip(states, found, strict=True):
         expected = FrameConstants.of(web_data.scene_of(state), 1)
         for name, codes in of_page["constants"].items():
@@ -212,23 +211,12 @@ def test_constants_are_those_of_python(open_page):
     assert not np.any(found[-1]["constants"]["halfway"])
 
 
-def by_three_normals(scene, raster, middle, model):
-    """Picture of the quadratics of N·L and N·H through those of three normals of each span."""
-    span = raster.span
-    t = (raster.offset / np.maximum(raster.length[span] - 1, 1))[:, np.newaxis]
-    left, middle, right = (normals[span] for normals in (raster.normal_left, middle, raster.normal_right))
-    curve = left + t * (4 * middle - 3 * left - right + 2 * t * (left + right - 2 * middle))
-    direction = np.array([light.direction for light in scene.lights])
-    halfway = halfway_vector(direction, scene.camera.viewer)
-    return shade_operands(scene, raster, curve @ direction.T, curve @ halfway.T, model)
-
-
 @pytest.mark.parametrize("reference", web_data.REFERENCES)
 def test_reference_is_that_of_golden(open_page, reference):
     page = open_page()
     for method, model, exponent in (
-        ("chord", "cosquad", 60),
-        ("chord", "exp", 300),
+        ("quadratic", "cosquad", 60),
+        ("renormalise", "exp", 300),
         ("linear", "cosquad", 9),
         ("quotient", "blinn", 80),
         ("quotient", "phong", 15),
@@ -252,8 +240,6 @@ def test_reference_is_that_of_golden(open_page, reference):
         reflection = REFLECTION_MODELS[(model != "phong" and entry["model"]) or model]
         if entry["curve"] == "exact":
             golden = render(scene, "phong", reflection, raster=raster).image
-        elif method == "chord":
-            golden = by_three_normals(scene, raster, frame.spans.normal_middle / ONE, reflection)
         else:
             golden = shade_spans(scene, raster, design.interpolator.exact_normals, reflection)
         mask = visible_mask(scene, raster)

@@ -70,8 +70,8 @@ def traced(page, component):
 
 WATCHED = {
     ("quotient", "blinn"): ("cosine", "highlight", "diffuse", "specular", "r"),
-    ("chord", "cosquad"): (
-        *("diffuse_0_sum", "highlight_0_step", "cosine", "highlight"),
+    ("quadratic", "cosquad"): (
+        *("normal_0_sum", "normal_0_step", "cosine", "highlight"),
         *("gated", "base", "square", "r"),
     ),
 }
@@ -106,7 +106,7 @@ def test_waveform_is_that_of_pysim(open_page, design):
 def test_exact_values_are_near(open_page):
     """On every clock, each word that belongs to a pixel is what its exact value says, to some steps."""
     page = open_page()
-    designs = ("quotient", "blinn"), ("quotient", "phong"), ("chord", "cosquad"), ("chord", "exp")
+    designs = ("quotient", "blinn"), ("quotient", "phong"), ("quadratic", "cosquad"), ("renormalise", "exp")
     for method, model in (*designs, ("linear", "cosquad")):
         use(page, method, model)
         looked_at(page)
@@ -123,7 +123,7 @@ def test_exact_values_are_near(open_page):
         }"""
         found = page.evaluate(script)
         names = {name for name, *_ in found}
-        sums = {"chord": "highlight_0_sum", "linear": "normal_2_sum"}.get(method, "cosine")
+        sums = {"quadratic": "normal_2_sum", "linear": "normal_2_sum"}.get(method, "cosine")
         lights = {"cosine", "diffuse", "specular"}
         lights |= {"highlight", "argument", "product"} if method != "quotient" else set()
         assert lights | {"red", "r", sums} <= names
@@ -396,7 +396,7 @@ def test_missing_file_is_told(open_page, live_site):
         page = open_page(waits=True)
         # The browser says so on its console, too.
         open_page.allowed = "ERR_FILE_NOT_FOUND"
-        page.locator("#method").select_option("chord")
+        page.locator("#method").select_option("renormalise")
         page.locator("#model").select_option("exp")
         page.wait_for_selector("#failure:not([hidden])")
         assert "models/exp.js is missing" in page.locator("#failure").inner_text()
