@@ -96,7 +96,7 @@ def _lit() -> str:
         scene = scene_for(teapot(10_000), exponent, 320, 240)
         row = [str(exponent)]
         for name in ("cosquad", "blinn_product"):
-            design = preset("chord", name, gate=True)
+            design = preset("quadratic", name, gate=True)
             spans = prepare(scene, design).spans
             lit = design.lit_spans(spans, FrameConstants.of(scene))
             row.append(f"{lit.mean():.1%}")
@@ -214,9 +214,10 @@ def _sharp_lobes() -> str:
         camera = Camera.framing(mesh.vertices, (0.2, 0.3, 1), "orthographic", 4 / 3)
         for roughness in _SHARP:
             material = Material((0.05,) * 3, (0.4, 0.3, 0.2), (0.55, 0.5, 0.6), 50, roughness)
-            scaled = [preset(method, "ggx").for_materials([material]) for method in ("chord", "chord-local")]
+            plain = preset("chord-local", "ggx")
+            scaled = plain.for_materials([material])
             cells = []
-            for design in (preset("chord", "ggx"), *scaled):
+            for design in (plain, scaled):
                 errors, pieces = [], []
                 for light in towards:
                     scene = Scene(mesh, camera, 160, 120, material, (Light(tuple(light)),))
@@ -224,10 +225,10 @@ def _sharp_lobes() -> str:
                     errors.append(compare_image(scene, design, frame.image).method_error.max_lsb)
                     pieces.append(frame.spans / len(frame.raster.length))
                 cells.append(f"{max(errors):.2f}, {np.mean(pieces):.2f}")
-            scale = cast(Lobe, scaled[0].specular).scale
+            scale = cast(Lobe, scaled.specular).scale
             title = name if count == 1 else f"{name}, {count:,}"
             rows.append([title, f"{roughness:g}", *cells, str(scale)])
-    return table(["mesh, triangles", "r", "`chord`, s = 0", "`chord`, s", "`chord-local`, s", "s"], rows)
+    return table(["mesh, triangles", "r", "error, pieces with s = 0", "with s", "s"], rows)
 
 
 def _sentences() -> list[str]:

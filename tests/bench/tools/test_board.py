@@ -56,7 +56,7 @@ def pattern_on(board):
         (
             ["ulx3s-25f", "--light", "0,0,1", "--light", "1,0,0", "--simulate", "1", "-o", "x"],
             "--method quotient: triangles give vectors for one light, not 2; give one light, or use method "
-            "chord",
+            "renormalise",
         ),
         (
             ["ulx3s-25f", "--point-light", "1,2,3", "--simulate", "1", "-o", "x"],
