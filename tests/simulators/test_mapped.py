@@ -1,7 +1,7 @@
 """Mapped ECP5 netlists with registers inside multipliers and memories, against the bit-accurate models.
 
 Cells are Yosys's models and ours. Quick: a unit, and faults that are injected into its netlist. Long: more
-units, and pipelines, whose netlists are proved to do what they did before the step; most shade spans, too.
+units, and pipelines, whose netlists are proved to do what they did before the step; the default shades a frame.
 """
 
 import copy
@@ -42,11 +42,8 @@ UNITS = (
 READS = {"name": "lobe", "variant": "blinn", "beats": 1300}
 """A unit that writes a block RAM and reads it through the register inside; more beats than table ends."""
 
-DESIGNS = [
-    preset(),
-    *(preset(method, "cosquad") for method in ("linear", "renormalise", "chord", "chord-local")),
-]
-"""The default design, and some of whose methods' accumulators, roots and setups the step finds registers."""
+DESIGNS = [preset(), preset("renormalise", "cosquad")]
+"""The default design, and one whose accumulators, roots and setup are others."""
 
 
 @pytest.fixture(scope="module")
@@ -116,18 +113,13 @@ def test_injected_faults_are_found(check, fault):
 
 
 MEMORY_FAULTS = {
-    # A word is not held while the unit waits.
-    "word always taken": lambda cell: cell["connections"].update(OCEA=["1"], OCEB=["1"]),
     "half a word without register": lambda cell: cell["parameters"].update(REGMODE_A="NOREG"),
-    "no word": lambda cell: connect(cell, "OCEB", "0"),
     "wrong word bit": lambda cell: swap(cell, "DOB4", "DOB5"),
 }
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "fault", [pytest.param(of, marks=[pytest.mark.long] * (of != "wrong word bit")) for of in MEMORY_FAULTS]
-)
+@pytest.mark.parametrize("fault", MEMORY_FAULTS)
 def test_faults_injected_in_a_memory_are_found(check, fault):
     with pytest.raises((AssertionError, BenchError)):
         check(**READS, change=lambda cells: MEMORY_FAULTS[fault](first(cells, "DP16KD")))
@@ -138,7 +130,7 @@ def test_faults_injected_in_a_memory_are_found(check, fault):
     "design", [pytest.param(of, id=f"{of.interpolator.name}-{of.specular.model.name}") for of in DESIGNS]
 )
 def test_a_frame_of_a_pipeline(design, tmp_path):
-    """The netlist before the step does the same, by proof; and spans pixel by pixel."""
+    """The netlist before the step does the same, by proof; that of the default shades a frame."""
     unit = ShadingPipelineUnit(design)
     before = map_component(unit, tmp_path)
     netlist, absorbed = absorb_registers(before)
@@ -146,11 +138,10 @@ def test_a_frame_of_a_pipeline(design, tmp_path):
     assert absorbed.words
     assert absorbed.removed
     assert same(before, netlist, tmp_path) == ""
-    spans, constants, pixels = teapot_frame(design)
     if design is not DESIGNS[0]:
         # Icarus simulates some ten cycles a second of such a netlist; the proof is of every cycle.
-        spans = spans[:: len(spans) // 20]
-        pixels = design.compute(spans, constants)
+        return
+    spans, constants, pixels = teapot_frame(design)
     found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)), clean=False).run(
         "icarus",
         beats_of(unit, spans),
