@@ -1,7 +1,8 @@
 """Mapped ECP5 netlists with registers inside multipliers and memories, against the bit-accurate models.
 
 Cells are Yosys's models and ours. Quick: a unit, and faults that are injected into its netlist. Long: more
-units, and pipelines, whose netlists are proved to do what they did before the step; the default shades a frame.
+units, and pipelines, whose netlists are proved to do what they did before the step. The default shades a
+frame.
 """
 
 import copy
