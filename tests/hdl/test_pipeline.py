@@ -55,10 +55,10 @@ def spans_in_range(rng, design, lengths, largest=None):
 
 
 def intervals():
-    """Setup intervals of one method of each unit, all up to 8, and the default of each method."""
+    """Setup intervals of one method of each unit, the shortest and the longest, and the default of each."""
     for method in FROM_NORMALS:
         choice = unit_of(METHODS[method]).setup_intervals(METHODS[method])
-        choice = [*choice[:8], *choice[8:][-1:]]
+        choice = [*choice[:2], *choice[2:][-1:]]
         if method in ("linear", "quadratic", "angular", "chord", "recurrence"):
             for interval in choice:
                 quick = interval == choice[-1] and method == "chord"
