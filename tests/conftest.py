@@ -21,6 +21,12 @@ subprocess.Popen = Process
 BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/tools/test_pages.py")
 """Files whose tests of a unit are a group."""
 
+BESIDE = {
+    "tests/bench/report/test_report_browser.py": "tests/bench/report/test_report.py",
+    "tests/bench/tools/test_web_inside.py": "tests/bench/tools/test_web_browser.py",
+}
+"""Files in the group of another file: a session makes the report, and the site, of both once."""
+
 LONGEST = (
     "tests/sim/cli/test_bad_input.py",
     "tests/test_supply.py",
@@ -33,8 +39,9 @@ LONGEST = (
 
 
 def group_of(nodeid):
-    """Tests that one worker runs, as they share what they make: those of a file, or of a unit."""
+    """Tests that one worker runs, as they share what they make: those of a file or two, or of a unit."""
     group, _, test = nodeid.partition("::")
+    group = BESIDE.get(group, group)
     return group + re.sub(r"^\w+(\[\w+)?.*", r"\1", test) if group in BY_UNIT else group
 
 

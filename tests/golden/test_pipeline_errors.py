@@ -276,7 +276,7 @@ def test_arithmetic_error(exponent, model, method):
 
 @pytest.mark.long
 @pytest.mark.parametrize("method", METHOD_SWEEPS)
-@pytest.mark.parametrize("model", SPECULAR_MODELS)
+@pytest.mark.parametrize("model", SPECULAR_MODELS[:1])
 @pytest.mark.parametrize("exponent", MEASURED)
 def test_arithmetic_error_of_ten_million_pixels(exponent, model, method):
     rng = np.random.default_rng(exponent + 1)
