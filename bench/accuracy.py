@@ -1,15 +1,18 @@
 """The frames that errors are measured on: scene, designs, exponents."""
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from blysk.golden.frames.compare import Comparison, compare
 from blysk.golden.pipeline import Design
 from blysk.golden.presets import METHODS, PUBLISHED
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
-from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
+
+if TYPE_CHECKING:
+    from blysk.golden.frames.compare import Comparison
+    from blysk.sim.frames.frame import SimulatedFrame
 
 __all__ = ["DESIGNS", "EXPONENTS", "measure", "model_of", "scene_for"]
 
@@ -50,8 +53,12 @@ def measure(
     exponents: Sequence[int] = EXPONENTS,
     width: int = 640,
     height: int = 480,
-) -> Iterator[tuple[int, SimulatedFrame, Comparison]]:
+) -> Iterator[tuple[int, "SimulatedFrame", "Comparison"]]:
     """Frames of a mesh by one design, and their errors, for each exponent."""
+    # The simulator takes a second to import, and the designs are listed without it.
+    from blysk.golden.frames.compare import compare
+    from blysk.sim.frames.frame import FrameSimulator
+
     simulator = FrameSimulator(design)
     for exponent in exponents:
         scene = scene_for(mesh, exponent, width, height)

@@ -10,8 +10,7 @@ from typing import TypeVar
 import click
 from tqdm import tqdm
 
-from blysk.sim.engines.engine import CompilerMissing, SimulationError
-from blysk.sim.errors import InputError
+from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 
 __all__ = ["progress", "resumable", "run"]
 

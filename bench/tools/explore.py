@@ -6,7 +6,6 @@ bit-accurate model, which the simulation equals to the bit; costs are counted in
 kept, so that every design is measured once, and a run that was stopped can continue.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
@@ -14,7 +13,6 @@ from dataclasses import asdict
 from itertools import cycle
 from typing import Any
 
-import click
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
@@ -26,52 +24,33 @@ from blysk.bench.report.frames import scenes_of, view_of
 from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.store import Task, results_of
 from blysk.bench.svg import svg
+from blysk.bench.tools.defaults import EXPONENT, SIZE
 from blysk.bench.tools.design_space import (
-    COSTS,
-    DEGREES,
-    OPERANDS,
-    Candidate,
     Explored,
-    Sweep,
     cheapest,
     errors_of,
     explored,
     front_of,
     tasks_of,
 )
-from blysk.golden.lighting.intensity import MAX_LIGHTS
-from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.bench.tools.sweep import COSTS, Candidate, Sweep
 from blysk.golden.pipeline import STYLES
-from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.errors import InputError
-from blysk.sim.frames.figures import ERRORS
-from blysk.sim.frames.workers import check_address, cluster_executor, local_executor, processors
-from blysk.sim.output import check_writable, write_json
-from blysk.sim.value_types import Choice, OutputFile, Size, Whole
+from blysk.sim.frames.error_names import ERRORS
+from blysk.sim.frames.workers import cluster_executor, local_executor, processors
+from blysk.sim.output import write_json
 
 __all__ = [
-    "EXPONENT",
-    "command",
+    "explore",
     "section",
     "tasks",
 ]
 
 
-_WORDS = range(36, 47, 2)
-"""Fraction bits of the differences of ``chord-local``."""
-
 _MARKERS = dict(zip(STYLES, ("o", "^"), strict=True))
 
-SERVED = LOBES | MIRROR_LOBES | MODELS
-"""Specular units by reflection model; a model with a roughness takes the roughness of the exponent."""
-
-EXPONENT = 50
-"""Exponent of the default sweep."""
-
 _TRIANGLES = 10_000
-
-_SIZE = (320, 240)
 
 
 # The report's section.
@@ -94,7 +73,7 @@ def tasks(quick: bool) -> list[Task]:
         ]
         view = view_of("teapot", 992, 160, 120)
     else:
-        sweeps, view = [Sweep()], view_of("teapot", _TRIANGLES, *_SIZE)
+        sweeps, view = [Sweep()], view_of("teapot", _TRIANGLES, *SIZE)
     return tasks_of([one for sweep in sweeps for one in sweep.candidates()[0]], view, EXPONENT)
 
 
@@ -229,44 +208,7 @@ def _drawing(designs: Sequence[Explored], fronts: Mapping[tuple[str, str], np.nd
     return figure
 
 
-# The command.
-
-
-class _Some(click.ParamType):
-    """Type of an option: names or whole numbers with commas between them."""
-
-    def __init__(self, values: Sequence[str | int]):
-        self.values = tuple(values)
-        self.name = "LIST"
-
-    def get_metavar(self, param, ctx):
-        return self.name
-
-    def convert(self, value, param, ctx):
-        """The values, each once; `InputError` if one is unknown."""
-        if isinstance(value, tuple):
-            return value
-        known = {str(one): one for one in self.values}
-        unknown = [word for word in value.split(",") if word not in known]
-        if unknown:
-            reason = f"{unknown[0]!r} is none of the choices"
-            raise InputError(f"{param.opts[0]} {value}", reason, f"use some of {','.join(known)}")
-        return tuple(dict.fromkeys(known[word] for word in value.split(",")))
-
-
-class _Error(click.ParamType):
-    """Type of an option: a limit of the largest error, in LSB."""
-
-    name = "LSB"
-
-    def convert(self, value, param, ctx):
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not 0 < number <= 255:
-            raise InputError(f"{param.opts[0]} {value}", "no such error", "give a number up to 255, in LSB")
-        return number
+# The list.
 
 
 def _executor(jobs: int, address: str | None) -> AbstractContextManager[Executor | None]:
@@ -275,86 +217,41 @@ def _executor(jobs: int, address: str | None) -> AbstractContextManager[Executor
     return local_executor(jobs) if jobs > 1 else nullcontext()
 
 
-def _option(name: str, values: Sequence[str | int], default: Sequence[str | int], text: str):
-    listed = ",".join(map(str, default))
-    return click.option(name, type=_Some(values), default=listed, show_default=True, help=text)
+def explore(
+    candidates: Sequence[Candidate],
+    mesh: str,
+    exponent: int,
+    size: tuple[int, int],
+    error: str,
+    largest: float,
+    cost: str,
+    limit: int,
+    jobs: int | None,
+    address: str | None,
+    figures: str | None,
+    impossible: Mapping[str, int],
+) -> None:
+    """Measure designs, and print those under an error; `blysk explore` after its checks.
 
+    Parameters
+    ----------
+    candidates, impossible
+        Of `Sweep.candidates`.
+    mesh, exponent, size
+        The scene.
+    error, largest, cost, limit
+        Kind and limit of the error, what is to be little, and how many designs are listed.
+    jobs, address
+        Processes, or a Dask scheduler.
+    figures : str or None
+        JSON file for every design.
 
-_USUAL = Sweep()
-
-
-@click.command()
-@click.option("--mesh", default="teapot", show_default=True, help="File, or teapot.")
-@click.option(
-    "--exponent", type=Whole(1, MAX_EXPONENT), default=EXPONENT, show_default=True, help="Of the highlight."
-)
-@click.option(
-    "--size", type=Size(), default="x".join(map(str, _SIZE)), show_default=True, help="Of the picture."
-)
-@click.option(
-    "--largest-error", "largest", type=_Error(), default=1.0, show_default=True, help="Of any channel."
-)
-@click.option(
-    "--error",
-    type=Choice("error", ERRORS),
-    default="method",
-    show_default=True,
-    help="Against the same method and model in float64, exact normals of every pixel with the same "
-    "model, or exact normals with Blinn's power, of a lobe with its own model.",
-)
-@click.option(
-    "--cost", type=Choice("cost", COSTS), default="cells", show_default=True, help="What is to be little."
-)
-@_option(
-    "--methods",
-    [*METHODS, *PUBLISHED],
-    _USUAL.methods,
-    f"Interpolation along a span; also {', '.join(PUBLISHED)}.",
-)
-@_option("--models", SERVED, _USUAL.models, f"Of the reflection models {', '.join(SERVED)}.")
-@_option("--lights", range(1, MAX_LIGHTS + 1), _USUAL.lights, f"Numbers of lights, to {MAX_LIGHTS}.")
-@_option("--operands", OPERANDS, OPERANDS, "Operands of the specular unit.")
-@_option(
-    "--degrees",
-    sorted({degree for degrees in DEGREES.values() for degree in degrees}),
-    _USUAL.degrees,
-    "Of the polynomial: quadratic in its forms 2 and 3, bisection 1 and 2.",
-)
-@_option(
-    "--fraction-bits", _WORDS, _USUAL.fraction_bits, "Of the differences of chord-local: 36 to 46, even."
-)
-@_option("--styles", STYLES, _USUAL.styles, "One pixel a cycle, or few multipliers.")
-@click.option("--limit", type=Whole(1, 1000), default=10, show_default=True, help="Designs that are listed.")
-@click.option("--jobs", type=Whole(1, 1024), help="Processes.  [default: processors]")
-@click.option(
-    "--cluster", "address", metavar="ADDRESS", help="Dask scheduler whose workers measure: tcp://host:8786."
-)
-@click.option("--json", "figures", type=OutputFile(), help="Every design, with every figure.")
-def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, figures, **choices):
-    """Draw a scene with every design of a sweep, and list the cheapest under an error.
-
-    Choices are lists with commas, and are combined in all ways; a method that lacks a choice is taken once.
-    Errors are in LSB of an 8-bit channel. Cells, multipliers, register and memory bits are counted in the
-    netlist, before technology mapping. Cycles are an upper bound for a pixel, from the units' figures for the
-    scene's spans; bisection states none for spans that it divides. Designs with a * are on the Pareto front
-    of the sweep: no design is better in both error and cost. Several lights stand evenly round the scene.
-    Earlier results come from the cache.
-
-    \b
-    Example:
-        blysk explore --methods quotient,renormalise --models blinn --largest-error 0.6 --cost multipliers
+    Raises
+    ------
+    InputError
+        If the mesh shows no pixel, or no design is under the error.
     """
-    if jobs and address is not None:
-        raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")
-    if address is not None:
-        check_address(address)
-    if figures:
-        check_writable(figures)
-    sweep = Sweep(**choices)
-    candidates, impossible = sweep.candidates()
     left_out = "; ".join(f"{count} of {reason}" for reason, count in impossible.items())
-    if not candidates:
-        raise InputError("the sweep", f"holds no possible design, {left_out}", "choose other combinations")
     view = view_of(mesh, _TRIANGLES, *size)
     if not rasterise(*scenes_of(view, [exponent])).visible.any():
         reason = f"no pixel shows the surface at {size[0]}x{size[1]}"

@@ -18,9 +18,8 @@ Yosys moves registers beside a multiplier into it; only a multiplier with an add
 refused.
 """
 
-import os
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -28,29 +27,33 @@ import click
 from amaranth.lib import wiring
 
 from blysk.bench.command import progress
-from blysk.bench.tools.blocks import ENTRIES
-from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F, Family, Parts
+from blysk.bench.tools.blocks import entries_shown
+from blysk.bench.tools.families import ECP5, Family, Parts
 from blysk.bench.tools.parts_by_unit import parts_by_unit, sum_parts
-from blysk.bench.tools.place_and_route import SEEDS, Layout, lay_out, versions_of
+from blysk.bench.tools.place_and_route import Layout, lay_out, versions_of
 from blysk.bench.tools.tool_runner import TooLarge
-from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.tops import TOPS
 from blysk.sim.api.design import design, pixel_pipelines, renderer_of
-from blysk.sim.api.options import DESIGN, PIPES, PORTS, SETUPS
-from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
-from blysk.sim.output import check_writable, write_json
-from blysk.sim.value_types import Choice, OutputFile, Whole
+from blysk.sim.output import write_json
+from blysk.sim.units.names import UNITS
 
 __all__ = [
-    "command",
+    "about",
+    "count_by_unit",
+    "pipelines_of",
+    "place",
     "rerouted",
     "table",
     "table_by_unit",
+    "units_of",
     "untimed",
 ]
 
+
+Designs = Sequence[tuple[str, Callable[[], wiring.Component]]]
+"""Name of each design, and what makes it."""
 
 _HEAD = ("design", "LUT", "FF", "mult", "BRAM", "LUTRAM", "min", "median", "max", "slowest path, ns")
 
@@ -111,17 +114,19 @@ def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
             )
 
 
-def _units(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """Entries of the table of the units, by a unit's name (all its variants) or by unit and variant."""
+def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
+    """Variants of units, by a unit's name (those of `entries_shown`) or by unit and variant."""
     for name in names:
-        found = [entry for entry in ENTRIES if name in (entry.title, entry.record.name)]
+        entries = [entry for unit in UNITS for entry in entries_shown(unit)]
+        found = [entry for entry in entries if name in (entry.title, entry.record.name)]
         if not found:
-            known = ", ".join(dict.fromkeys(entry.record.name for entry in ENTRIES))
-            raise InputError(f"--unit {name}", "unknown unit", f"use {known}, or one of their variants")
+            unit = name.split(" ")[0]
+            known = dict.fromkeys([unit, *(entry.title for entry in entries if entry.record.name == unit)])
+            raise InputError(f"--unit {name}", "unknown variant", f"use {' or '.join(known)}")
         yield from ((entry.title, entry.variant.unit) for entry in found)
 
 
-def _pipelines(
+def pipelines_of(
     given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1, top: str = "shader", setups: int = 1
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
     """The pipeline or another core by the given options, with one method or with every method."""
@@ -142,128 +147,50 @@ def _pipelines(
             yield ", ".join(name), partial(TOPS[top].unit, renderer_of(made, "top", top), setups=setups)
 
 
-@click.command()
-@options_of(DESIGN)
-@options_of(PIPES)
-@options_of({"top": PORTS["top"]})
-@options_of(SETUPS)
-@click.option(
-    "--family",
-    "family_name",
-    type=Choice("family", DEVICES),
-    help="Of FPGAs: "
-    + ", ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
-    + ".  [default: ecp5; of several pipelines ecp5-85f]",
-)
-@click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
-@click.option("--every-method", is_flag=True, help="The pipeline of every method.")
-@click.option(
-    "--unit",
-    "units",
-    multiple=True,
-    metavar="NAME",
-    help="In place of the pipeline, a unit of the table of blysk blocks: all its variants, or one, as in "
-    "'bisection 1, 45'; repeat for more.",
-)
-@click.option(
-    "--target",
-    type=Whole(1, 1000),
-    default=ECP5.target,
-    show_default=True,
-    help="Clock rate in MHz that the tool is asked for; one within reach gives more than one far beyond.",
-)
-@click.option("--seeds", type=Whole(1, 100), default=SEEDS, show_default=True, help="Placements of each.")
-@click.option(
-    "--jobs",
-    type=Whole(1, 64),
-    default=lambda: min(os.cpu_count() or 1, 4),
-    show_default="number of cores, 4 at most",
-    help="Placements at once, of half a GB each.",
-)
-@click.option("--keep-registers", is_flag=True, help="ECP5: no registers inside multipliers.")
-@click.option(
-    "--by-unit", is_flag=True, help="Parts of each unit inside, as mapped; without placement and clock rate."
-)
-@click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
-@click.pass_context
-def command(
-    context,
-    family_name,
-    lights,
-    pipes,
-    top,
-    setups,
-    every_method,
-    units,
-    target,
-    seeds,
-    jobs,
-    keep_registers,
-    by_unit,
-    figures,
-    **_,
-):
-    """Place and route the pipeline on an FPGA, and print its parts and clock rate.
+def about(family: Family) -> dict[str, Any]:
+    """Device, its parts and the tools' versions, for the JSON file; `InputError` if a tool is missing."""
+    return {"device": family.device, "capacity": asdict(family.capacity), "tools": versions_of(family)}
 
-    LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops, without
-    those inside multipliers; mult: multipliers of 18x18 bits; BRAM: block RAMs of 18 Kibit; LUTRAM: memories
-    of 16x4 bits in look-up tables. The first line has the parts of the FPGA. Clock rates are in MHz, over the
-    seeds. The slowest path is that of the slowest seed: its delay in cells and between them, and the
-    registers at its ends. Earlier placements come from the cache. On ECP5 registers beside a multiplier move
-    into it; the tool does not time the path between registers on both sides, and a line below the table says
-    so.
 
-    \b
-    Examples:
-        blysk fpga --seeds 3 --json quotient.json
-        blysk fpga --family nexus --unit specular
-        blysk fpga --pipes 4 --seeds 1
-        blysk fpga --top render --style compact --target 115 --seeds 1
-        blysk fpga --top render --style compact --by-unit
-    """
-    pipes = pipes or PIPES["pipes"].default
-    family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
-    family = replace(family, target=target)
-    chosen = given_options(context, list(DESIGN))
-    top = top or "shader"
-    given = [*chosen, *given_options(context, ["lights", "pipes", "top", "setups", "every_method"])]
-    if units and given:
-        option = f"--{given[0].replace('_', '-')}"
-        raise InputError(option, "is for the pipeline", "leave it out, or --unit")
-    if every_method and "method" in given:
-        raise InputError("--method", "is one of every method", "leave it out, or --every-method")
-    if pipes > 1 and top != "shader":
-        raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave it out, or --top")
-    setups = setups or SETUPS["setups"].default
-    if setups > 1 and top == "shader":
-        raise InputError(
-            f"--setups {setups}", "spans need no triangle setup", "leave it out, or --top geometry or render"
-        )
-    if by_unit and (placing := given_options(context, ["target", "seeds", "jobs"])):
-        raise InputError(f"--{next(iter(placing))}", "nothing is placed", "leave it out, or --by-unit")
+def count_by_unit(designs: Designs, family: Family, inside: bool, figures: str | None) -> None:
+    """Print the parts of each unit inside of designs, as mapped; parameters as for `place`."""
+    found = {
+        name: parts_by_unit(unit(), family, inside)
+        for name, unit in progress(designs, total=len(designs), unit="designs")
+    }
     if figures:
-        check_writable(figures)
-    designs = list(_units(units) if units else _pipelines(chosen, lights, every_method, pipes, top, setups))
-    tools = versions_of(family)
-    about = {"device": family.device, "capacity": asdict(family.capacity), "tools": tools}
-    if by_unit:
-        found = {
-            name: parts_by_unit(unit(), family, not keep_registers)
-            for name, unit in progress(designs, total=len(designs), unit="designs")
-        }
-        if figures:
-            entries = {
-                name: {unit: asdict(parts) for unit, parts in of.items()} for name, of in found.items()
-            }
-            write_json(figures, {**about, "units": entries})
-        click.echo("\n\n".join(table_by_unit(name, of, family) for name, of in found.items()))
-        return
+        entries = {name: {unit: asdict(parts) for unit, parts in of.items()} for name, of in found.items()}
+        write_json(figures, {**about(family), "units": entries})
+    click.echo("\n\n".join(table_by_unit(name, of, family) for name, of in found.items()))
+
+
+def place(designs: Designs, family: Family, seeds: int, jobs: int, inside: bool, figures: str | None) -> None:
+    """Place and route designs, and print the table.
+
+    Parameters
+    ----------
+    designs : sequence of (str, callable)
+        Name of each, and what makes it.
+    family : Family
+        The FPGA, and the clock rate that is asked for.
+    seeds, jobs, inside
+        As for `lay_out`.
+    figures : str or None
+        JSON file for every figure.
+
+    Raises
+    ------
+    InputError
+        If a tool is missing.
+    ToolError
+        If a tool fails, or the only design does not fit.
+    """
     layouts, too_large = [], {}
     with progress(total=len(designs) * seeds, unit="placements") as bar:
         for name, unit in designs:
             bar.set_description_str(name)
             try:
-                layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family, not keep_registers))
+                layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family, inside))
             except TooLarge as error:
                 if len(designs) == 1:
                     raise
@@ -272,8 +199,8 @@ def command(
         write_json(
             figures,
             {
-                **about,
-                "target_mhz": target,
+                **about(family),
+                "target_mhz": family.target,
                 "designs": [layout.as_dict() for layout in layouts],
                 "too_large": too_large,
             },

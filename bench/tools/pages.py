@@ -12,34 +12,31 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
-import click
 from amaranth.hdl import Fragment, Shape
 from amaranth.lib import stream, wiring
 from amaranth.lib.data import StructLayout
 from matplotlib import rc_context
 
-from blysk.bench.command import progress
 from blysk.bench.svg import STYLE, svg
-from blysk.bench.tools.blocks import SEED, Entry, Row, cells_of, entries_of, row_of, sample_of
+from blysk.bench.tools.blocks import Row, cells_of, entries_shown, row_of, sample_of
+from blysk.bench.tools.defaults import SEED
 from blysk.bench.tools.docstrings import inline, markdown, markdown_table
+from blysk.bench.tools.documents import PROJECT
 from blysk.bench.tools.drawing import draw_structure
 from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, likeness
 from blysk.bench.tools.netlist import describe_shape
+from blysk.bench.tools.pages_folder import MADE, check_folder
 from blysk.bench.tools.structure import graph_of
 from blysk.bench.tools.timing import draw_timing, waves_of
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.sim.errors import InputError
-from blysk.sim.output import check_writable, write_text
+from blysk.sim.output import write_text
+from blysk.sim.units.names import ROOMS
 from blysk.sim.units.record import Record, Sample
-from blysk.sim.units.registry import RECORDS, ROOMS
-from blysk.sim.value_types import Choice
+from blysk.sim.units.registry import RECORDS
 
 __all__ = [
-    "PROJECT",
     "SAMPLES",
-    "command",
-    "entries_shown",
     "index_page",
     "page",
     "pictures",
@@ -47,13 +44,8 @@ __all__ = [
     "write_pages",
 ]
 
-PROJECT = Path(__file__).parents[2]
-"""Folder of the project, with its tests and documents if it is a checkout."""
-
 SAMPLES = 100_000
 """Random operands of each variant, enough for the drawings."""
-
-_MADE = "made by `blysk pages`"
 
 _TITLES = {
     "geometry": "Triangles to spans",
@@ -66,12 +58,6 @@ _TITLES = {
     "": "All of it",
 }
 """Titles of the folders of units."""
-
-
-def entries_shown(unit: str) -> tuple[Entry, ...]:
-    """Variants on a unit's page: the measured ones, or the default one if none is measured."""
-    record = RECORDS[unit]
-    return entries_of(record) or (Entry(record, record.default),)
 
 
 # Parts of a page.
@@ -382,7 +368,7 @@ def index_page(folder: Path) -> str:
     lines = [
         "# The units",
         "",
-        f"One page a unit, {_MADE} from the code itself: text from the docstrings, figures as "
+        f"One page a unit, {MADE} from the code itself: text from the docstrings, figures as "
         "`blysk blocks` measures them, drawings from netlists and simulations. The units are in the order in "
         "which a span passes them; of those that do the same a pipeline has one.",
     ]
@@ -403,19 +389,6 @@ def index_page(folder: Path) -> str:
             lines += ["", f"## {_TITLES[room]}", ""]
             lines += ["| unit | what it does | source | structure |", "| --- | --- | --- | --- |", *rows]
     return "\n".join([*lines, ""])
-
-
-def _check_ours(folder: Path, units: Sequence[str]) -> None:
-    """Refuse a folder whose first page, or without one whose page of a unit, is of somebody else."""
-    first = folder / "README.md"
-    if first.is_file() and _MADE not in first.read_text(encoding="utf-8", errors="replace"):
-        others = [first]
-    else:
-        others = [] if first.is_file() else [folder / f"{unit}.md" for unit in units]
-    for path in others:
-        if path.exists():
-            reason = "would be replaced, and `blysk pages` did not write it"
-            raise InputError(str(path), reason, "give a folder of its own")
 
 
 def write_pages(
@@ -445,12 +418,7 @@ def write_pages(
     InputError
         If the folder or a file cannot be written, or a file would be replaced that is no page.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(str(folder), f"cannot be made ({error.strerror})", "give another folder") from None
-    check_writable(folder / "README.md")
-    _check_ours(folder, units)
+    check_folder(folder, units)
     # First: it tells that the folder is ours, whatever comes between.
     write_text(folder / "README.md", index_page(folder))
     for unit in units:
@@ -466,29 +434,3 @@ def write_pages(
             of_this_page = re.fullmatch(rf"{unit}-(structure|timing|errors)(-\d+)?\.svg", path.name)
             if of_this_page and path.name not in files:
                 path.unlink()
-
-
-@click.command()
-@click.argument("folder", type=click.Path(path_type=Path), default="docs/blocks")
-@click.option(
-    "--unit", "units", type=Choice("unit", RECORDS), multiple=True, help="This page alone; repeat for more."
-)
-def command(folder, units):
-    """Write a page for each unit, with drawings of structure, timing and errors, into FOLDER.
-
-    FOLDER is docs/blocks by default, and is made if there is none. Pictures that a page no longer has are
-    removed, other files stay.
-
-    \b
-    Example:
-        blysk pages docs/blocks --unit bisection
-    """
-    units = units or tuple(RECORDS)
-    with progress(total=len(units), unit="pages") as bar:
-
-        def show(unit):
-            bar.set_postfix_str(unit)
-            bar.update(units.index(unit) - bar.n)
-
-        write_pages(folder, units, progress=show)
-    click.echo(f"{'pages':<12}{folder}")

@@ -20,6 +20,7 @@ from amaranth.lib.wiring import Out
 
 from blysk.bench.tools import absorb_registers as absorbing
 from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
+from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
 from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner
 from blysk.sim.engines.cache import cache_folder, version_of
@@ -30,7 +31,6 @@ from blysk.sim.output import write_json
 __all__ = [
     "MAP_AFTER",
     "MAP_BEFORE",
-    "SEEDS",
     "YOSYS",
     "Layout",
     "Registered",
@@ -44,8 +44,6 @@ __all__ = [
     "versions_of",
 ]
 
-
-SEEDS = 5
 
 _REMEDY = install_extra("fpga")
 

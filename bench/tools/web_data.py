@@ -54,13 +54,11 @@ __all__ = [
     "BACKGROUND",
     "BANDS",
     "COLUMNS",
-    "DESIGNS",
     "HEIGHT",
     "MESHES",
     "REFERENCES",
     "RIVAL",
     "ROUGHNESSES",
-    "SERVED",
     "START",
     "WIDTH",
     "Body",
@@ -83,16 +81,6 @@ WIDTH, HEIGHT = 320, 240
 
 BANDS = (100, MAX_EXPONENT)
 """Exponents for which spans are cut; a frame uses the smallest that is at least its own exponent."""
-
-SERVED = tuple(name for name, of in METHODS.items() if not of.TAKES_VALUES)
-"""Methods of modules. Those whose spans bring values of each light are left out: the light moves. Vectors are
-turned into its frame by the page."""
-
-DESIGNS = (
-    *(pair for pair in accuracy.DESIGNS if pair[0] in SERVED),
-    *(("quotient", "ggx"), ("renormalise", "ggx"), ("linear", "blinn")),
-)
-"""Method and model of each module; the rival has the model of the first one, too."""
 
 ROUGHNESSES = tuple(round(step / 100, 2) for step in range(10, 101))
 """Roughnesses that a model with a roughness may have."""

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from blysk.bench.tools.board_build import BOARDS
+from blysk.bench.tools.boards import BOARDS
 
 GUIDE = Path(__file__).parent
 PAGE, FIGURES = GUIDE / "board.md", GUIDE / "board.json"

@@ -17,8 +17,7 @@ from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import DESIGN, LIGHTS, RENDERING, SCENE, SLOW_SIZE, Engine, Option, Source
 from blysk.sim.api.scene_file import read_scene_file
 from blysk.sim.errors import InputError, OptionError
-from blysk.sim.meshes.mesh_path import check_mesh_path
-from blysk.sim.meshes.refusal import Refused
+from blysk.sim.meshes.mesh_path import check_mesh_file
 from blysk.sim.run_files import OutputIsInput
 from blysk.sim.value_types import Choice, PartError, plain, shown
 
@@ -185,17 +184,9 @@ def check_mesh(settings: Settings) -> None:
     InputError
         As `load_mesh`.
     """
-    source = settings.source
-    if not isinstance(source, str | os.PathLike) or source == "teapot":
-        return
-    with settings.mesh_located():
-        try:
-            check_mesh_path(Path(source))
-        except Refused as refusal:
-            raise InputError(os.fspath(source), refusal.reason, refusal.remedy) from None
-        except (OSError, ValueError):
-            # `load_mesh` says why the system refuses the name.
-            return
+    if isinstance(settings.source, str | os.PathLike):
+        with settings.mesh_located():
+            check_mesh_file(settings.source)
 
 
 def _one_list_of_lights(given: dict[str, Any]) -> dict[str, Any]:

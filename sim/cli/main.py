@@ -12,7 +12,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import click
-from tqdm import tqdm
 
 from blysk.hdl.emit.errors import NetlistError
 from blysk.sim.cli.lazy_command import LazyCommand
@@ -116,6 +115,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
 
     def show(message, *_):
+        # Between the lines of a bar, if there is one.
+        from tqdm import tqdm
+
         tqdm.write(f"blysk: warning: {one_line(str(message))}", file=sys.stderr)
 
     # Models in the cache leave components that nothing elaborates; some live to the end of the program.

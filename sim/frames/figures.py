@@ -12,41 +12,20 @@ from blysk.golden.frames.frame import Frame
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
+from blysk.sim.frames.error_names import ERRORS
 from blysk.sim.frames.frame import SimulatedFrame
 from blysk.sim.frames.specialise import Specialisation
 from blysk.sim.frames.triangles import SimulatedTriangleFrame
 
 __all__ = [
-    "ERRORS",
     "animation_figures",
     "difference_figures",
     "frame_figures",
-    "reference_of",
     "saving_figures",
     "sharp_lobes",
     "triangle_figures",
     "worst_errors",
 ]
-
-ERRORS = {
-    "arithmetic": "the same method and model in float64",
-    "method": "exact normals of every pixel, same model",
-    "total": "exact normals of every pixel, model {}",
-}
-"""Name of each error, and the frame that it compares with; ``{}``: a model, see `reference_of`."""
-
-
-def reference_of(error: str, target: str) -> str:
-    """The frame that an error compares with, in words.
-
-    Parameters
-    ----------
-    error : str
-        One of `ERRORS`.
-    target : str
-        Name of the exact model, see `target_of`.
-    """
-    return ERRORS[error].format(target)
 
 
 def frame_figures(

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from blysk.sim.frames.figures import ERRORS, reference_of
+from blysk.sim.frames.error_names import ERRORS, reference_of
 
 __all__ = ["animation_lines", "frame_lines", "short_lines", "specialisation_lines"]
 

@@ -1,10 +1,12 @@
 """Names of mesh files: which suffixes are read."""
 
+import os
 from pathlib import Path
 
+from blysk.sim.errors import InputError
 from blysk.sim.meshes.refusal import Refused
 
-__all__ = ["SUFFIXES", "check_mesh_path"]
+__all__ = ["SUFFIXES", "check_mesh_file", "check_mesh_path"]
 
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
 
@@ -30,3 +32,23 @@ def check_mesh_path(path: Path) -> None:
             f"unknown mesh type {path.suffix!r}" if path.suffix else "the name has no suffix",
             f"use {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}",
         )
+
+
+def check_mesh_file(source: str | os.PathLike[str]) -> None:
+    """Refuse, before long work, a mesh file that is not there, or of an unknown type; it is not opened.
+
+    The name ``teapot`` is accepted. What the system refuses of a name is left to `load_mesh`.
+
+    Raises
+    ------
+    InputError
+        As `load_mesh`.
+    """
+    if source == "teapot":
+        return
+    try:
+        check_mesh_path(Path(source))
+    except Refused as refusal:
+        raise InputError(os.fspath(source), refusal.reason, refusal.remedy) from None
+    except (OSError, ValueError):
+        return

@@ -17,8 +17,8 @@ from click.testing import CliRunner
 from matplotlib.figure import Figure
 from PIL import Image
 
+from blysk.bench.cli.bench import command
 from blysk.bench.report import frames, points
-from blysk.bench.report.report import command
 from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.speed.web_speed import OPTIONS, find_chromium
 from blysk.bench.store import Task

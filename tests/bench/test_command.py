@@ -1,6 +1,8 @@
 """The end of a command: one line and a status for each kind of error."""
 
 import re
+import subprocess
+import sys
 import time
 
 import click
@@ -58,6 +60,57 @@ def test_help_has_an_example(name, capsys):
 def test_bad_input_is_one_line(arguments, line, refused, tmp_path):
     (tmp_path / "file").touch()
     refused(*arguments, line=line)
+
+
+QUICK = """
+import contextlib, io, sys
+from blysk.sim.cli.main import cli, main
+with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as errors:
+    names = cli.list_commands(None)
+    helped = [main([name, "--help"]) for name in names]
+    refused = [main(words.split()) for words in sys.argv[1:]]
+heavy = {"amaranth", "distributed", "jinja2", "matplotlib", "scipy", "skimage", "trimesh"}
+print(*names, set(helped), set(refused), heavy & sys.modules.keys(), errors.getvalue().count("blysk: "))
+"""
+
+
+def test_help_and_refused_arguments_load_nothing_heavy(tmp_path):
+    """Of every command: what does its work is imported after the checks."""
+    refused = [
+        "bench --only nothing",
+        "bench --jobs 0",
+        "bench --cluster nowhere",
+        "bench --mesh missing.obj",
+        "bench no/folder",
+        "blocks --samples 3",
+        "blocks --json no/folder.json",
+        "board nothing",
+        "board ulx3s-25f",
+        "board ulx3s-25f -o a.bit --toggles",
+        "board ulx3s-25f -o a --simulate 1 --mesh missing.obj",
+        "board ulx3s-25f -o a --simulate 1 --light 0,0,0",
+        "explore --models nothing",
+        "explore --mesh missing.obj",
+        "explore --methods linear --operands cosine --degrees 1 --size 0x1",
+        "fpga --unit nothing",
+        "fpga --unit gpq --lights 2",
+        "fpga --setups 2",
+        "fpga --family nothing",
+        "pages --unit nothing",
+        "pages file/new",
+        "render missing.obj",
+        "verilog --pipes 3",
+        "web --design chord-local/exp",
+        "web --report nothing",
+        "web -o file",
+    ]
+    (tmp_path / "file").touch()
+    done = subprocess.run(
+        [sys.executable, "-c", QUICK, *refused], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    commands = "bench blocks board explore fpga pages render verilog web"
+    assert done.stdout == f"{commands} {{0}} {{2}} set() {len(refused)}\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, monkeypatch):

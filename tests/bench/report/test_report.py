@@ -11,10 +11,12 @@ from concurrent.futures import Executor, Future
 import pytest
 from click.testing import CliRunner
 
-from blysk.bench.report import frames, report, units
+from blysk.bench.cli.bench import command
+from blysk.bench.report import frames, report, sections, units
 from blysk.bench.report.page import AXES, environment, page, shown
-from blysk.bench.report.report import SECTIONS, about, check_folder, command, write_report
+from blysk.bench.report.report import about, check_folder, write_report
 from blysk.bench.report.section import Section, Table
+from blysk.bench.report.sections import SECTIONS, load
 from blysk.bench.store import Task
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
@@ -187,11 +189,16 @@ class Fake:
         return self._section
 
 
+def replace_sections(monkeypatch, modules):
+    monkeypatch.setattr(sections, "SECTIONS", modules)
+    monkeypatch.setattr(sections, "load", modules.__getitem__)
+
+
 @pytest.fixture
 def run(monkeypatch, plain_section):
     """Run the command with a section or two of little work."""
     other = Section("other", "Another", [], [Table("other", "Other", ["a"], [(1,)])])
-    monkeypatch.setattr(report, "SECTIONS", {"plain": Fake(plain_section), "other": Fake(other, 1)})
+    replace_sections(monkeypatch, {"plain": Fake(plain_section), "other": Fake(other, 1)})
     return lambda *arguments: CliRunner().invoke(command, [str(argument) for argument in arguments])
 
 
@@ -225,7 +232,7 @@ def test_a_cluster_measures_what_is_no_time(run, tmp_path, monkeypatch):
         assert address == "tcp://a:1"
         yield Here()
 
-    monkeypatch.setattr(report, "check_address", lambda address: None)
+    monkeypatch.setattr("blysk.bench.cli.bench.check_address", lambda address: None)
     monkeypatch.setattr(report, "cluster_executor", workers)
     monkeypatch.setenv("BLYSK_CACHE", str(tmp_path / "cache"))
     folder = tmp_path / "report"
@@ -238,8 +245,11 @@ def test_a_cluster_measures_what_is_no_time(run, tmp_path, monkeypatch):
 
 
 def test_meshes_go_to_the_points(monkeypatch, tmp_path, plain_section):
-    monkeypatch.setattr(report, "SECTIONS", {"points": Fake(plain_section), "other": Fake(plain_section)})
+    replace_sections(monkeypatch, {"points": Fake(plain_section), "other": Fake(plain_section)})
     folder = tmp_path / "report"
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.obj").touch()
+    (tmp_path / "b.obj").touch()
     options = ["--mesh", "a.obj", "--mesh", "b.obj", "--jobs", "1", "--only", "points"]
     result = CliRunner().invoke(command, [str(folder), *options], catch_exceptions=False)
     assert result.exit_code == 0
@@ -301,15 +311,15 @@ def test_interrupt_says_what_is_kept(run, tmp_path, monkeypatch):
 def test_interrupt_leaves_nothing_behind(interrupted):
     """A worker in the midst of a program of its own."""
     status, text = interrupted(
-        "import subprocess, sys, blysk.bench.report.report as r\n"
+        "import subprocess, sys, blysk.bench.report.sections as r\n"
         "def sleep(seconds): subprocess.run(['sleep', str(seconds)])\n"
         "if __name__ == '__main__':\n"
         "    from blysk.bench.store import Task\n"
         "    class Slow:\n"
         "        def tasks(self, quick): return [Task(sleep, {'seconds': 300})]\n"
-        "    r.SECTIONS.clear()\n"
-        "    r.SECTIONS['slow'] = Slow()\n"
-        "    sys.exit(r.command.main(['report', '--jobs', '1'], standalone_mode=False))\n"
+        "    from blysk.bench.cli.bench import command\n"
+        "    r.SECTIONS, r.load = {'slow': ''}, lambda name: Slow()\n"
+        "    sys.exit(command.main(['report', '--jobs', '1'], standalone_mode=False))\n"
     )
     assert status == 130
     assert text == "blysk: stopped; 0 of 1 measurements are kept, run again to go on\n"
@@ -317,9 +327,9 @@ def test_interrupt_leaves_nothing_behind(interrupted):
 
 @pytest.mark.parametrize("name", SECTIONS)
 def test_sections_have_tasks(name):
-    assert name == SECTIONS[name].__name__.rpartition(".")[2].replace("_", "-")
+    assert name == SECTIONS[name].rpartition(".")[2].replace("_", "-")
     for quick in (True, False):
-        tasks = SECTIONS[name].tasks(quick)
+        tasks = load(name).tasks(quick)
         for task in tasks:
             assert json.loads(json.dumps(task.settings)) == task.settings
             assert getattr(sys.modules[task.function.__module__], task.function.__name__) is task.function

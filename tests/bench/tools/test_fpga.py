@@ -158,15 +158,15 @@ def test_designs():
         return [name for name, _ in designs]
 
     gates = ["middle_normal exact", "diffuse"]
-    assert names(fpga._units(gates)) == gates
-    forms = names(fpga._units(["quadratic_evaluator"]))
+    assert names(fpga.units_of(gates)) == gates
+    forms = names(fpga.units_of(["quadratic_evaluator"]))
     assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
     full = {"method": "quadratic", "style": "compact", "setup_interval": 7, "gate": True}
     whole = "pipeline quadratic, blinn, 2 lights, compact, interval 7, gate"
-    assert names(fpga._pipelines(full, 2, False)) == [whole]
-    assert names(fpga._pipelines({}, 1, False)) == ["pipeline quotient, blinn, 1 light"]
-    assert names(fpga._pipelines({"model": "exp"}, 1, False)) == ["pipeline renormalise, exp, 1 light"]
-    assert names(fpga._pipelines({}, 1, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
+    assert names(fpga.pipelines_of(full, 2, False)) == [whole]
+    assert names(fpga.pipelines_of({}, 1, False)) == ["pipeline quotient, blinn, 1 light"]
+    assert names(fpga.pipelines_of({"model": "exp"}, 1, False)) == ["pipeline renormalise, exp, 1 light"]
+    assert names(fpga.pipelines_of({}, 1, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,8 @@ def test_designs():
         ),
         (["--seeds", "0"], "--seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "--jobs no: not a whole number; give"),
-        (["--unit", "fuse"], "--unit fuse: unknown unit; use gradient_setup, halfway_vector, "),
+        (["--unit", "fuse"], "--unit fuse: unknown unit; use attribute_serialiser, coarse_depth, "),
+        (["--unit", "gpq x"], "--unit gpq x: unknown variant; use gpq\n"),
         (["--unit", "gpq", "--method", "renormalise"], "--method: is for the pipeline; leave it out, or"),
         (["--unit", "gpq", "--every-method"], "--every-method: is for the pipeline; leave it out"),
         (["--method", "renormalise", "--every-method"], "--method: is one of every method; leave it out"),

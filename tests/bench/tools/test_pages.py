@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from blysk.bench.tools import pages
-from blysk.bench.tools.blocks import ENTRIES, Entry, sample_of
+from blysk.bench.tools.blocks import ENTRIES, Entry, entries_shown, sample_of
 from blysk.bench.tools.docstrings import markdown
+from blysk.bench.tools.documents import PROJECT
 from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, Node, likeness
-from blysk.bench.tools.pages import PROJECT, entries_shown, write_pages
+from blysk.bench.tools.pages import write_pages
 from blysk.sim.errors import InputError
 from blysk.sim.units.record import Decisions, Record, Sample, Variant
 from blysk.sim.units.registry import RECORDS

@@ -13,7 +13,8 @@ import pytest
 from amaranth.hdl import Fragment
 from click.testing import CliRunner
 
-from blysk.bench.tools import web, web_data
+from blysk.bench.cli.web import command
+from blysk.bench.tools import web, web_data, web_designs, web_folder
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
@@ -131,7 +132,7 @@ def probes():
     """Of all modules of the page."""
     return [
         probe
-        for pair in web_data.DESIGNS
+        for pair in web_designs.DESIGNS
         for probe in probes_of(ShadingPipelineUnit(web_data.design_of(*pair)))
     ]
 
@@ -250,21 +251,21 @@ def test_an_earlier_site_is_replaced(site, work, results):
     assert not (site / "spans" / "square-0-0.js").exists()
     mark = json.loads((site / "site.json").read_text())
     assert "modules/linear-exp.js" not in mark["files"]
-    web.check_folder(site)
+    web_folder.check_folder(site)
 
 
 def test_folder_of_something_else(tmp_path, site):
-    web.check_folder(tmp_path / "new")
+    web_folder.check_folder(tmp_path / "new")
     (tmp_path / "empty").mkdir()
-    web.check_folder(tmp_path / "empty")
+    web_folder.check_folder(tmp_path / "empty")
     (tmp_path / "file").write_text("mine")
     with pytest.raises(InputError, match="it is a file"):
-        web.check_folder(tmp_path / "file")
+        web_folder.check_folder(tmp_path / "file")
     (site / "spans" / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match=r"holds spans/mine.txt, which is of no site"):
-        web.check_folder(site)
+        web_folder.check_folder(site)
     with pytest.raises(InputError, match="there is no folder"):
-        web.check_folder(tmp_path / "no" / "site")
+        web_folder.check_folder(tmp_path / "no" / "site")
 
 
 def test_names_of_an_earlier_site_that_lead_out_stay(site, work, results, tmp_path):
@@ -335,7 +336,7 @@ def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
     figures = {"program": "blysk", "files": ["index.html", "report.json"], "sections": sections}
     (report / "report.json").write_text(json.dumps(figures))
     (report / "index.html").write_text("<p>report</p>")
-    folders = {name: path for name, path in web.folders_of(None).items() if name != "blocks"}
+    folders = {name: path for name, path in web_folder.folders_of(None).items() if name != "blocks"}
     site = tmp_path / "site"
     web.write_site(site, work, results, report, folders)
     assert "<strong>This</strong> much." in (site / "index.html").read_text()
@@ -356,9 +357,9 @@ def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
 
 def test_folders_of_documents(tmp_path):
     with pytest.raises(InputError, match="holds no pages of units; make them with `blysk pages FOLDER`"):
-        web.folders_of(tmp_path)
+        web_folder.folders_of(tmp_path)
     (tmp_path / "README.md").write_text("# Units\n")
-    found = web.folders_of(tmp_path)
+    found = web_folder.folders_of(tmp_path)
     assert found["blocks"] == tmp_path
     assert {"guide", "theory"} <= set(found)
 
@@ -367,7 +368,7 @@ def test_folders_of_documents(tmp_path):
 
 
 def run(*arguments):
-    return CliRunner().invoke(web.command, list(map(str, arguments)))
+    return CliRunner().invoke(command, list(map(str, arguments)))
 
 
 def test_command(tmp_path, monkeypatch, work, results, plain_section):
@@ -418,7 +419,7 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
 def test_command_refuses(tmp_path, monkeypatch, arguments, line):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError) as error:
-        CliRunner().invoke(web.command, arguments, catch_exceptions=False)
+        CliRunner().invoke(command, arguments, catch_exceptions=False)
     assert str(error.value).startswith(line)
     assert not list(tmp_path.iterdir())
 
@@ -429,7 +430,7 @@ def test_command_without_the_extra(tmp_path, uninstalled, name):
     with pytest.raises(
         InputError, match=f"^web: {name} is not installed; {re.escape(install_extra('web'))}$"
     ):
-        CliRunner().invoke(web.command, ["-o", str(tmp_path / "site")], catch_exceptions=False)
+        CliRunner().invoke(command, ["-o", str(tmp_path / "site")], catch_exceptions=False)
     assert not list(tmp_path.iterdir())
 
 
@@ -458,7 +459,8 @@ def test_interrupt_leaves_nothing_behind(interrupted):
         "if __name__ == '__main__':\n"
         "    web.tasks = lambda designs, views: [Task(sleep, {'seconds': 300})]\n"
         "    web.chosen_tasks = lambda quick: []\n"
-        "    sys.exit(web.command.main(['--jobs', '1'], standalone_mode=False))\n"
+        "    from blysk.bench.cli.web import command\n"
+        "    sys.exit(command.main(['--jobs', '1'], standalone_mode=False))\n"
     )
     assert status == 130
     assert text == "blysk: stopped; 0 of 1 parts are kept, run again to go on\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blysk.bench.store import results_of
-from blysk.bench.tools import web, web_data
+from blysk.bench.tools import web, web_data, web_designs
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.metrics import error_figures
@@ -81,14 +81,14 @@ def test_a_gate_is_counted(open_page):
 @pytest.mark.skipif(not has_compiler(), reason="no C++ compiler: pysim would take hours")
 def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
     """All that the command builds by itself, in both engines."""
-    work = web.tasks(web_data.DESIGNS, {"teapot": 1})
+    work = web.tasks(web_designs.DESIGNS, {"teapot": 1})
     web.write_site(tmp_path / "site", work, results_of(work))
     page = open_page(folder=tmp_path / "site")
     assert page.evaluate("() => Object.keys(blysk.site.designs)") == [
-        "-".join(pair) for pair in web_data.DESIGNS
+        "-".join(pair) for pair in web_designs.DESIGNS
     ]
     digests = set()
-    for method, model in web_data.DESIGNS:
+    for method, model in web_designs.DESIGNS:
         page.locator("#method").select_option(method)
         change(page, "model", model)
         state = state_of(page)
@@ -101,7 +101,7 @@ def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
             assert figure(page, "gated") == run.status["gated_pixels"], (method, model)
         digests.add(shown)
     # Those that differ by their arithmetic do so in some pixel: none is shown for another.
-    assert len(digests) > len(web_data.DESIGNS) // 2
+    assert len(digests) > len(web_designs.DESIGNS) // 2
 
 
 def test_drag_moves_the_light(open_page):

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from blysk.sim.frames.figures import ERRORS, worst_errors
+from blysk.sim.frames.error_names import ERRORS
+from blysk.sim.frames.figures import worst_errors
 from blysk.sim.frames.summary import frame_lines, short_lines
 
 FIGURES = ("max_lsb", "p999_lsb", "rmse_lsb", "psnr_db")

@@ -1,0 +1,52 @@
+"""``blysk blocks``: the table of the units; see `blysk.bench.tools.blocks`."""
+
+import os
+
+import click
+
+from blysk.bench.command import progress
+from blysk.bench.tools.defaults import SAMPLES, SEED
+from blysk.sim.output import check_writable, write_json
+from blysk.sim.value_types import OutputFile, Whole
+
+__all__ = ["command"]
+
+_MOST_JOBS = 64
+
+
+@click.command()
+@click.option(
+    "--samples", type=Whole(1000, 10_000_000), default=SAMPLES, show_default=True, help="Of each unit."
+)
+@click.option("--seed", type=Whole(0, 2**32 - 1), default=SEED, show_default=True, help="Of the operands.")
+@click.option(
+    "--jobs",
+    type=Whole(1, _MOST_JOBS),
+    default=lambda: min(os.cpu_count() or 1, 4),
+    show_default="number of cores, 4 at most",
+    help="Processes, of a quarter of a GB each.",
+)
+@click.option("--json", "figures", type=OutputFile(), help="Every figure, with domains and notes.")
+def command(samples, seed, jobs, figures):
+    """Measure every variant of every unit, and print a table.
+
+    Errors are the largest ones found: model error, of the unit's formula in float64 against the exact
+    function; arithmetic error, of the unit against that formula; and total error. Their unit is a full term
+    or a vector's length, or the third column names it; rate: the shares of a gate's decisions that let a dark
+    span through, that stop a lit one, and both. For units of whole spans a sample is a pixel. lat: cycles
+    from an input to its first result; int: cycles from a result to the next; ROM and regs are in bits;
+    multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. The variant of a bisection gives its
+    degree and its widest span in degrees.
+
+    \b
+    Example:
+        blysk blocks --jobs 4 --json blocks.json
+    """
+    if figures:
+        check_writable(figures)
+    from blysk.bench.tools.blocks import ENTRIES, rows, table
+
+    lines = list(progress(rows(ENTRIES, samples, seed, jobs), total=len(ENTRIES), unit="rows"))
+    if figures:
+        write_json(figures, {"samples": samples, "seed": seed, "blocks": [row.as_dict() for row in lines]})
+    click.echo(table(lines))

@@ -1,0 +1,145 @@
+"""``blysk board``: a mesh on a monitor; see `blysk.bench.tools.board`."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import click
+
+from blysk.bench.tools.board_options import COLOURS, DEFAULTS, OPTIONS
+from blysk.bench.tools.boards import board_named, packages_missing
+from blysk.sim.api.options import DESIGN, SCENE
+from blysk.sim.api.settings import check_mesh, read_settings
+from blysk.sim.cli.options import given_options, options_of
+from blysk.sim.errors import InputError
+from blysk.sim.installation import install_package
+from blysk.sim.output import check_writable, write_json
+from blysk.sim.value_types import Choice, Number, OutputFile, Whole
+
+__all__ = ["command"]
+
+_MOST_FRAMES = 60
+
+
+@click.command()
+@click.argument("board_name", metavar="BOARD")
+@click.option(
+    "--mesh", default="teapot", show_default=True, help="File (OBJ, PLY, ...), scene file, or teapot."
+)
+@click.option(
+    "-o", "--output", type=OutputFile(), help="Bitstream; with --simulate the folder of the frames."
+)
+@click.option("--simulate", type=Whole(1, _MOST_FRAMES), help="So many frames, simulated down to the lanes.")
+@click.option(
+    "--colours",
+    type=Choice("colours", COLOURS),
+    help="Of the bands.  [default: rgb888 for ulx3s-85f, rgb565 for the others]",
+)
+@click.option(
+    "--clock",
+    type=Number(1, 126, "MHz"),
+    default=52.5,
+    show_default=True,
+    help="Drawing clock, MHz: this or a little less.",
+)
+@click.option(
+    "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."
+)
+@click.option("--seeds", type=Whole(1, 20), default=4, show_default=True, help="Placements to try at most.")
+@click.option(
+    "--record", type=OutputFile(), help="JSON file of figures, to which those of this run are added."
+)
+@click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
+@options_of(OPTIONS)
+@click.pass_context
+def command(context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **_):
+    """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
+
+    Without --simulate a bitstream is made. Used and available parts and reached and needed clock rates are
+    printed, and the exit status is 1 if a clock is not met. With it, frames are decoded from the simulated
+    lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or if the
+    frames are too heavy for 60 Hz.
+
+    What is known of the board's bitstream is printed first.
+
+    Triangles give the method quotient vectors for one light: several lights need --method renormalise.
+
+    The buttons of the board stop the motion, turn it round, and change the material and the light.
+
+    \b
+    Examples:
+        blysk board ulx3s-25f --mesh teapot -o teapot.bit
+        blysk board ulx3s-85f --exponent 200 --simulate 2 -o frames/
+    """
+    board = board_named(board_name)
+    if output is None:
+        raise InputError("board", "nothing to write", "give -o FILE.bit, or --simulate N -o FOLDER")
+    given = given_options(context, OPTIONS)
+    loader = _loader() if load else ""
+    if toggles and not simulate:
+        raise InputError("--toggles", "counts bits of a simulation", "give --simulate N with it")
+    if simulate and load:
+        raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
+    if not simulate:
+        packages_missing()
+        from blysk.sim.cli.outputs import check_outputs
+
+        check_outputs([], pictures=[], others=[output, record])
+    recorded = _recorded(record)
+    settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **DEFAULTS)
+    check_mesh(settings)
+    from blysk.bench.tools import board as work
+
+    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock)
+    click.echo("\n".join(work.design_lines(board, mesh, gpu, plan)))
+    if not simulate:
+        click.echo(f"{'known':<12}of a bitstream: {board.known}")
+    figures = recorded.setdefault(f"{board.name}, {mesh}, {gpu.drawing.mesh.triangles:,} triangles", {})
+    if simulate:
+        figures["simulated"] = work.simulated(board, gpu, scenes, plan, simulate, Path(output))
+        if toggles:
+            figures["toggles"] = work.toggled(board, gpu, plan, simulate)
+        if record:
+            write_json(record, recorded)
+        return
+    built = work.bitstream_of(board, gpu, plan, seeds)
+    click.echo("\n".join(work.built_lines(built)))
+    figures["built"] = work.figures_of(built)
+    if record:
+        write_json(record, recorded)
+    work.write_bitstream(built, output)
+    if load:
+        work.load_bitstream(loader, board, output)
+
+
+def _recorded(path: str | None) -> dict[str, Any]:
+    """Figures of a JSON file, empty if there is no such file yet; checked before long work."""
+    if path is None:
+        return {}
+    check_writable(path)
+    try:
+        known = json.loads(Path(path).read_text(encoding="utf-8"))
+        return {entry: dict(figures) for entry, figures in known.items()}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError, AttributeError) as error:
+        raise InputError(path, "is no JSON file of figures", "give --record another name") from error
+
+
+def _loader() -> str:
+    """The loader's executable.
+
+    Raises
+    ------
+    InputError
+        If it is not installed.
+    """
+    found = shutil.which("openFPGALoader")
+    if found is None:
+        raise InputError(
+            "--load",
+            "openFPGALoader is not installed",
+            f"{install_package('openfpgaloader')}, or leave it out",
+        )
+    return found

@@ -1,0 +1,135 @@
+"""``blysk fpga``: place and route; see `blysk.bench.tools.fpga`."""
+
+import os
+from dataclasses import replace
+
+import click
+
+from blysk.bench.tools.defaults import SEEDS
+from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F
+from blysk.golden.lighting.intensity import MAX_LIGHTS
+from blysk.sim.api.options import DESIGN, PIPES, PORTS, SETUPS
+from blysk.sim.cli.options import given_options, options_of
+from blysk.sim.errors import InputError
+from blysk.sim.output import check_writable
+from blysk.sim.units.names import UNITS
+from blysk.sim.value_types import Choice, OutputFile, Whole
+
+__all__ = ["command"]
+
+
+@click.command()
+@options_of(DESIGN)
+@options_of(PIPES)
+@options_of({"top": PORTS["top"]})
+@options_of(SETUPS)
+@click.option(
+    "--family",
+    "family_name",
+    type=Choice("family", DEVICES),
+    help="Of FPGAs: "
+    + ", ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
+    + ".  [default: ecp5; of several pipelines ecp5-85f]",
+)
+@click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
+@click.option("--every-method", is_flag=True, help="The pipeline of every method.")
+@click.option(
+    "--unit",
+    "units",
+    multiple=True,
+    metavar="NAME",
+    help="In place of the pipeline, a unit of the table of blysk blocks: all its variants, or one, as in "
+    "'bisection 1, 45'; repeat for more.",
+)
+@click.option(
+    "--target",
+    type=Whole(1, 1000),
+    default=ECP5.target,
+    show_default=True,
+    help="Clock rate in MHz that the tool is asked for; one within reach gives more than one far beyond.",
+)
+@click.option("--seeds", type=Whole(1, 100), default=SEEDS, show_default=True, help="Placements of each.")
+@click.option(
+    "--jobs",
+    type=Whole(1, 64),
+    default=lambda: min(os.cpu_count() or 1, 4),
+    show_default="number of cores, 4 at most",
+    help="Placements at once, of half a GB each.",
+)
+@click.option("--keep-registers", is_flag=True, help="ECP5: no registers inside multipliers.")
+@click.option(
+    "--by-unit", is_flag=True, help="Parts of each unit inside, as mapped; without placement and clock rate."
+)
+@click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
+@click.pass_context
+def command(
+    context,
+    family_name,
+    lights,
+    pipes,
+    top,
+    setups,
+    every_method,
+    units,
+    target,
+    seeds,
+    jobs,
+    keep_registers,
+    by_unit,
+    figures,
+    **_,
+):
+    """Place and route the pipeline on an FPGA, and print its parts and clock rate.
+
+    LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops, without
+    those inside multipliers; mult: multipliers of 18x18 bits; BRAM: block RAMs of 18 Kibit; LUTRAM: memories
+    of 16x4 bits in look-up tables. The first line has the parts of the FPGA. Clock rates are in MHz, over the
+    seeds. The slowest path is that of the slowest seed: its delay in cells and between them, and the
+    registers at its ends. Earlier placements come from the cache. On ECP5 registers beside a multiplier move
+    into it; the tool does not time the path between registers on both sides, and a line below the table says
+    so.
+
+    \b
+    Examples:
+        blysk fpga --seeds 3 --json quotient.json
+        blysk fpga --family nexus --unit specular
+        blysk fpga --pipes 4 --seeds 1
+        blysk fpga --top render --style compact --target 115 --seeds 1
+        blysk fpga --top render --style compact --by-unit
+    """
+    pipes = pipes or PIPES["pipes"].default
+    family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
+    family = replace(family, target=target)
+    chosen = given_options(context, list(DESIGN))
+    top = top or "shader"
+    given = [*chosen, *given_options(context, ["lights", "pipes", "top", "setups", "every_method"])]
+    if units and given:
+        option = f"--{given[0].replace('_', '-')}"
+        raise InputError(option, "is for the pipeline", "leave it out, or --unit")
+    if every_method and "method" in given:
+        raise InputError("--method", "is one of every method", "leave it out, or --every-method")
+    if pipes > 1 and top != "shader":
+        raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave it out, or --top")
+    setups = setups or SETUPS["setups"].default
+    if setups > 1 and top == "shader":
+        raise InputError(
+            f"--setups {setups}", "spans need no triangle setup", "leave it out, or --top geometry or render"
+        )
+    if by_unit and (placing := given_options(context, ["target", "seeds", "jobs"])):
+        raise InputError(f"--{next(iter(placing))}", "nothing is placed", "leave it out, or --by-unit")
+    if figures:
+        check_writable(figures)
+    unknown = [name for name in units if name.split(" ")[0] not in UNITS]
+    if unknown:
+        raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
+    from blysk.bench.tools.fpga import about, count_by_unit, pipelines_of, place, units_of
+
+    designs = list(
+        units_of(units) if units else pipelines_of(chosen, lights, every_method, pipes, top, setups)
+    )
+    # A missing tool is told of before the work.
+    about(family)
+    if by_unit:
+        count_by_unit(designs, family, not keep_registers, figures)
+    else:
+        place(designs, family, seeds, jobs, not keep_registers, figures)

@@ -1,0 +1,26 @@
+"""Options of a board's scene and design."""
+
+from blysk.golden.video.band_buffer import RGB565, RGB888
+from blysk.sim.api.options import DESIGN, SCENE
+
+__all__ = ["COLOURS", "DEFAULTS", "OPTIONS"]
+
+COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
+"""Pixel formats of the band buffer."""
+
+_LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
+
+DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
+"""Defaults that differ from those of a rendering."""
+
+_METHOD = "Interpolation along a span.  [default: quotient; renormalise with a model that is from no table]"
+
+OPTIONS = {
+    name: option._replace(default=DEFAULTS.get(name, option.default))
+    for name, option in {**SCENE, **DESIGN, "method": DESIGN["method"]._replace(help=_METHOD)}.items()
+    if name not in _LEFT_OUT
+}
+"""Options of the command, with the defaults that its help tells.
+
+The size is that of the display, and the camera a perspective one.
+"""

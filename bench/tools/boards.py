@@ -1,0 +1,154 @@
+"""Boards with an ECP5 and a connector for a monitor, and the tools that their bitstreams need."""
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+from blysk.bench.tools.families import ECP5
+from blysk.sim.engines.cache import version_of
+from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
+
+__all__ = ["BOARDS", "Board", "board_named", "packages_missing"]
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board that has an ECP5 and a connector for a monitor.
+
+    Parameters
+    ----------
+    name : str
+        Name on the command line.
+    module, platform : str
+        Module and class in `amaranth_boards`.
+    options : tuple of str
+        Options of nextpnr: device, package, speed grade.
+    reference : int
+        Rate of its clock, Hz.
+    buttons : tuple of (str, int)
+        Name and number of up to six button resources; the top gives each its meaning.
+    luts, block_rams, multipliers : int
+        Parts of its device, which has as many flip-flops as look-up tables.
+    lines : int
+        Lines of a band, by the memory of the device.
+    loader : str
+        Name of the board for openFPGALoader.
+    compact : bool
+        Whether the device is small: geometry of compact style, and setup interval 9 of methods that have it.
+    known : str
+        What is known of the bitstream of its default design, with commits. The command prints it before a
+        build, and the guide's table is made of it.
+    """
+
+    name: str
+    module: str
+    platform: str
+    options: tuple[str, ...]
+    reference: int
+    buttons: tuple[tuple[str, int], ...]
+    luts: int
+    block_rams: int
+    multipliers: int
+    lines: int
+    loader: str
+    compact: bool
+    known: str
+
+    def make(self) -> Any:
+        """The platform of amaranth-boards.
+
+        Raises
+        ------
+        InputError
+            If amaranth-boards is not installed.
+        """
+        try:
+            module = importlib.import_module(f"amaranth_boards.{self.module}")
+        except ModuleNotFoundError as error:
+            raise InputError("board", f"{error.name} is not installed", install_extra("board")) from error
+        return getattr(module, self.platform)(toolchain="Trellis")
+
+
+_ULX3S_BUTTONS = tuple(
+    (f"button_{name}", number)
+    for name, number in (("fire", 0), ("fire", 1), ("up", 0), ("down", 0), ("left", 0), ("right", 0))
+)
+
+BOARDS = {
+    board.name: board
+    for board in (
+        Board(
+            *("ulx3s-25f", "ulx3s", "ULX3S_25F_Platform"),
+            options=("--25k", "--package", "CABGA381", "--speed", "6"),
+            reference=25_000_000,
+            buttons=_ULX3S_BUTTONS,
+            luts=24_288,
+            block_rams=56,
+            multipliers=28,
+            lines=8,
+            loader="ulx3s",
+            compact=True,
+            known="none with quotient so far: on commit 142fa70 it took 19,888 of 24,288 look-up tables, "
+            "mapped; one placement had 1,423 wires used twice when 15 minutes of routing ended; an "
+            "ulx3s-85f has room, --simulate routes nothing",
+        ),
+        Board(
+            *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
+            options=("--85k", "--package", "CABGA381", "--speed", "6"),
+            reference=25_000_000,
+            buttons=_ULX3S_BUTTONS,
+            luts=83_640,
+            block_rams=208,
+            multipliers=156,
+            lines=16,
+            loader="ulx3s",
+            compact=False,
+            known="not tried with quotient so far; commit c815b08 gave one with a method that is gone, at "
+            "the first placement, of a third of the device",
+        ),
+        Board(
+            *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
+            options=("--25k", "--package", "CABGA256", "--speed", "6"),
+            reference=50_000_000,
+            buttons=(("button", 0), ("button", 1)),
+            luts=24_288,
+            block_rams=56,
+            multipliers=28,
+            lines=8,
+            loader="icepi-zero",
+            compact=True,
+            known="not tried with quotient so far; commit c815b08 gave one with a method that is gone; the "
+            "same device on an ulx3s-25f gave none on commit 142fa70",
+        ),
+    )
+}
+"""Boards by name."""
+
+
+def board_named(name: str) -> Board:
+    """A board by its name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name; the message lists the names.
+    """
+    if name not in BOARDS:
+        raise InputError(f"board {name}", "unknown", f"use {', '.join(BOARDS)}")
+    return BOARDS[name]
+
+
+def packages_missing() -> None:
+    """Check that every tool of a bitstream is installed.
+
+    Raises
+    ------
+    InputError
+        If tools are missing; the message names all of them.
+    """
+    needed = ("amaranth-boards", "pyosys", ECP5.package)
+    missing = [package for package in needed if version_of(package) is None]
+    if missing:
+        verb = "is" if len(missing) == 1 else "are"
+        raise InputError("board", f"{' and '.join(missing)} {verb} not installed", install_extra("board"))

@@ -1,0 +1,43 @@
+"""The folder of the units' pages, checked before they are made."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from blysk.sim.errors import InputError
+from blysk.sim.output import check_writable
+
+__all__ = ["MADE", "check_folder"]
+
+MADE = "made by `blysk pages`"
+"""Words of the folder's first page by which it is known."""
+
+
+def check_folder(folder: Path, units: Sequence[str]) -> None:
+    """Make the folder of pages if there is none, and refuse a folder of somebody else.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the pages.
+    units : sequence of str
+        Units whose pages will be written.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made or written, or a file would be replaced that `blysk pages` did not write.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(str(folder), f"cannot be made ({error.strerror})", "give another folder") from None
+    first = folder / "README.md"
+    check_writable(first)
+    if first.is_file() and MADE not in first.read_text(encoding="utf-8", errors="replace"):
+        others = [first]
+    else:
+        others = [] if first.is_file() else [folder / f"{unit}.md" for unit in units]
+    for path in others:
+        if path.exists():
+            reason = "would be replaced, and `blysk pages` did not write it"
+            raise InputError(str(path), reason, "give a folder of its own")

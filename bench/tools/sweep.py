@@ -1,0 +1,167 @@
+"""Designs of a sweep of the design space, and the choices that they are combined of."""
+
+import json
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple, get_args
+
+from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.golden.methods.interpolator import Operand
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
+from blysk.golden.normals.middle_normal import MiddleNormal
+from blysk.golden.pipeline import STYLES, Design
+from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED, preset
+
+if TYPE_CHECKING:
+    from blysk.hdl.pipeline import ShadingPipelineUnit
+
+__all__ = ["COSTS", "DEGREES", "OPERANDS", "SERVED", "WORDS", "Candidate", "Sweep"]
+
+COSTS = {
+    "cells": "cells",
+    "multipliers": "multipliers",
+    "registers": "register_bits",
+    "memory": "memory_bits",
+}
+"""Names of the costs, with their figures in `Cost.totals`."""
+
+OPERANDS = get_args(Operand)
+"""Operands of the specular unit."""
+
+
+DEGREES = {QuadraticInterpolator: (2, 3), BisectionInterpolator: (1, 2)}
+"""Degrees of a method's polynomial."""
+
+_FITS = {2: "minimax_2", 3: "exact"}
+"""Middle normal of each degree."""
+
+SERVED = LOBES | MIRROR_LOBES | MODELS
+"""Specular units by reflection model; a model with a roughness takes the roughness of the exponent."""
+
+WORDS = range(36, 47, 2)
+"""Fraction bits of the differences of ``chord-local``."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design of the sweep.
+
+    Parameters
+    ----------
+    method, model, lights, operand
+        See `Design`.
+    degree : int, optional
+        Degree of the method's polynomial in the angle: for the middle normal (``quadratic`` and its forms: 2,
+        a plain minimax fit, or 3), or for the bisection's factor (1 or 2).
+    fraction_bits : int, optional
+        Fraction bits of the differences of ``chord-local``.
+    style : str
+        See `ShadingPipelineUnit`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such design.
+    """
+
+    method: str
+    model: str = "cosquad"
+    lights: int = 1
+    operand: Operand | None = None
+    degree: int | None = None
+    fraction_bits: int | None = None
+    style: str = "throughput"
+
+    def __post_init__(self):
+        _ = self.design
+
+    @cached_property
+    def design(self) -> Design:
+        """Its `Design`: the bit-accurate model of the pipeline."""
+        usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
+        interpolator, changes = usual.interpolator, {}
+        if usual.takes_vectors and self.model in MODELS:
+            raise ValueError(f"method {self.method} has tables of lobes, and no circuits of other models")
+        if self.fraction_bits is not None and not isinstance(interpolator, LocalChordInterpolator):
+            raise ValueError(f"method {self.method} has no choice of words")
+        if self.degree not in (None, *_degrees(self.method)):
+            raise ValueError(f"method {self.method} has no polynomial of degree {self.degree}")
+        if self.fraction_bits is not None:
+            changes = {"fraction_bits": self.fraction_bits}
+        elif self.degree is not None and isinstance(interpolator, QuadraticInterpolator):
+            changes = {"middle_normal": MiddleNormal(_FITS[self.degree])}
+        elif self.degree is not None:
+            changes = {"bisection": replace(interpolator.bisection, degree=self.degree)}
+        return replace(usual, interpolator=replace(interpolator, **changes))
+
+    def unit(self) -> "ShadingPipelineUnit":
+        """Its hardware."""
+        # The hardware's description takes a second to import, and a sweep is listed without it.
+        from blysk.hdl.pipeline import ShadingPipelineUnit
+
+        return ShadingPipelineUnit(self.design)
+
+    @property
+    def command(self) -> str:
+        """Shell command that prints it as Verilog."""
+        usual = preset(self.method, self.model, operand=self.operand).interpolator
+        if self.method in METHODS and self.design.interpolator == usual:
+            words = ["blysk", "verilog", "--method", self.method, "--model", self.model]
+            words += ["--lights", str(self.lights)] if self.lights != 1 else []
+            words += ["--operand", self.operand] if self.operand else []
+            words += ["--style", self.style] if self.style != "throughput" else []
+            return shlex.join(words)
+        given = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
+        # JSON has its strings in double quotes, so that the shell can have the single ones.
+        arguments = ", ".join(f"{name}={json.dumps(x)}" for name, (x, usual) in given.items() if x != usual)
+        imports = "from blysk.bench.tools.sweep import Candidate; from blysk.hdl.emit.verilog import emit"
+        return shlex.join(["python", "-c", f'{imports}; print(emit(Candidate({arguments}).unit(), "blysk"))'])
+
+
+def _degrees(method: str) -> Sequence[int]:
+    return DEGREES.get(type(METHODS.get(method)), ())
+
+
+class Sweep(NamedTuple):
+    """Values to combine in all ways. A method that lacks a choice is taken once.
+
+    Parameters
+    ----------
+    methods, models, lights, operands, degrees, fraction_bits, styles : sequences
+        See `Candidate`.
+    """
+
+    methods: Sequence[str] = tuple(METHODS)
+    models: Sequence[str] = ("blinn", "phong", "cosquad", "lyon3_refitted", "exp")
+    lights: Sequence[int] = (1,)
+    operands: Sequence[Operand | None] = OPERANDS
+    degrees: Sequence[int] = (1, 2, 3)
+    fraction_bits: Sequence[int] = (40, 46)
+    styles: Sequence[str] = STYLES
+
+    def candidates(self) -> tuple[list[Candidate], dict[str, int]]:
+        """Every design once, and the number of impossible combinations for each reason."""
+        found: dict[Candidate, None] = {}
+        refused: dict[str, list[str]] = {}
+        for method in self.methods:
+            degrees = self.degrees if _degrees(method) else (None,)
+            words = self.fraction_bits if method == "chord-local" else (None,)
+            usual = (METHODS | PUBLISHED)[method].operand
+            operands = [None if operand == usual else operand for operand in self.operands]
+            if usual not in OPERANDS:
+                operands = [None]
+            for values in product(self.models, self.lights, operands, degrees, words, self.styles):
+                try:
+                    found[Candidate(method, *values)] = None
+                except ValueError as error:
+                    reason = str(error).removeprefix(f"method {method} ")
+                    refused.setdefault(reason, []).append(method)
+        reasons = {
+            f"{', '.join(dict.fromkeys(methods))}: {reason}": len(methods)
+            for reason, methods in refused.items()
+        }
+        return list(found), reasons

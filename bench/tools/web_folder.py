@@ -1,0 +1,95 @@
+"""Folders that a site is written into and made of, checked before long work."""
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+
+from blysk.bench.tools.documents import PROJECT
+from blysk.sim.errors import InputError
+from blysk.sim.installation import install_extra
+from blysk.sim.output import files_within
+from blysk.sim.run_files import reads
+
+__all__ = ["MARK", "PAGE", "check_extras", "check_folder", "earlier", "folders_of", "report_files"]
+
+MARK, PAGE = "site.json", "index.html"
+"""Files of a site: the mark by which it is known, and the first page."""
+
+_EXTRAS = ("ziglang", "jinja2", "markdown_it", "flip_evaluator", "skimage")
+
+
+def folders_of(pages: Path | None) -> dict[str, Path]:
+    """Existing folders of Markdown: documents of the project, and pages of the units.
+
+    Parameters
+    ----------
+    pages : Path, optional
+        Folder that ``blysk pages`` wrote; ``None``: the project's folder, if there is one.
+
+    Raises
+    ------
+    InputError
+        If the folder has no pages.
+    """
+    if pages is not None and not (pages / "README.md").is_file():
+        raise InputError(f"--pages {pages}", "holds no pages of units", "make them with `blysk pages FOLDER`")
+    docs = PROJECT / "docs"
+    folders = {"guide": docs / "guide", "theory": docs / "theory", "blocks": pages or docs / "blocks"}
+    return {name: path for name, path in folders.items() if any(path.glob("*.md"))}
+
+
+def check_extras() -> None:
+    """Refuse to begin without the packages of the extra ``web``."""
+    for name in _EXTRAS:
+        if importlib.util.find_spec(name) is None:
+            raise InputError("web", f"{name} is not installed", install_extra("web"))
+
+
+def earlier(folder: Path) -> dict[str, Any] | None:
+    """The mark of a folder, if this program wrote it as a site; else ``None``."""
+    try:
+        mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    if not isinstance(mark, dict) or mark.get("program") != "blysk":
+        return None
+    names = mark.get("files")
+    return mark if isinstance(names, list) and all(isinstance(name, str) for name in names) else None
+
+
+def check_folder(folder: Path) -> None:
+    """Check, before long work, that a site can be written into a folder; writes nothing.
+
+    Parameters
+    ----------
+    folder : Path
+        A folder that is new, is empty, or holds an earlier site.
+
+    Raises
+    ------
+    InputError
+        If it is a file, holds other files, or may not be written.
+    """
+    names = files_within(folder, PAGE)
+    mark = earlier(folder)
+    ours = {MARK, *(mark["files"] if mark else ())}
+    others = [name for name in names if name not in ours]
+    if others:
+        reason = f"holds {others[0]}, which is of no site"
+        raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier site")
+
+
+def report_files(folder: Path) -> list[Path]:
+    """Files of a report; `InputError` if the folder is none."""
+    try:
+        report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+        names = report["files"] if report["program"] == "blysk" else []
+    except (OSError, ValueError, KeyError, TypeError):
+        names = []
+    files = [folder / name for name in names if Path(name).name == name]
+    if not files or not all(path.is_file() for path in files):
+        raise InputError(f"--report {folder}", "is no report", "make one with `blysk bench FOLDER`")
+    for path in files:
+        reads(path)
+    return files
