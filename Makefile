@@ -46,8 +46,8 @@ decided: $(VENV)/.installed-test
 	mkdir -p build
 	rm -f build/decided
 	DECIDED=$(CURDIR)/build/decided $(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder \
-		-m prove tests/formal
-	LC_ALL=C sort -u build/decided > tests/formal/decided.txt
+		-m "prove or long" tests/formal tests/test_units.py
+	LC_ALL=C sort -u build/decided > tests/decided.txt
 
 mutants: $(VENV)/.installed-test
 	$(BIN)/python -m blysk.bench.quality.mutants

@@ -15,6 +15,8 @@ from xdist.scheduler import LoadScopeScheduling
 
 from blysk.hdl.emit.processes import Process
 
+from .decided import Decided
+
 # A test that is killed leaves no program behind, nor does a run of tests with its workers.
 subprocess.Popen = Process
 
@@ -107,6 +109,14 @@ def model_cache(tmp_path_factory, worker_id, pytestconfig):
         # Of few cycles the compiler takes most of the time; with -O1 a model runs as fast as with -O2.
         patch.setenv("CXXFLAGS", "-O0" if "not long" in pytestconfig.option.markexpr else "-O1")
         yield
+
+
+@pytest.fixture(scope="session")
+def decided():
+    """What was decided before, and need not be decided again."""
+    decided = Decided.read()
+    yield decided
+    decided.keep()
 
 
 @pytest.fixture

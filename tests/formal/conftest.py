@@ -1,34 +1,19 @@
-"""What proofs share: a folder for the netlist, verdicts that say what they found, and the record of them."""
+"""What proofs share: a folder for the netlist, and verdicts that say what they found."""
 
 import inspect
-import os
 import textwrap
-from pathlib import Path
 
 import pytest
 
 from blysk.golden.number.fixed import Fixed, Format
 
 from .bounds import Bounds
-from .prover import Record, missing_tool
+from .prover import expect, missing_tool
 from .rules import never_resumes
-
-DECIDED = Path(__file__).with_name("decided.txt")
-"""Digests of the statements that `make decided` has decided."""
-
-
-@pytest.fixture(scope="session")
-def record():
-    """What was decided before; what this run used is appended to the file that ``DECIDED`` names."""
-    record = Record(DECIDED.read_text(encoding="ascii").split())
-    yield record
-    if path := os.environ.get("DECIDED"):
-        with open(path, "a", encoding="ascii") as file:
-            file.writelines(f"{digest}\n" for digest in sorted(record.used))
 
 
 @pytest.fixture
-def prove(record, tmp_path):
+def prove(decided, tmp_path):
     """Prove the claims of a harness, for runs of any length, or of so many cycles from power-up.
 
     So many must be enough for a beat to wait, another to come, and one to leave.
@@ -37,26 +22,26 @@ def prove(record, tmp_path):
         pytest.skip(missing_tool())
 
     def prove(harness, cycles=None):
-        verdict = record.expect(True, harness, tmp_path, cycles)
+        verdict = expect(True, harness, tmp_path, cycles, decided=decided)
         assert verdict.holds is not None, f"not decided in time, after {verdict.cycles} cycles"
         assert verdict.holds, f"refuted after {verdict.cycles} cycles:\n{verdict.trace}"
         if cycles is not None:
             runs = harness.without_claims()
             never_resumes(runs)
-            moves = record.expect(False, runs, tmp_path, cycles)
+            moves = expect(False, runs, tmp_path, cycles, decided=decided)
             assert moves.holds is False, f"nothing moves on in {cycles} cycles"
 
     return prove
 
 
 @pytest.fixture
-def refute(record, tmp_path):
+def refute(decided, tmp_path):
     """Find a counterexample to the claims of a harness, of at most so many cycles; the injected bug's."""
     if missing_tool():
         pytest.skip(missing_tool())
 
     def refute(harness, cycles=40):
-        verdict = record.expect(False, harness, tmp_path, cycles)
+        verdict = expect(False, harness, tmp_path, cycles, decided=decided)
         assert verdict.holds is False, f"no counterexample in {verdict.cycles} cycles"
 
     return refute

@@ -1,10 +1,8 @@
 """Proofs of hardware: what is claimed of a unit for all inputs, decided by Yosys and ABC (package pyosys)."""
 
-import hashlib
 import re
 import subprocess
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +13,9 @@ from amaranth.lib.wiring import Component, In
 
 from blysk.sim.installation import install_extra
 
-__all__ = ["Harness", "Record", "Verdict", "decide", "missing_tool"]
+from ..decided import Decided, digest_of
+
+__all__ = ["Harness", "Verdict", "decide", "expect", "missing_tool"]
 
 _YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
 
@@ -155,44 +155,23 @@ def _run_yosys(script: str, folder: Path) -> None:
         raise RuntimeError(f"Yosys failed: {done.stderr[-2000:] or done.stdout[-2000:]}")
 
 
-class Record:
-    """Statements that were decided before, each with the verdict that was expected of it, by their digests.
+def expect(
+    holds: bool, harness: Harness, folder: Path, cycles: int | None = None, *, decided: Decided
+) -> Verdict:
+    """The expected verdict if it was found before, otherwise that of `decide`.
 
-    A digest is that of all that a verdict depends on: the netlist with its claims, but for the places in the
-    source, the commands of Yosys and ABC with the number of cycles, and the expected verdict. Where a unit or
-    a claim changes, its statements have other digests, and are decided anew.
-
-    Parameters
-    ----------
-    digests : iterable of str
-        Those that are known.
-
-    Attributes
-    ----------
-    used : set
-        Digests that were asked for, and were there or were decided as expected.
+    What it depends on: the netlist with its claims, but for the places in the source, the commands of Yosys
+    and ABC with the number of cycles, and the expected verdict itself.
     """
-
-    def __init__(self, digests: Iterable[str]):
-        self._known = set(digests)
-        self.used: set[str] = set()
-
-    @staticmethod
-    def digest(netlist: str, cycles: int | None, multiplies: bool, holds: bool) -> str:
-        """Digest of a statement and of its expected verdict."""
-        text = re.sub(r"^ *attribute \\src .*\n", "", netlist, flags=re.MULTILINE)
-        parts = text, *_commands(cycles, multiplies), str(holds)
-        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
-
-    def expect(self, holds: bool, harness: Harness, folder: Path, cycles: int | None = None) -> Verdict:
-        """The expected verdict if it is known, otherwise that of `decide`."""
-        netlist = harness.netlist()
-        digest = self.digest(netlist, cycles, harness.multiplies, holds)
-        known = digest in self._known
-        verdict = Verdict(holds, 0) if known else decide(netlist, folder, cycles, harness.multiplies)
-        if verdict.holds is holds:
-            self.used.add(digest)
-        return verdict
+    netlist = harness.netlist()
+    text = re.sub(r"^ *attribute \\src .*\n", "", netlist, flags=re.MULTILINE)
+    digest = digest_of(text, _commands(cycles, harness.multiplies), holds)
+    if decided.knows(digest):
+        return Verdict(holds, 0)
+    verdict = decide(netlist, folder, cycles, harness.multiplies)
+    if verdict.holds is holds:
+        decided.add(digest)
+    return verdict
 
 
 def _commands(cycles: int | None, multiplies: bool) -> tuple[str, str]:

@@ -3,7 +3,8 @@
 import pytest
 from amaranth.hdl import Mux, Signal, unsigned
 
-from .prover import Harness, Record, missing_tool
+from ..decided import Decided
+from .prover import Harness, expect, missing_tool
 
 pytestmark = [pytest.mark.prove, pytest.mark.skipif(bool(missing_tool()), reason=missing_tool())]
 
@@ -18,20 +19,20 @@ def of_counter(last):
 
 
 def test_what_was_decided_is_known_and_nothing_else(tmp_path):
-    first = Record([])
-    assert first.expect(True, of_counter(5), tmp_path).holds is True
+    first = Decided([])
+    assert expect(True, of_counter(5), tmp_path, decided=first).holds is True
     assert (tmp_path / "top.aig").is_file()
     for k, (harness, cycles) in enumerate([(of_counter(5), None), (of_counter(4), None), (of_counter(5), 4)]):
         (folder := tmp_path / str(k)).mkdir()
-        verdict = Record(first.used).expect(True, harness, folder, cycles)
+        verdict = expect(True, harness, folder, cycles, decided=Decided(first.used))
         assert verdict.holds is (k != 1)
         # Only what is not known is decided.
         assert any(folder.iterdir()) == (k != 0)
 
 
 def test_a_verdict_that_is_not_expected_is_not_kept(tmp_path):
-    record = Record([])
-    assert record.expect(True, of_counter(4), tmp_path).holds is False
-    assert not record.used
-    assert record.expect(False, of_counter(4), tmp_path).holds is False
-    assert Record(record.used).expect(True, of_counter(4), tmp_path).holds is False
+    decided = Decided([])
+    assert expect(True, of_counter(4), tmp_path, decided=decided).holds is False
+    assert not decided.used
+    assert expect(False, of_counter(4), tmp_path, decided=decided).holds is False
+    assert expect(True, of_counter(4), tmp_path, decided=Decided(decided.used)).holds is False
