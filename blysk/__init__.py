@@ -4,10 +4,10 @@
 
     import blysk
 
-    frame = blysk.render("teapot", method="chord", exponent=200)
+    frame = blysk.render("teapot", exponent=200)
     frame.save("teapot.png")
     print(frame.error.max_lsb, frame.cycles)
-    text = blysk.verilog(blysk.design(method="chord"))
+    text = blysk.verilog(blysk.design(lights=2))
 """
 
 from importlib import import_module
