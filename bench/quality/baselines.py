@@ -232,7 +232,7 @@ def _command(words: Sequence[str], update: bool, jobs: int) -> int:
     print(f"{len(new)} entries, {len(moved)} differences, {len(far)} of more than {TOLERANCE:.0%}")
     if update:
         whole = new | kept
-        write_json(FILE, {name: whole[name] for name in dict.fromkeys([*ENTRIES, *whole])})
+        write_json(FILE, {name: whole[name] for name in dict.fromkeys([*ENTRIES, *whole]) if name in whole})
         print(f"written: {FILE}")
     elif far:
         print(f"if that is meant: {UPDATE}")

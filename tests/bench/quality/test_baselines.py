@@ -204,6 +204,9 @@ def test_words_choose_entries(small, capsys):
     assert main(["one", "--update"]) == 0
     assert "1 entries, 1 differences" in capsys.readouterr().out
     assert json.loads(path.read_text()) == {"one": figures["one"], "two": {"cells": 5}, "gone": {"cells": 1}}
+    path.write_text("{}")
+    assert main(["one", "--update"]) == 0
+    assert json.loads(path.read_text()) == {"one": figures["one"]}
     assert main(["ne", "--jobs", "1"]) == 0
     assert main(["nothing"]) == 2
     assert "nothing: is in the name of no entry; " in capsys.readouterr().err
