@@ -90,7 +90,7 @@ def test_switched_pixels_are_told_apart(side):
     product = quantise(normals) @ quantise(light)
     # The model's N·L is cut to 25 of these 34 fraction bits.
     (normal, *_) = normals[side * product < -(2**10)]
-    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"], "renormalise")
+    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"], "quadratic")
     assert point.over == point.switched == point.pixels > 20
     assert point.switched_cosine == pytest.approx(1e-9, rel=0.01)
     assert point.max_lsb > 5
@@ -106,7 +106,7 @@ def test_a_wrong_sign_is_no_excuse(monkeypatch):
     constants = FrameConstants.of(frame.scene, 1)
     behind = replace(constants, direction=-constants.direction)
     monkeypatch.setattr(sweep, "constants_of", lambda *_: [behind])
-    (point,) = frame.points(1, ["blinn_product"], "renormalise")
+    (point,) = frame.points(1, ["blinn_product"], "quadratic")
     assert point.over == point.pixels > 20
     assert point.switched == 0
     assert point.steady_lsb == point.max_lsb > 5

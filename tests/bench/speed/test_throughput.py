@@ -75,7 +75,7 @@ def test_lengths_of_nothing():
 
 
 def test_spans_hold_the_frame():
-    """Cutting moves no pixel; the chord method, which has true middles, needs fewer spans."""
+    """Cutting moves no pixel; renormalise, which has the true line, needs fewer spans."""
     scene = scene_for(teapot(1000), 1000, 160, 120)
     pixels = len(rasterise(scene).span)
     count = {}
@@ -139,4 +139,4 @@ def test_json(counted, capsys):
 def test_target(counted, capsys):
     counted["cycles"] = 1.06
     assert main([*SMALL, "--methods", "renormalise"]) == 1
-    assert capsys.readouterr().err.count("cycles a pixel, spans of 16+: chord, setup interval") == 2
+    assert capsys.readouterr().err.count("cycles a pixel, spans of 16+: renormalise, setup interval") == 2
