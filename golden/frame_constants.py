@@ -14,6 +14,8 @@ from blysk.golden.reference.reflection import ReflectionModel
 from blysk.golden.reference.scene import Scene
 
 __all__ = [
+    "AXES_ADDRESS",
+    "AXIS_STRIDE",
     "BANK_ADDRESS",
     "FIELDS_OF_A_FRAME",
     "FIELDS_OF_A_LIGHT",
@@ -45,6 +47,15 @@ THRESHOLD_ADDRESS = 6
 
 BANK_ADDRESS = 7
 """Address of the bank of a material's table, in a pipeline with several banks."""
+
+AXES_ADDRESS = 256
+"""Address from which on further lights have the axes of their frames, `LIGHT_STRIDE` addresses each.
+
+For hardware that makes their components of a vector in the frame of the first light, see `LightAdapter`.
+"""
+
+AXIS_STRIDE = 4
+"""Addresses from an axis of a light to the next."""
 
 MAX_MATERIALS = 1024
 """Largest number of materials of a pipeline."""
@@ -78,6 +89,10 @@ class FrameConstants:
     threshold : int, optional
         Threshold of that table, see `Design.threshold_of`, for a design in which a gate or a span limit needs
         it.
+    axes : int array, shape (lights - 1, rows, 3), optional
+        Axes of the frame of each further light, in the frame of the first: x, y, z, or with highlights of R·V
+        x, ``y cos a``, z, or without highlights z alone; ``SQ(1, 17)``. For a renderer of triangles whose
+        method takes vectors.
     """
 
     exponent: int
@@ -89,6 +104,7 @@ class FrameConstants:
     lobe: LobeTable | None = None
     bank: int = 0
     threshold: int | None = None
+    axes: np.ndarray | None = None
 
     @property
     def highlight(self) -> int | LobeTable:
@@ -202,6 +218,10 @@ class FrameConstants:
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():
                 address += range(base + first, base + first + count)
                 data += getattr(self, name)[light].tolist()
+        for light, rows in enumerate(() if self.axes is None else self.axes, 1):
+            base = AXES_ADDRESS + light * LIGHT_STRIDE
+            address += [base + AXIS_STRIDE * row + k for row in range(len(rows)) for k in range(3)]
+            data += np.ravel(rows).tolist()
         return {"address": np.array(address), "data": np.array(data) & 0x3FFFF}
 
 
@@ -243,6 +263,7 @@ def address_table(
     threshold: Format | None = None,
     loads_tables: bool = False,
     members: str = "normals",
+    axes: Sequence[str] = (),
 ) -> list[str]:
     """Lines of text with the address and format of every frame constant of a pipeline.
 
@@ -258,6 +279,8 @@ def address_table(
         Whether tables are loaded.
     members : str
         What a span brings, see `Design.span_members`.
+    axes : sequence of str
+        Names of the axes that each further light has, see `FrameConstants.axes`.
     """
     vectors = {name: f"{text}, SQ(1, 17)" for name, text in VECTOR_MEANINGS[members].items()}
     meanings = _MEANINGS | vectors
@@ -273,9 +296,14 @@ def address_table(
     for light in range(lights):
         base = (light + 1) * LIGHT_STRIDE
         rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]
+    meanings |= {axis: f"{axis} in the frame of light 0, SQ(1, 17)" for axis in axes}
+    for light in range(1, lights):
+        base = AXES_ADDRESS + light * LIGHT_STRIDE
+        rows += [(base + AXIS_STRIDE * row, 3, axis) for row, axis in enumerate(axes)]
     lines = []
     for first, count, name in rows:
         last = f" to {first + count - 1}" if count > 1 else ""
-        light = f" (light {first // LIGHT_STRIDE - 1})" if first >= LIGHT_STRIDE else ""
+        number = first // LIGHT_STRIDE - (1 if first < AXES_ADDRESS else AXES_ADDRESS // LIGHT_STRIDE)
+        light = f" (light {number})" if first >= LIGHT_STRIDE else ""
         lines.append(f"  {first:>3}{last:<8} {meanings[name].format(threshold=threshold)}{light}")
     return lines

@@ -10,6 +10,7 @@ from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.depth_test import DepthTest
 from blysk.golden.geometry.edge_normals import TrueSpans
 from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.mirror_adapter import MirrorAdapter
 from blysk.golden.geometry.span_adapter import LineSpans, shading_spans
 from blysk.golden.geometry.triangles import Frame, Triangles
@@ -69,10 +70,11 @@ class Renderer:
     Parameters
     ----------
     design : Design
-        The shading pipeline, of a method that takes normals, or vectors for one light.
+        The shading pipeline, of a method that takes normals or vectors.
     geometry : Geometry
         The part that makes spans of triangles, with ``lines`` for a method that takes true lines, with
-        ``vectors`` for one that takes vectors. ``None``: the geometry that suits the method.
+        ``vectors`` for one that takes vectors, and ``rotates``, too, if there are several lights. ``None``:
+        the geometry that suits the method.
     coarse : CoarseDepth, optional
         Depth test that drops spans, before they are shaded, if all of their pixels are hidden; the picture is
         the same.
@@ -80,7 +82,7 @@ class Renderer:
     Raises
     ------
     ValueError
-        If the method takes values, vectors of several lights, or other words than the geometry gives.
+        If the method takes values, or other words than the geometry gives.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -91,14 +93,12 @@ class Renderer:
 
     def __post_init__(self):
         design, vectors = self.design, self.design.takes_vectors
-        suits = Geometry(lines=design.interpolator.takes_line and not vectors, vectors=vectors)
+        lines = design.interpolator.takes_line and not vectors
+        suits = Geometry(lines=lines, vectors=vectors, rotates=vectors and design.lights > 1)
         if self.geometry is None:
             object.__setattr__(self, "geometry", suits)
         if design.takes_values:
             raise ValueError(f"triangles give normals, and {design.method} takes values; use another method")
-        if vectors and design.lights > 1:
-            reason = f"triangles give vectors for one light, not {design.lights}"
-            raise ValueError(f"{reason}; give one light, or use method renormalise")
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
             raise ValueError(f"method {design.method} takes {taken}, the geometry gives {given}")
@@ -107,6 +107,18 @@ class Renderer:
     def mirrors(self) -> bool:
         """Whether vectors of geometry get the components of R·V, by `MirrorAdapter`."""
         return self.design.takes_vectors and self.design.mirror and self.design.lights > 0
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Axes of a further light's frame by which `LightAdapter` makes components; empty with one light."""
+        if not self.geometry.rotates:
+            return ()
+        return ("x", "y cos a" if self.mirrors else "y", "z") if self.design.specular else ("z",)
+
+    @property
+    def rows(self) -> int:
+        """Components that further lights have of a vector of geometry."""
+        return len(self.axes) * (self.design.lights - 1)
 
     def compute(
         self, triangles: Triangles, frame: Frame, constants: FrameConstants | Sequence[FrameConstants]
@@ -120,19 +132,22 @@ class Renderer:
         frame : Frame
             The picture.
         constants : FrameConstants or sequence of FrameConstants
-            As for `Design.compute`.
+            As for `Design.compute`; with several lights and vectors they have axes, as
+            `triangle_frame.triangle_constants` gives them.
+
+        Raises
+        ------
+        ValueError
+            If the constants lack the axes of further lights, or do not suit the design.
         """
         spans, counts = self.geometry.compute(triangles, frame)
-        if self.mirrors:
-            of_a_frame = constants if isinstance(constants, FrameConstants) else constants[0]
-            sine, _, cosine = of_a_frame.direction[0]
-            spans = MirrorAdapter().compute(spans, sine, cosine)
         dropped = 0
         if self.coarse is not None:
             places = (spans.x, spans.y, spans.length, spans.depth, spans.depth_step)
             hidden = self.coarse.compute(*places)
             dropped = int(spans.length[hidden].sum())
             spans = replace(spans, **{name: value[~hidden] for name, value in vars(spans).items()})
+        spans = self._for_lights(spans, constants if isinstance(constants, FrameConstants) else constants[0])
         pixels = self.design.compute(shading_spans(spans), constants)
         test = DepthTest()
         depth = test.depths(spans.length, spans.depth, spans.depth_step)
@@ -151,3 +166,19 @@ class Renderer:
             out_of_range_spans=pixels.out_of_range_spans,
             wide_spans=pixels.wide_spans,
         )
+
+    def _for_lights(
+        self, spans: TrueSpans | LineSpans | VectorSpans, constants: FrameConstants
+    ) -> TrueSpans | LineSpans | VectorSpans:
+        """Vectors with the components of further lights and of highlights of R·V; other spans unchanged."""
+        if not isinstance(spans, VectorSpans):
+            return spans
+        if self.rows:
+            axes = constants.axes
+            if axes is None or axes.shape[0] * axes.shape[1] != self.rows:
+                raise ValueError(f"the constants must have {self.rows} axes of further lights")
+            spans = LightAdapter().compute(spans, axes.reshape(-1, 3))
+        if self.mirrors:
+            sine, _, cosine = constants.direction[0]
+            spans = MirrorAdapter().compute(spans, sine, cosine)
+        return spans

@@ -1,5 +1,7 @@
 """Triangles to pixels: geometry, shading and depth test."""
 
+from itertools import pairwise
+
 from amaranth.hdl import Const, Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
@@ -15,6 +17,7 @@ from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.hdl.geometry.light_adapter import LightAdapterUnit, with_components
 from blysk.hdl.geometry.mirror_adapter import MirrorAdapterUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
 from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_shape, triangle_shape
@@ -65,6 +68,12 @@ PORT_DESCRIPTIONS = {
 }
 """Ports without a ``size``, for the table in Verilog."""
 
+_DEEP = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
+"""Words of a span that the depth test takes, and shading does not."""
+
+_COMPONENTS = 3
+"""Components of a vector of geometry."""
+
 _SHADING = ("out_of_range_spans", "wide_spans")
 
 STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", *_SHADING)
@@ -87,8 +96,9 @@ class RenderUnit(wiring.Component):
     design's build is that of shading, and that of geometry unless ``compact`` says otherwise.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
-    for the pipeline to be empty, see `ShadingPipelineUnit`. With highlights of R·V `MirrorAdapterUnit` makes
-    the components of vectors that geometry does not have. It reads L of the light: write that before the
+    for the pipeline to be empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
+    highlights of R·V, `MirrorAdapterUnit` make the components of vectors that geometry does not have. The one
+    has its own memories for the axes of further lights, the other reads L of the first: write both before the
     frame's first triangle.
 
     Parameters
@@ -141,9 +151,10 @@ class RenderUnit(wiring.Component):
         design, geometry = self.parameters.design, self.parameters.geometry
         grid = geometry.grid
         compact = design.build.style == "compact" if compact is None else compact
-        self.geometry = GeometryUnit(grid, compact, geometry.lines, setups, geometry.vectors)
+        rotates = geometry.rotates
+        self.geometry = GeometryUnit(grid, compact, geometry.lines, setups, geometry.vectors, rotates)
         self.pipeline = ShadingPipelineUnit(design)
-        self._mirror = MirrorAdapterUnit(serial=compact) if self.parameters.mirrors else None
+        self._adapters(compact)
         coarse, bits = self.parameters.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
         self.depth = DepthTestUnit(*bits, size, clears)
@@ -178,13 +189,12 @@ class RenderUnit(wiring.Component):
                 depth.picture.height.eq(given.bottom - given.top),
             ]
 
-        deep = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
-        span = stream.Signature(data.StructLayout({"span": pipeline.i.payload.shape(), **deep}))
+        span = stream.Signature(data.StructLayout({"span": self._span, **_DEEP}))
         made, ready = span.create(path=("made",)), span.create(path=("ready",))
-        source = self._components(m)
+        source = geometry.o
         connect_shading_span(m, source.payload, made.payload.span)
         m.d.comb += [
-            *(made.payload[name].eq(source.payload[name]) for name in deep),
+            *(made.payload[name].eq(source.payload[name]) for name in _DEEP),
             made.valid.eq(source.valid & (room := Signal(name="room"))),
             source.ready.eq(made.ready & room),
         ]
@@ -198,13 +208,12 @@ class RenderUnit(wiring.Component):
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(pipeline.i.valid & pipeline.i.ready):
             m.d.sync += count.eq(count + 1)
-        enters = made if self._mirror is None else geometry.o
-        spans = moving(m, "spans", enters, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
+        spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
         m.d.comb += [
             pixel_last.eq(depth.i.payload.pixel.last),
             self.idle.eq(geometry.idle & depth.idle & ~spans),
         ]
-        waits = stream.Signature(data.StructLayout(deep))
+        waits = stream.Signature(data.StructLayout(_DEEP))
         entering, waiting = waits.create(path=("entering",)), waits.create(path=("waiting",))
         # There is room whenever the pipeline takes a span.
         connect_late_fifo(m, "depths", entering, waiting, pipeline.spans_inside + 1 + UNCOUNTED)
@@ -219,16 +228,21 @@ class RenderUnit(wiring.Component):
             goes = Signal(name="depth_goes")
             m.d.sync += goes.eq(taken)
             taken, there = goes, there & ~goes
+        kept = stream.Signature(ready.payload.shape()).create(path=("kept",))
+        shaded = self._components(m, kept)
         m.d.comb += [
-            pipeline.i.payload.eq(ready.payload.span),
-            *(entering.payload[name].eq(ready.payload[name]) for name in deep),
+            kept.payload.eq(ready.payload),
             given.eq(ready.valid & known),
             dropped.eq(given & drops),
-            entering.valid.eq(given & ~drops & pipeline.i.ready),
-            pipeline.i.valid.eq(given & ~drops & entering.ready),
-            ready.ready.eq(known & (drops | (pipeline.i.ready & entering.ready))),
+            kept.valid.eq(given & ~drops),
+            ready.ready.eq(known & (drops | kept.ready)),
+            pipeline.i.payload.eq(shaded.payload.span),
+            *(entering.payload[name].eq(shaded.payload[name]) for name in _DEEP),
+            entering.valid.eq(shaded.valid & pipeline.i.ready),
+            pipeline.i.valid.eq(shaded.valid & entering.ready),
+            shaded.ready.eq(pipeline.i.ready & entering.ready),
             depth.i.payload.pixel.eq(pixel.payload),
-            *(depth.i.payload[name].eq(waiting.payload[name]) for name in deep),
+            *(depth.i.payload[name].eq(waiting.payload[name]) for name in _DEEP),
             depth.i.valid.eq(pixel.valid & there),
             pixel.ready.eq(depth.i.ready & there),
             waiting.ready.eq(taken),
@@ -239,15 +253,58 @@ class RenderUnit(wiring.Component):
         ]
         return m
 
-    def _components(self, m: Module) -> stream.Interface:
-        """Spans of geometry, with the components that highlights of R·V take of their vectors."""
-        if self._mirror is None:
-            return self.geometry.o
-        m.submodules.mirror = mirror = self._mirror
-        connect(m, self.geometry.o, mirror.i)
-        sine, _, cosine = self.pipeline.direction
-        m.d.comb += [mirror.constants.sine.eq(sine), mirror.constants.cosine.eq(cosine)]
-        return mirror.o
+    def _adapters(self, compact: bool) -> None:
+        """Units for the components of vectors that geometry does not have, and the shape before them."""
+        span, rows, lights = (
+            self.pipeline.i.payload.shape(),
+            self.parameters.rows,
+            self.parameters.design.lights,
+        )
+        self._lights = self._mirror = None
+        self._span = span
+        if not (rows or self.parameters.mirrors):
+            return
+        self._span = with_components(span, _COMPONENTS)
+        shape = data.StructLayout(self._span.members | _DEEP)
+        if rows:
+            self._lights = LightAdapterUnit(lights - 1, rows // (lights - 1), compact, shape)
+        if self.parameters.mirrors:
+            self._mirror = MirrorAdapterUnit(compact, with_components(shape, _COMPONENTS + rows))
+
+    def _components(self, m: Module, span: stream.Interface) -> stream.Interface:
+        """Spans with the components that further lights and highlights of R·V take of their vectors."""
+        units = []
+        if self._lights is not None:
+            m.submodules.lights = self._lights
+            write = self._lights.write
+            m.d.comb += [
+                write.payload.eq(self.write.payload),
+                write.valid.eq(self.write.valid & self.write.ready),
+            ]
+            units.append(self._lights)
+        if self._mirror is not None:
+            m.submodules.mirror = self._mirror
+            sine, _, cosine = self.pipeline.direction
+            constants = self._mirror.constants
+            m.d.comb += [constants.sine.eq(sine), constants.cosine.eq(cosine)]
+            units.append(self._mirror)
+        if not units:
+            return span
+        last = units[-1].o
+        members = {"span": self.pipeline.i.payload.shape(), **_DEEP}
+        made = stream.Signature(data.StructLayout(members)).create(path=("shaded",))
+        for (source, of_source), (sink, of_sink) in (
+            ((span, _nested), (units[0].i, _flat)),
+            *(((before.o, _flat), (after.i, _flat)) for before, after in pairwise(units)),
+            ((last, _flat), (made, _nested)),
+        ):
+            taken, given = of_source(source.payload), of_sink(sink.payload)
+            m.d.comb += [
+                *(Value.cast(given[name]).eq(Value.cast(taken[name])) for name in given),
+                sink.valid.eq(source.valid),
+                source.ready.eq(sink.ready),
+            ]
+        return made
 
     def _judge(
         self, m: Module, span: stream.Interface, room: Signal, taken: Value, head: stream.Interface
@@ -280,6 +337,16 @@ class RenderUnit(wiring.Component):
         with m.If(answers.ready & answers.valid & answers.payload):
             m.d.sync += count.eq(count + head.payload.span.length)
         return answers.valid, answers.payload
+
+
+def _flat(payload: data.View) -> dict[str, Value]:
+    """Words of a span and of its depths."""
+    return {name: payload[name] for name in payload.shape().members}
+
+
+def _nested(payload: data.View) -> dict[str, Value]:
+    """The same of a payload in which those of the span are apart."""
+    return _flat(payload.span) | {name: payload[name] for name in _DEEP}
 
 
 def _constants_shape(picture: bool) -> data.StructLayout:

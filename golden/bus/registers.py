@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from blysk.golden.frame_constants import (
+    AXES_ADDRESS,
+    AXIS_STRIDE,
     BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
@@ -154,13 +156,15 @@ _OF_A_LIGHT = {
 }
 
 
-def constant_registers(design: Design) -> list[Register]:
+def constant_registers(design: Design, axes: Sequence[str] = ()) -> list[Register]:
     """Registers of the frame constants: one for each address of the write port, from `CONSTANTS` on.
 
     Parameters
     ----------
     design : Design
         The shading pipeline.
+    axes : sequence of str
+        Axes that each further light has, see `Renderer.axes`.
     """
     color, component = Intensity.COLOR_FORMAT, COMPONENT
     formats = {"exponent": (Specular.EXPONENT_BITS, False, "")} | dict.fromkeys(
@@ -196,6 +200,12 @@ def constant_registers(design: Design) -> list[Register]:
     }
     for light in range(design.lights):
         add(f"light{light}_", (light + 1) * LIGHT_STRIDE, FIELDS_OF_A_LIGHT, texts_of_a_light)
+    for light in range(1, design.lights):
+        for row, axis in enumerate(axes):
+            base = AXES_ADDRESS + light * LIGHT_STRIDE + row * AXIS_STRIDE
+            text = f"axis {axis} in the frame of light 0, component times 2^17"
+            words = component.width, True, str(component), text
+            rows += [(f"light{light}_axis_{axis[0]}_{'xyz'[k]}", base + k, *words) for k in range(3)]
     ranges = {"material": (0, design.materials - 1), "bank": (0, design.banks - 1)}
     return [
         Register(

@@ -137,7 +137,10 @@ def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) ->
         error += longest * (2 * np.sqrt(3) * LineAdapter.ERROR + LineSetup.ERROR)
     elif renderer.geometry.vectors:
         change = np.linalg.norm(right - left, axis=1)
-        error += np.sqrt(3) * (np.maximum(longest, VectorAdapter.SHORTEST) + change) * VectorAdapter.ERROR
+        # Vectors that are to be turned may be half as long in their words, and are rounded again.
+        factor = 4 if renderer.geometry.rotates else 1
+        shortest = np.maximum(longest, VectorAdapter.SHORTEST)
+        error += factor * np.sqrt(3) * (shortest + change) * VectorAdapter.ERROR
     return np.minimum(error / np.maximum(nearest(left, right), SPAN_NORMAL.step), np.pi)
 
 

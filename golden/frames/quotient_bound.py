@@ -6,9 +6,9 @@ import numpy as np
 
 from blysk.golden.frames.missed import component_error, nearest
 from blysk.golden.frames.prepare import span_vectors
+from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.plane_setup import PlaneSetup
 from blysk.golden.geometry.scene_triangles import SceneTriangles
-from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.geometry.vertex_sort import SortedTriangles
@@ -42,9 +42,9 @@ def quotient_bound(scene: Scene, design: Design, cut: Raster) -> float:
     assert isinstance(method, QuotientInterpolator)
     if not len(cut.length):
         return 0.5
-    return _bound(
-        scene, design, QuotientErrors.of(span_vectors(scene, cut, design), cut.length, method.mirror)
-    )
+    vectors = span_vectors(scene, cut, design)
+    errors = [QuotientErrors.of(vectors, cut.length, method.mirror, further) for further in (False, True)]
+    return _bound(scene, design, *errors)
 
 
 def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
@@ -53,7 +53,8 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     A component of N/W is off by `component_error`, times the shift, and by the words of `VectorAdapter`: half
     a step for the start, the rounding of the step, and an eighth of a step for cuts. Slivers, which have the
     attributes of their longest edge, are off by those of their middle corner against that edge, too.
-    `MirrorAdapter` turns psi by 2^-15 at most.
+    `MirrorAdapter` turns psi by 2^-15 at most. Components of further lights have the error of the vector that
+    `LightAdapter` turns, that of its axes, and a rounding of their own.
 
     Parameters
     ----------
@@ -73,21 +74,31 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     if not len(pieces):
         return 0.5
     left, right = pieces.left.values, pieces.right.values
-    steps = np.ldexp(
-        2.0**17 * (1 - 2.0**-VectorAdapter.MARGIN_SHIFT), SpanHalver().shift(pieces.left, pieces.right)
-    )
+    adapter = VectorAdapter(renderer.geometry.rotates)
+    steps = np.ldexp(2.0**17 * (1 - 2.0**-adapter.margin_shift), adapter.shift(pieces))
     last = pieces.length - 1.0
     difference = np.abs(right - left).max(axis=1) * steps
-    rounding = np.where(last > 0, np.maximum(difference * 2.0**-17, 1 / 16) + 1 / 8, 0)
+    # Of the step, whose word is a bit shorter where it is to be turned; and its cuts.
+    of_step = np.maximum(difference * 2.0**-17, 1 / 16) * (1 + adapter.rotates)
+    rounding = np.where(last > 0, of_step + 1 / 8, 0)
     error = component_error(drawn, pieces, renderer) + _across_slivers(drawn, renderer)[pieces.triangle]
     component = 0.5 + rounding + error * steps
     shortest = nearest(left, right) * steps - 2 * component
     if (shortest <= 2 * component).any():
         return None
     errors = QuotientErrors.of_words(component, shortest, last, renderer.mirrors)
-    if renderer.mirrors:
-        errors = replace(errors, turn=errors.turn + 2.0**-15)
-    return _bound(scene, renderer.design, errors)
+    mirrored = 2.0**-15 * renderer.mirrors
+    errors = replace(errors, turn=errors.turn + mirrored)
+    if not renderer.rows:
+        return _bound(scene, renderer.design, errors)
+    longest = np.maximum(*(np.linalg.norm(end, axis=1) for end in (left, right))) * steps
+    own = component + 0.5 + np.where(last > 0, of_step, 0) + LightAdapter.AXIS_ERROR * longest / np.sqrt(3)
+    if (shortest <= 4 * own).any():
+        return None
+    further = QuotientErrors.of_words(own, shortest, last, renderer.mirrors, component)
+    # The codes of sin a and cos a of the first light change q, too.
+    further = replace(further, mismatch=further.mismatch + mirrored)
+    return _bound(scene, renderer.design, errors, further)
 
 
 def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
@@ -100,18 +111,24 @@ def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
     return np.where(sliver, np.abs(across).max(axis=1), 0)
 
 
-def _bound(scene: Scene, design: Design, errors: QuotientErrors) -> float:
-    """From the bounds of directions to that of a pixel."""
+def _bound(
+    scene: Scene, design: Design, errors: QuotientErrors, further: QuotientErrors | None = None
+) -> float:
+    """From the bounds of directions, of the first light and of further ones, to that of a pixel."""
     lobe = design.specular
     assert isinstance(lobe, QuotientLobe)
+    kinds = [errors] if further is None or len(scene.lights) < 2 else [errors, further]
     largest = 0.0
     for material in scene.materials:
         parameter = design.highlight_parameter(material)
-        highlight = errors.highlight(lobe.model, parameter) + lobe.line_error(parameter) + Lobe.ERROR
+        table = lobe.line_error(parameter) + Lobe.ERROR
+        highlights = [bounds.highlight(lobe.model, parameter) + table for bounds in kinds]
         total = np.zeros(3)
-        for light in scene.lights:
+        for index, light in enumerate(scene.lights):
+            kind = min(index, len(kinds) - 1)
+            bounds, highlight = kinds[kind], highlights[kind]
             reflection = material.reflection(distant_cosine(light, scene.distant_viewer))
-            diffuse = np.multiply(material.diffuse, errors.cosine + 2.0**-18)
+            diffuse = np.multiply(material.diffuse, bounds.cosine + 2.0**-18)
             total += light.color * (diffuse + np.multiply(reflection, highlight))
         largest = max(largest, float(total.max()))
     return 0.5 + 255 * largest + (1 + 2 * len(scene.lights)) / 128

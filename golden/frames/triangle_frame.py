@@ -1,20 +1,29 @@
 """A frame by triangles: a scene drawn by the bit-accurate models of geometry, shading and depth test."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.vector_axes import triangle_axes
+from blysk.golden.frames.vector_axes import further_axes, triangle_axes
+from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
 from blysk.golden.geometry.triangles import Frame
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
-__all__ = ["TriangleFrame", "frame_of_pixels", "sent_triangles", "span_angle", "triangle_frame"]
+__all__ = [
+    "TriangleFrame",
+    "frame_of_pixels",
+    "sent_triangles",
+    "span_angle",
+    "triangle_constants",
+    "triangle_frame",
+]
 
 _SPAN_ANGLE = 5.0
 """Widest piece of a span in degrees, for methods without a `SpanLimit`."""
@@ -79,6 +88,26 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle), axes).by_material()
 
 
+def triangle_constants(scene: Scene, renderer: Renderer) -> list[FrameConstants]:
+    """Frame constants of each material of a scene, with the axes of further lights, for a renderer.
+
+    Parameters
+    ----------
+    scene, renderer
+        As for `triangle_frame`.
+
+    Raises
+    ------
+    ValueError
+        As `constants_of` does.
+    """
+    constants = constants_of(scene, renderer.design)
+    if not renderer.rows:
+        return constants
+    axes = LightAdapter.codes_of(further_axes(scene, renderer.design))
+    return [replace(constants[0], axes=axes), *constants[1:]]
+
+
 def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarray) -> np.ndarray:
     """Frame buffer after pixels are written in their order over the background.
 
@@ -120,7 +149,7 @@ def triangle_frame(scene: Scene, renderer: Renderer, angle: float | None = None)
         If the scene has point lights or a near viewer, or does not fit the design.
     """
     sent = sent_triangles(scene, renderer, angle)
-    drawn = renderer.compute(sent.triangles, sent.frame, constants_of(scene, renderer.design))
+    drawn = renderer.compute(sent.triangles, sent.frame, triangle_constants(scene, renderer))
     owner = np.full((scene.height, scene.width), -1, dtype=np.int64)
     owner[drawn.y, drawn.x] = sent.source[drawn.triangle]
     return TriangleFrame(frame_of_pixels(scene, drawn.x, drawn.y, drawn.color), sent, owner, drawn.counts)

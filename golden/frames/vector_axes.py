@@ -6,7 +6,7 @@ from blysk.golden.pipeline import Design
 from blysk.golden.reference.light_frame import LightFrame, light_frame
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["light_frames", "triangle_axes", "vector_axes"]
+__all__ = ["further_axes", "light_frames", "triangle_axes", "vector_axes"]
 
 
 def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
@@ -60,6 +60,22 @@ def triangle_axes(scene: Scene, design: Design) -> np.ndarray:
     float64 array, shape (3, 3)
     """
     return _axes(light_frames(scene, 1)[0], design.vector_spans.highlights)
+
+
+def further_axes(scene: Scene, design: Design) -> np.ndarray:
+    """Axes of further lights in the frame of the first, as `FrameConstants` has them, in float64.
+
+    Parameters
+    ----------
+    scene, design
+        As for `vector_axes`; two lights at least.
+
+    Returns
+    -------
+    float64 array, shape (lights - 1, rows, 3)
+    """
+    rows = vector_axes(scene, design) @ triangle_axes(scene, design).T
+    return rows[3 : len(rows) - design.vector_spans.mirror].reshape(design.lights - 1, -1, 3)
 
 
 def _axes(frame: LightFrame, highlights: bool) -> np.ndarray:

@@ -40,11 +40,14 @@ class Geometry:
     vectors : bool
         Whether spans have N/W at the first pixel and its step in place of unit normals: they are cut by
         `SpanHalver`, and no normal is normalised. Not with ``lines``.
+    rotates : bool
+        Whether vectors are to be turned into the frames of further lights, see `VectorAdapter`; only with
+        ``vectors``.
 
     Raises
     ------
     ValueError
-        If spans are to have both lines and vectors.
+        If spans are to have both lines and vectors, or to be turned without vectors.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -52,15 +55,19 @@ class Geometry:
     grid: Grid = GRID
     lines: bool = False
     vectors: bool = False
+    rotates: bool = False
 
     def __post_init__(self):
         if self.lines and self.vectors:
             raise ValueError("spans have true lines or vectors, not both")
+        if self.rotates and not self.vectors:
+            raise ValueError("only vectors are turned into the frames of lights")
 
     @property
     def gives(self) -> str:
-        """What spans have: ``"unit normals"``, ``"true lines"`` or ``"vectors"``."""
-        return "true lines" if self.lines else "vectors" if self.vectors else "unit normals"
+        """What spans have: unit normals, true lines, vectors, or vectors for several lights."""
+        vectors = "vectors for several lights" if self.rotates else "vectors"
+        return "true lines" if self.lines else vectors if self.vectors else "unit normals"
 
     def rows(
         self, triangles: Triangles, frame: Frame
@@ -88,7 +95,7 @@ class Geometry:
         planes, sliver = self.planes(drawn, frame)
         pieces, more = SpanAttributes(self.vectors).compute(rows, planes)
         if self.vectors:
-            pieces, more["cut"] = SpanHalver().compute(pieces)
+            pieces, more["cut"] = SpanHalver(self.rotates).compute(pieces)
         counts = {
             **counts,
             "empty": counts["empty"] + more["empty"],
@@ -130,5 +137,5 @@ class Geometry:
     def _shaded(self, pieces: Pieces) -> tuple[TrueSpans | LineSpans | VectorSpans, int]:
         """What the pipeline reads of pieces, and the number of normals that were repaired."""
         if self.lines or self.vectors:
-            return (LineAdapter() if self.lines else VectorAdapter()).compute(pieces), 0
+            return (LineAdapter() if self.lines else VectorAdapter(self.rotates)).compute(pieces), 0
         return EdgeNormals().compute(pieces)

@@ -15,6 +15,8 @@ __all__ = ["MirrorAdapter"]
 class MirrorAdapter:
     """Components x, ``y cos a``, z and ``y sin a`` of `SpanVectors`, from x, y and z.
 
+    Those of further lights stay as they are, before ``y sin a``.
+
     Start and step are multiplied by the codes of sin a and cos a that the pipeline has as direction to the
     light, and rounded half up to 17 fraction bits: products of 18 bits. Of a span of one pixel, whose step
     has no meaning, the step has the products of the start.
@@ -34,7 +36,7 @@ class MirrorAdapter:
         Parameters
         ----------
         spans : VectorSpans
-            From `VectorAdapter`.
+            From `VectorAdapter` or `LightAdapter`.
         sine, cosine : int
             Codes of sin a and cos a, `FORMAT`.
         """
@@ -45,7 +47,7 @@ class MirrorAdapter:
         return replace(spans, start=start, step=self._components(spans.step, y * factors))
 
     def _components(self, vector: np.ndarray, products: np.ndarray) -> np.ndarray:
-        """x, rounded ``y cos a``, z, rounded ``y sin a``."""
+        """x, rounded ``y cos a``, z, those of further lights, rounded ``y sin a``."""
         bits = self.FORMAT.fraction_bits
         along, across = ((products + (1 << (bits - 1))) >> bits).T
-        return np.stack([vector[:, 0], along, vector[:, 2], across], axis=1)
+        return np.column_stack([vector[:, 0], along, vector[:, 2:], across])

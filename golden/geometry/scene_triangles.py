@@ -116,6 +116,10 @@ def scene_triangles(
     position = np.rint(records[..., :2] / w[..., np.newaxis] * grid.steps).astype(np.int64)
     position = np.clip(position, grid.coordinate.min_code, grid.coordinate.max_code)
     normal = records[..., 4:] * (w.min(axis=1, keepdims=True) / w)[..., np.newaxis]
+    # Normals of a mesh may be a little longer than 1; vectors in the frame of a light may not.
+    longest = np.linalg.norm(normal, axis=2).max(axis=1)
+    beyond = (longest > 1 + ATTRIBUTE.step) & (axes is not None)
+    normal[beyond] /= longest[beyond, np.newaxis, np.newaxis]
     depth = -1 / w if scene.camera.projection == "perspective" else records[..., 3]
     near, far = (depth.min(), depth.max()) if len(depth) else (0.0, 1.0)
     depth = (depth - near) * (_FARTHEST / ((far - near) or 1.0))

@@ -39,14 +39,24 @@ class SpanHalver:
     its first pixel to the one in the middle, whose N/W is the mean of both ends. The pixels that are left are
     tried together.
 
+    Parameters
+    ----------
+    rotates : bool
+        Whether vectors are to be turned into other frames, see `VectorAdapter`. Then a span of two pixels
+        fits only if no component of its ends differs by 9/16 or more, as its step has to be shorter than 1:
+        the first `BITS` bits of the components, with their signs, are at most `STEEP` apart.
+
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
+
+    rotates: bool = False
 
     BITS = 4
     LARGEST_SHIFT = 7
     AXIS = 5 / 16
     PAIR = 1 / 2
     SHORTEST = 5 / 16
+    STEEP = 1 / 2
 
     def compute(self, spans: WholeSpans) -> tuple[Pieces, int]:
         """Bit-accurate pieces with steps, and the number of spans that were cut.
@@ -147,5 +157,8 @@ class SpanHalver:
             sums = size[..., j] + size[..., k]
             long |= same[:, j] & same[:, k] & (sums >= pair).all(axis=0)
         large = (size >= half).any(axis=0)
-        steep = (pixels == 2) & (~same & large).any(axis=1)
-        return (pixels == 1) | ((long | ~large.any(axis=1)) & ~steep)
+        steep = (~same & large).any(axis=1)
+        if self.rotates:
+            left, right = (end.codes << shift >> cut for end in (first, last))
+            steep = (np.abs(left - right) > int(self.STEEP * 2**self.BITS)).any(axis=1)
+        return (pixels == 1) | ((long | ~large.any(axis=1)) & ~(steep & (pixels == 2)))

@@ -68,10 +68,23 @@ class VectorAdapter:
     ends at the right end, or a sixteenth of a step, and its cut up to an eighth. The errors of N/W and of the
     triangle's gradient are added to that. All together are under 4 steps.
 
+    Parameters
+    ----------
+    rotates : bool
+        Whether vectors are to be turned into other frames, so that lengths, and not components alone, have to
+        be under 1: those of the vectors and of their steps. Then the shift and e are one less, where they are
+        not 0. N/W has to be no longer than 1, as `scene_triangles` makes it, and spans are cut by
+        `SpanHalver` with ``rotates``. A start keeps its rounding where the shift is 0, else it is twice as
+        large for its length. That of the step is an eighth of a step, or twice the distance of the ends. The
+        margin is 2^-12, 32 steps of 2^-17, as the errors of both add up.
+
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
 
+    rotates: bool = False
+
     MARGIN_SHIFT = 14
+    ROTATED_MARGIN_SHIFT = 12
     ERROR = 2.0**-17
     SHORTEST = 2.0**-8
     FORMAT = QuotientSpans.COMPONENT_FORMAT
@@ -96,16 +109,28 @@ class VectorAdapter:
         if step is None or {pieces.left.format, pieces.right.format, step.format} != {SPAN_NORMAL, SPAN_STEP}:
             raise ValueError(f"pieces must have ends of {SPAN_NORMAL} and steps of {SPAN_STEP}")
         flip, turned = (np.asarray(flag, dtype=bool)[:, np.newaxis] for flag in (pieces.flip, pieces.turned))
-        shift = SpanHalver().shift(pieces.left, pieces.right)[:, np.newaxis]
+        shift = self.shift(pieces)[:, np.newaxis]
         start = self._rounded(self._smaller(pieces.left.codes << shift), flip, SPAN_NORMAL.fraction_bits)
         # Modulo 2: steps that are larger come in pieces of one pixel alone.
         whole = 1 << self.STEP_BITS
         shifted = (((step.codes << shift) + whole) & (2 * whole - 1)) - whole
         exponent = np.minimum(self.STEP_BITS - _used(shifted), self.LARGEST_EXPONENT)
+        if self.rotates:
+            exponent = np.maximum(exponent - 1, 0)
         word = self._rounded(
             self._smaller(shifted) << exponent[:, np.newaxis], flip != turned, self.STEP_BITS
         )
         return VectorSpans.of(pieces, start=start, step=word, exponent=exponent)
+
+    @property
+    def margin_shift(self) -> int:
+        """A word x becomes ``x - 2^-margin_shift x``."""
+        return self.ROTATED_MARGIN_SHIFT if self.rotates else self.MARGIN_SHIFT
+
+    def shift(self, pieces: Pieces) -> np.ndarray:
+        """Places by which N/W of pieces is shifted: int64 array, shape (S,)."""
+        shift = SpanHalver().shift(pieces.left, pieces.right)
+        return np.maximum(shift - 1, 0) if self.rotates else shift
 
     def _rounded(self, codes: np.ndarray, flip: np.ndarray, point: int) -> np.ndarray:
         """Codes with ``point`` fraction bits, negated where told, in `FORMAT`."""
@@ -114,7 +139,7 @@ class VectorAdapter:
 
     def _smaller(self, codes: np.ndarray) -> np.ndarray:
         """Codes with a margin to 1."""
-        return codes - (codes >> self.MARGIN_SHIFT)
+        return codes - (codes >> self.margin_shift)
 
 
 def _used(codes: np.ndarray) -> np.ndarray:

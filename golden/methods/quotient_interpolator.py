@@ -116,7 +116,9 @@ class QuotientErrors:
       a step; the difference is rounded by half of ``2^-e``, which is under ``2 D/(K - 1) 2^-17`` where its
       word is full, and else at most ``1/(8 (K - 1))``;
     - so the direction of v is off by ``asin(sqrt(3) eps / |v|)``;
-    - the accumulators are off by ``(i + i^2/2) 2^-47``, so that s is off by twice as much over q.
+    - the accumulators are off by ``(i + i^2/2) 2^-47``, so that s is off by twice as much over q;
+    - words of a further light are rounded by themselves, and q is that of the first light: it is off, beside
+      ``|v|^2`` of the further light's words, by the sum of both errors.
 
     Parameters
     ----------
@@ -126,6 +128,8 @@ class QuotientErrors:
         Largest error of the highlight's angle: gamma, or psi, in radians.
     drift : float
         Largest error of s by the accumulators.
+    mismatch : float
+        Largest relative error of q beside a light's own words; 0 for the first light.
 
     Source: docs/theory/quotient.md#bound.
     """
@@ -133,9 +137,12 @@ class QuotientErrors:
     angle: float
     turn: float
     drift: float
+    mismatch: float = 0.0
 
     @classmethod
-    def of(cls, vectors: SpanVectors, length: np.ndarray, mirror: bool = False) -> "QuotientErrors":
+    def of(
+        cls, vectors: SpanVectors, length: np.ndarray, mirror: bool = False, further: bool = False
+    ) -> "QuotientErrors":
         """The largest bounds of some spans.
 
         Parameters
@@ -146,6 +153,8 @@ class QuotientErrors:
             Pixels.
         mirror : bool
             Whether the highlight is one of R·V.
+        further : bool
+            Whether the bounds are those of a further light.
         """
         # The components whose squares are q, in the frame of the first light.
         own = [0, 1, 2, -1] if mirror else [0, 1, 2]
@@ -158,7 +167,9 @@ class QuotientErrors:
         square = np.einsum("si,si->s", way, way)
         t = np.clip(-np.einsum("si,si->s", start, way) / np.where(square, square, 1), 0, 1)
         shortest = np.linalg.norm(start + t[:, np.newaxis] * way, axis=1)
-        return cls.of_words(0.5 + difference, np.maximum(shortest - 3, 1), last, mirror)
+        component = 0.5 + difference
+        own = component if further else None
+        return cls.of_words(component, np.maximum(shortest - 3, 1), last, mirror, own)
 
     @classmethod
     def worst(cls, length: int, mirror: bool = False) -> "QuotientErrors":
@@ -176,7 +187,12 @@ class QuotientErrors:
 
     @classmethod
     def of_words(
-        cls, component: np.ndarray, shortest: np.ndarray, last: np.ndarray, mirror: bool = False
+        cls,
+        component: np.ndarray,
+        shortest: np.ndarray,
+        last: np.ndarray,
+        mirror: bool = False,
+        first: np.ndarray | None = None,
     ) -> "QuotientErrors":
         """The largest bounds of some spans whose words are off by more than their rounding.
 
@@ -190,23 +206,32 @@ class QuotientErrors:
             Pixels less 1.
         mirror : bool
             Whether the highlight is one of R·V.
+        first : float array, shape (spans,), optional
+            Of a further light: ``component`` of the first light, whose words make q.
         """
         angle = np.arcsin(np.minimum(np.sqrt(3) * component / shortest, 1))
         # Of R and V the angle turns twice as fast, and y cos a is rounded once more.
         turn = 2 * angle + 2 * np.sqrt(2) * (component + 0.5) / shortest if mirror else angle
         drift = 2 * (last + last**2 / 2) * 2.0**-13 / shortest**2
-        return cls(*(float(bound.max(initial=0)) for bound in (angle, turn, drift)))
+        mismatch = np.zeros(1)
+        if first is not None:
+            # Of the first light's y cos a and y sin a both are rounded.
+            longer = shortest + np.sqrt(3) * first + np.sqrt(0.5) * mirror
+            mismatch = (longer / np.maximum(shortest - np.sqrt(3) * component, 1)) ** 2 - 1
+        return cls(*(float(bound.max(initial=0)) for bound in (angle, turn, drift, mismatch)))
 
     @property
     def cosine(self) -> float:
         """Largest error of N·L: by the normal, the codes of L, and the words of a pixel."""
-        return self.angle + self.drift + 2.0**-16 + 2.0**-17.5 + Quotient.COSINE_ERROR
+        words = 2.0**-16 + 2.0**-17.5 + Quotient.COSINE_ERROR
+        return self.angle + self.drift + self.mismatch / 2 + words
 
     def highlight(self, model: ReflectionModel, parameter: float | None) -> float:
         """Largest error of the specular term, without that of the lobe's table.
 
         The lobe's steepest slope a radian times the error of its angle; its slope over s times the drift, but
-        at most that of the angle ``asin(sqrt(drift))``; and the relative error of s.
+        at most that of the angle ``asin(sqrt(drift))``; the relative error of s; and, of a further light,
+        what the error of q changes.
 
         Parameters
         ----------
@@ -224,7 +249,13 @@ class QuotientErrors:
         # Errors of 1 - s serve where s is over 1/2.
         relative = (rise / np.diff(sine) * np.minimum(sine, 1 - sine)[1:]).max()
         by_drift = min(steepness * self.drift, slope * (1 + model.MIRROR) * np.arcsin(np.sqrt(self.drift)))
-        return float(slope * self.turn + by_drift + relative * Quotient.SINE_ERROR)
+        by_square = 0.0
+        if self.mismatch:
+            moved = np.minimum(np.outer([1 - self.mismatch, 1 + self.mismatch], sine), 1)
+            turned = np.arcsin(np.sqrt(moved)) * (1 + model.MIRROR)
+            beside = model.reflect(np.cos(np.minimum(turned, np.pi / 2)), parameter)
+            by_square = np.abs(beside - value).max()
+        return float(slope * self.turn + by_drift + by_square + relative * Quotient.SINE_ERROR)
 
 
 METHODS = {

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.triangle_frame import span_angle
+from blysk.golden.frames.triangle_frame import span_angle, triangle_constants
 from blysk.golden.frames.vector_axes import triangle_axes
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.pipeline import Design
@@ -23,6 +22,9 @@ from blysk.golden.video.triangle_assembly import TriangleAssembly
 from blysk.golden.video.vertex_unit import ScreenVertices, VertexTransform
 
 __all__ = ["BandPixels", "Drawing", "board_design", "turned"]
+
+_SHORTER = 1 - 2.0**-11
+"""Length of axes with several lights, so that no normal is longer than 1 after the matrix's roundings."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,9 @@ class Drawing:
             for each in scenes
         ]
         axes, sets = np.unique(np.stack(turned_to), axis=0, return_inverse=True)
-        presets = tuple(tuple(constants_of(each, design)) for each in scenes)
+        if renderer.rows:
+            axes = axes * _SHORTER
+        presets = tuple(tuple(triangle_constants(each, renderer)) for each in scenes)
         widest = [span_angle(each, design) if angle is None else angle for each in scenes]
         return cls(
             mesh=mesh,

@@ -93,12 +93,14 @@ class BusUnit(wiring.Component):
         ]
         of_core = self.framing.core.signature.members
         constants = self.framing.constants.shape() if "constants" in of_core else None
-        design = parameters.design if isinstance(parameters, Renderer) else parameters
+        design, axes = parameters, ()
+        if isinstance(parameters, Renderer):
+            design, axes = parameters.design, parameters.axes
         self.map = RegisterMap(
             self.framing.top.title,
             counters,
             frame_registers("keep" in constants.members) if constants else (),
-            constant_registers(design) if "write" in of_core else (),
+            constant_registers(design, axes) if "write" in of_core else (),
         )
         self._registers = RegistersUnit(self.map)
         layouts = self.framing.parameters

@@ -6,7 +6,9 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
+from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
+from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.single_register import connect_register, hold_output
 from blysk.hdl.core.stream import connect, connect_fifo, moving
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
@@ -187,6 +189,9 @@ class GeometryUnit(wiring.Component):
     vectors : bool
         Whether spans have N/W at the first pixel and its step in place of unit normals: they are cut by
         `SpanHalver`, and no normal is normalised; not with ``lines``.
+    rotates : bool
+        Whether vectors are to be turned into the frames of further lights, see `VectorAdapter`; only with
+        ``vectors``.
 
     Raises
     ------
@@ -219,12 +224,16 @@ class GeometryUnit(wiring.Component):
         lines: bool = False,
         setups: int = 1,
         vectors: bool = False,
+        rotates: bool = False,
     ):
         if setups not in (1, 2):
             raise ValueError(f"setups must be 1 or 2, not {setups!r}")
         if lines and vectors:
             raise ValueError("spans have true lines or vectors, not both")
+        if rotates and not vectors:
+            raise ValueError("only vectors are turned into the frames of lights")
         self.grid, self.compact, self.lines, self.vectors = grid, compact, lines, vectors
+        self.rotates = rotates
         self._sort = VertexSortUnit(grid, compact)
         self._lanes = [_TriangleSetup(grid, compact, not (lines or vectors)) for _ in range(setups)]
         self.interval = -(-self._lanes[0].interval // setups)
@@ -236,8 +245,8 @@ class GeometryUnit(wiring.Component):
         if lines:
             self._normals, shape = LineAdapterUnit(), line_spans_shape()
         elif vectors:
-            self._normals, shape = VectorAdapterUnit(), vector_spans_shape()
-            self._halver = SpanHalverUnit()
+            self._normals, shape = VectorAdapterUnit(VectorAdapter(rotates)), vector_spans_shape()
+            self._halver = SpanHalverUnit(SpanHalver(rotates))
         else:
             self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
         normaliser = 0 if lines or vectors else self._normals.multipliers

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.mirror_adapter import MirrorAdapter
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.geometry.light_adapter import with_components
 from blysk.hdl.geometry.vector_adapter import vector_spans_shape
 
 __all__ = ["MirrorAdapterUnit", "mirror_constants_shape"]
@@ -18,7 +19,7 @@ def mirror_constants_shape() -> data.StructLayout:
 
 
 class MirrorAdapterUnit(wiring.Component):
-    """Four components of vectors in place of three: `MirrorAdapter` is the bit-accurate model.
+    """Two components of vectors in place of y: `MirrorAdapter` is the bit-accurate model.
 
     Two multipliers take the start and then the step of a span: the initiation interval is 2, of a span of one
     pixel 1. In the *serial* form one multiplier makes the four products, and the interval is 4. A span is
@@ -28,13 +29,15 @@ class MirrorAdapterUnit(wiring.Component):
     ----------
     serial : bool
         Whether one multiplier serves.
+    shape : StructLayout or None
+        Shape of a span, as for `LightAdapterUnit`; its vectors may have components of further lights.
 
     Members
     -------
-    i : :py:`In(stream.Signature(vector_spans_shape()))`
-        Spans of `VectorAdapterUnit`.
-    o : :py:`Out(stream.Signature(vector_spans_shape(4)))`
-        The same with the components x, y cos a, z, y sin a.
+    i : :py:`In(stream.Signature(shape))`
+        Spans of `VectorAdapterUnit` or `LightAdapterUnit`.
+    o : :py:`Out(stream.Signature(with_components(shape, components + 1)))`
+        The same with the components x, y cos a, z, those of further lights, y sin a.
     constants : :py:`In(mirror_constants_shape())`
         sin a and cos a; stay while spans are inside.
 
@@ -43,13 +46,15 @@ class MirrorAdapterUnit(wiring.Component):
 
     latency = 3
 
-    def __init__(self, serial: bool = False):
+    def __init__(self, serial: bool = False, shape: data.StructLayout | None = None):
         self.serial = serial
+        shape = vector_spans_shape() if shape is None else shape
+        self._components = shape["start"].shape.length
         self.multipliers = 1 if serial else 2
         super().__init__(
             {
-                "i": In(stream.Signature(vector_spans_shape())),
-                "o": Out(stream.Signature(vector_spans_shape(4))),
+                "i": In(stream.Signature(shape)),
+                "o": Out(stream.Signature(with_components(shape, self._components + 1))),
                 "constants": In(mirror_constants_shape()),
             }
         )
@@ -105,7 +110,8 @@ class MirrorAdapterUnit(wiring.Component):
             ends = [Mux(alone, now, then) for now, then in zip(rounded, before, strict=True)], rounded
         with m.If(advance):
             for name, (along, across) in zip(("start", "step"), ends, strict=True):
-                vector = words[f"{name}_0"], along, words[f"{name}_2"], across
+                others = (words[f"{name}_{k}"] for k in range(2, self._components))
+                vector = words[f"{name}_0"], along, *others, across
                 m.d.sync += [
                     Value.cast(word).eq(code) for word, code in zip(result[name], vector, strict=True)
                 ]
@@ -116,13 +122,13 @@ class MirrorAdapterUnit(wiring.Component):
             ]
         return m
 
-    @staticmethod
-    def _delayed(register, given, single: Value) -> dict[str, Value]:
+    def _delayed(self, register, given, single: Value) -> dict[str, Value]:
         """All that is no product, two stages on."""
         words = {
             name: Value.cast(given[name]) for name in given.shape().members if name not in ("start", "step")
         }
-        words |= {f"{name}_{k}": Value.cast(given[name][k]) for name in ("start", "step") for k in (0, 2)}
+        kept = (0, *range(2, self._components))
+        words |= {f"{name}_{k}": Value.cast(given[name][k]) for name in ("start", "step") for k in kept}
         words["single"] = single
         for age in range(1, 3):
             words = {name: register(word, f"{name}_{age}") for name, word in words.items()}

@@ -37,6 +37,11 @@ class SpanHalverUnit(wiring.Component):
     taken in on every cycle. One that does not fit takes two cycles more each time that it is tried again; so
     does what is left of a span behind a piece. No multipliers: two ends of an attribute share one adder.
 
+    Parameters
+    ----------
+    parameters : SpanHalver
+        Bit-accurate model.
+
     Members
     -------
     i : :py:`In(stream.Signature(whole_spans_shape()))`
@@ -57,7 +62,8 @@ class SpanHalverUnit(wiring.Component):
 
     latency = 1
 
-    def __init__(self):
+    def __init__(self, parameters: SpanHalver | None = None):
+        self.parameters = parameters or SpanHalver()
         super().__init__(
             {
                 "i": In(stream.Signature(whole_spans_shape())),
@@ -215,8 +221,7 @@ class SpanHalverUnit(wiring.Component):
                 ]
         return marks
 
-    @staticmethod
-    def _fits(marks: dict, pixels: Value) -> Value:
+    def _fits(self, marks: dict, pixels: Value) -> Value:
         """Whether the piece needs no cut."""
         scale = 1 << SpanHalver.BITS
         axis, pair = int(SpanHalver.AXIS * scale), int(SpanHalver.PAIR * scale)
@@ -230,5 +235,13 @@ class SpanHalverUnit(wiring.Component):
             long = long | (keeps & same[j] & sums[0] & sums[1])
         large = [first[k][-1] | last[k][-1] for k in range(len(same))]
         steep = Cat(~keeps & size for keeps, size in zip(same, large, strict=True)).any()
+        if self.parameters.rotates:
+            most = int(SpanHalver.STEEP * scale)
+            # Below 0 the first bits are one less than the size's, with the other sign.
+            apart = [
+                Mux(keeps, (left - right > most) | (right - left > most), left + right >= most)
+                for keeps, left, right in zip(same, first, last, strict=True)
+            ]
+            steep = Cat(apart).any()
         two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
         return one | ((long | ~Cat(large).any()) & ~(two & steep))

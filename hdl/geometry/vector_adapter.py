@@ -27,6 +27,11 @@ class VectorAdapterUnit(PipelinedUnit):
     The latency is 4 cycles (the shift of all; the margin to 1, and the bits that the step uses; its own
     shift; sign and rounding), the initiation interval 1. No multipliers.
 
+    Parameters
+    ----------
+    parameters : VectorAdapter
+        Bit-accurate model.
+
     Members
     -------
     i : :py:`In(stream.Signature(halved_spans_shape()))`
@@ -37,12 +42,13 @@ class VectorAdapterUnit(PipelinedUnit):
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
 
-    def __init__(self):
+    def __init__(self, parameters: VectorAdapter | None = None):
+        self.parameters = parameters or VectorAdapter()
         super().__init__(halved_spans_shape(), vector_spans_shape(), latency=4)
 
     def datapath(self, m, operands):
         """Shared shift; margin; the step's bits and shift; sign, rounding."""
-        p, bits = VectorAdapter(), SPAN_NORMAL.fraction_bits
+        p, bits = self.parameters, SPAN_NORMAL.fraction_bits
         start, step = (
             [Value.cast(operands[name][k]).as_signed() for k in range(3)] for name in ("start", "step")
         )
@@ -56,15 +62,22 @@ class VectorAdapterUnit(PipelinedUnit):
 
         # Modulo 2, see the model.
         step = [code[: p.STEP_BITS + 1] for code in step]
-        for k in reversed(range(len(operands.shift))):
-            chosen, places = operands.shift[k], 1 << k
+        shift = operands.shift
+        if p.rotates:
+            shift = (shift - shift.any())[: len(shift)]
+        for k in reversed(range(len(shift))):
+            chosen, places = shift[k], 1 << k
             start = [Mux(chosen, code << places, code)[: bits + 1].as_signed() for code in start]
             step = [Mux(chosen, code << places, code)[: p.STEP_BITS + 1].as_signed() for code in step]
         start = [self.register(m, code, f"shifted_{k}") for k, code in enumerate(start)]
         step = [self.register(m, code, f"shifted_step_{k}") for k, code in enumerate(step)]
 
         # So many places at most: lower bits do not count.
-        used = self.register(m, _used(step, p.STEP_BITS)[-p.LARGEST_EXPONENT :], "step_used")
+        used = _used(step, p.STEP_BITS)[-p.LARGEST_EXPONENT :]
+        if p.rotates:
+            # A place less, but for none.
+            used = Cat(1, used[:-2], used[-2:].any())
+        used = self.register(m, used, "step_used")
         step = [self.register(m, self._smaller(code), f"small_step_{k}") for k, code in enumerate(step)]
         start = [self.register(m, self._smaller(code), f"small_{k}") for k, code in enumerate(start)]
         exponent = []
@@ -96,10 +109,9 @@ class VectorAdapterUnit(PipelinedUnit):
         turned = (code[:] ^ flip.replicate(len(code))).as_signed() + flip + (1 << (cut - 1))
         return (turned >> cut)[: format.width]
 
-    @staticmethod
-    def _smaller(code: Value) -> Value:
+    def _smaller(self, code: Value) -> Value:
         """A code with a margin to 1."""
-        return (code - (code >> VectorAdapter.MARGIN_SHIFT))[: len(code)].as_signed()
+        return (code - (code >> self.parameters.margin_shift))[: len(code)].as_signed()
 
 
 def _used(codes: list[Value], bits: int) -> Value:

@@ -10,7 +10,7 @@ from blysk.golden.bus.registers import ADDRESS_BITS, ERRORS, WORD_BITS, Register
 from blysk.hdl.bus.bus import BusUnit
 from blysk.sim.run_files import MARK
 
-__all__ = ["DOCUMENTS", "FRAME", "documents_of", "layout_lines", "takes_frame"]
+__all__ = ["DOCUMENTS", "FRAME", "documents_of", "frame_text", "layout_lines"]
 
 DOCUMENTS = (".md", ".h", ".svd")
 """Suffixes of the documents."""
@@ -45,17 +45,20 @@ def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
     return dict(zip(DOCUMENTS, texts, strict=True))
 
 
-def takes_frame(core: Component) -> bool:
-    """Whether the vectors of a core's spans or corners are those of a light's frame."""
+def frame_text(core: Component) -> str:
+    """Of which frame the vectors of a core's spans or corners are; empty where of none of a light."""
     if "step" in core.i.payload.shape().members:
-        return True
-    return getattr(getattr(core, "geometry", core), "vectors", False)
+        return FRAME
+    geometry = getattr(core, "geometry", core)
+    if not getattr(geometry, "vectors", False):
+        return ""
+    return FRAME.replace("the light's", "light 0's") if geometry.rotates else FRAME
 
 
 def _values(unit: BusUnit, field: Field) -> str:
     """Number format of a field, and what its vector is."""
-    core = unit.framing.core
-    return f"{field.values}; N/W {FRAME}" if field.name in _IN_FRAME and takes_frame(core) else field.values
+    frame = frame_text(unit.framing.core)
+    return f"{field.values}; N/W {frame}" if field.name in _IN_FRAME and frame else field.values
 
 
 def layout_lines(layout: ByteLayout) -> list[str]:

@@ -9,7 +9,7 @@ from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCR
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
-from blysk.sim.api.bus_documents import FRAME, layout_lines, takes_frame
+from blysk.sim.api.bus_documents import frame_text, layout_lines
 
 __all__ = ["bus_descriptions", "bus_header", "triangle_descriptions", "unit_of_top"]
 
@@ -46,8 +46,8 @@ def unit_of_top(top: str, bus: str, parameters, **options):
 def triangle_descriptions(unit: RenderUnit | GeometryUnit) -> dict[str, str]:
     """Descriptions of the ports of a core that takes triangles."""
     given = dict(RENDER_PORT_DESCRIPTIONS)
-    if takes_frame(unit):
-        given["i_normal"] += f", {FRAME}"
+    if frame := frame_text(unit):
+        given["i_normal"] += f", {frame}"
     if isinstance(unit, RenderUnit):
         return given
     made = set(unit.o.payload.shape().members)

@@ -304,10 +304,23 @@ def _render_header(unit: RenderUnit) -> list[str]:
         first.replace("shading pipeline", "triangles to pixels"),
         *lines,
         *_geometry_lines(unit.geometry),
+        *_axes_lines(unit.parameters),
         *_coarse_lines(unit),
         "memory_*: a depth for each pixel; read data a clock after the place; before a picture's first pixel "
         "the core writes all ones to every pixel of the picture, one a clock",
         "constants_picture changes with each picture: depths begin anew, as after rst; else it is added to",
+    ]
+
+
+def _axes_lines(renderer: Renderer) -> list[str]:
+    """How the axes of further lights are made, and how long a normal may be."""
+    if not renderer.axes:
+        return []
+    return [
+        "With several lights no vertex normal is longer than 1 before it is multiplied by 1/W.",
+        f"axes: of light k from 1 on {', '.join(renderer.axes)} of its frame, each as its dot products with",
+        "x, y and z of light 0's frame, times 2^17, rounded, at most 2^17 - 1; written before the first "
+        "triangle of a frame",
     ]
 
 
@@ -328,7 +341,8 @@ def _geometry_lines(geometry: GeometryUnit) -> list[str]:
     normal, limit = "vertex normal", "is not read" if geometry.lines else _LIMIT
     if geometry.vectors:
         spans, limit = "N/W and its step, cut where N/W grows short", "is not read"
-        normal = "vertex normal in the frame of the light (H along z, L and V in the xz plane)"
+        which = "light 0" if geometry.rotates else "the light"
+        normal = f"vertex normal in the frame of {which} (H along z, L and V in the xz plane)"
     return [
         f"geometry: at most a triangle in {geometry.interval} cycles; spans with {spans}; {grid.coordinate} "
         "coordinates",
@@ -467,13 +481,15 @@ def verilog_and_unit(
     p = design
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
-    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads, p.span_members)
     core = unit.framing.core if isinstance(unit, BusUnit) else unit
+    renderer = core.parameters if isinstance(core, RenderUnit) else None
+    axes = [f"axis {axis}" for axis in renderer.axes] if renderer else []
+    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads, p.span_members, axes)
     if isinstance(core, GeometryUnit):
         lines = _geometry_header(core)
     else:
         lines = _render_header(core) if isinstance(core, RenderUnit) else header_of(core)
-    words = [*constants, *example_of(p)]
+    words = [*constants, *example_of(p, renderer)]
     descriptions: Mapping[str, str]
     if isinstance(unit, BusUnit):
         header, descriptions = bus_header(unit, bus, lines, words), bus_descriptions(unit)

@@ -4,6 +4,7 @@ import numpy as np
 
 from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.frames.prepare import constants_of
+from blysk.golden.frames.triangle_frame import triangle_constants
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.value_gate import ValueGate
@@ -12,6 +13,7 @@ from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
+from blysk.golden.render import Renderer
 
 __all__ = ["example_of"]
 
@@ -21,7 +23,7 @@ AMBIENT, DIFFUSE, SPECULAR, EXPONENT = 0.05, 0.4, 0.55, 50
 _PER_LINE = 8
 
 
-def example_of(design: Design) -> list[str]:
+def example_of(design: Design, renderer: Renderer | None = None) -> list[str]:
     """Lines: all writes for a grey surface and white light along the viewer, in decimal.
 
     Parameters
@@ -29,6 +31,8 @@ def example_of(design: Design) -> list[str]:
     design : Design
         The pipeline. The example has its exponent if that is fixed at build time; there are no lines if its
         tables are fixed for other lobes.
+    renderer : Renderer, optional
+        What sends triangles to the pipeline: the axes of its further lights are written, too.
     """
     colours = ((value,) * 3 for value in (AMBIENT, DIFFUSE, SPECULAR))
     material = Material(*colours, design.build.exponent or EXPONENT)
@@ -36,7 +40,7 @@ def example_of(design: Design) -> list[str]:
     lights = (Light((0, 0, 1)),) * design.lights
     scene = Scene(triangle, Camera((0, 0, 5), (0, 0, 0)), 8, 8, (material,) * design.materials, lights)
     try:
-        first, *more = constants_of(scene, design)
+        first, *more = triangle_constants(scene, renderer) if renderer else constants_of(scene, design)
     except ValueError:
         # A table that is fixed is of its own parameter.
         return []

@@ -1,7 +1,7 @@
 """Frames by triangles: scenes through simulated geometry, shading and depth test."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -11,8 +11,8 @@ from amaranth.lib.wiring import Out
 
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.missed import missed_pieces
-from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles
+from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles, triangle_constants
+from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, Frame, Triangles
 from blysk.golden.geometry.vertex_sort import VertexSort
@@ -135,7 +135,8 @@ def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
         x=corner[..., 0],
         y=corner[..., 1],
         depth=rng.integers(0, DEPTH.max_code, (count, 3)),
-        normal=most // 2 + rng.integers(-most // 4, most // 4, (count, 3, 3)),
+        # No longer than 1, as where vectors are turned into the frames of several lights.
+        normal=most // 3 + rng.integers(-most // 6, most // 6, (count, 3, 3)),
         material=np.arange(count) * renderer.design.materials // count,
         two_sided=np.arange(count) % 2,
     )
@@ -184,6 +185,10 @@ class TriangleSimulator:
         """Compare the pixels of some triangles by the new simulation model with the bit-accurate model."""
         triangles, frame = sample_triangles(self.renderer, self.size), Frame.centred(*self.size)
         constants = sample_constants(self.renderer.design)
+        if self.renderer.rows:
+            given = np.random.default_rng(2026).uniform(-0.5, 0.5, (self.renderer.design.lights - 1, 3, 3))
+            axes = LightAdapter.codes_of(given[:, : len(self.renderer.axes)])
+            constants[0] = replace(constants[0], axes=axes)
         expected = self.renderer.compute(triangles, frame, constants)
         run = simulate(
             self._unit,
@@ -254,7 +259,7 @@ class TriangleSimulator:
             sent.triangles.beats,
             count=None,
             constants=self._constants(sent.frame),
-            write=writes_of(constants_of(scene, self.renderer.design)),
+            write=writes_of(triangle_constants(scene, self.renderer)),
             engine=self.engine,
             origin=self._origin,
             progress=None if progress is None else lambda done: progress(done, done),

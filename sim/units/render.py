@@ -1,5 +1,6 @@
 """Record of the render unit: triangles to pixels."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.prepare import with_tables
 from blysk.golden.geometry.coarse_depth import CoarseDepth
+from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
@@ -22,8 +24,9 @@ _SIZE = 32, 24
 _SEED = 2026
 
 
-def _constants(rng, design):
-    """Frame constants of each material: lights from anywhere."""
+def _constants(rng, renderer):
+    """Frame constants of each material: lights from anywhere, in frames turned in any way."""
+    design = renderer.design
     direction, halfway = (unit_codes(rng, design.lights) for _ in range(2))
     constants = []
     for index in range(design.materials):
@@ -33,12 +36,16 @@ def _constants(rng, design):
     if design.loads_tables:
         materials = [sample_material(design, index) for index in range(design.materials)]
         constants = with_tables(constants, materials, design)
+    if renderer.rows:
+        frames = np.linalg.qr(rng.normal(size=(design.lights - 1, 3, 3)))[0]
+        axes = LightAdapter.codes_of(frames[:, : renderer.rows // len(frames)])
+        constants[0] = replace(constants[0], axes=axes)
     return constants
 
 
 def _made(unit, case):
     parameters = unit.parameters
-    constants = _constants(np.random.default_rng(_SEED), parameters.design)
+    constants = _constants(np.random.default_rng(_SEED), parameters)
     frame = {name: code for name, code in case.constants.items() if name != "picture"}
     return parameters.compute(Triangles(**case.beats), frame_of(frame), constants)
 
@@ -53,8 +60,11 @@ def _triangles(unit, rng, count, size=6.0, spread=0.2):
     design = unit.parameters.design
     triangles = ended(random_triangles(rng, count, size=size, spread=spread))
     triangles.material[:] = rng.integers(0, design.materials, count)
+    if unit.parameters.rows:
+        # No normal is longer than 1.
+        triangles.normal[:] //= 2
     frame = Frame.centred(*_SIZE, limit=Frame.limit_of(15.0))
-    write = writes_of(_constants(np.random.default_rng(_SEED), design))
+    write = writes_of(_constants(np.random.default_rng(_SEED), unit.parameters))
     codes = frame.codes | {"picture": 0}
     return Case(triangles.beats, {name: codes[name] for name in unit.constants.shape().members}, write)
 
@@ -78,6 +88,12 @@ def _variants():
         ("quotient", {"method": "quotient", "model": "blinn"}),
         ("quotient, phong, coarse", {"method": "quotient", "model": "phong"}),
         ("quotient, phong, compact", {"method": "quotient", "model": "phong", "style": "compact"}),
+        ("quotient, 2 lights", {"method": "quotient", "model": "blinn", "lights": 2}),
+        (
+            "quotient, phong, 3 lights, compact, coarse",
+            {"method": "quotient", "model": "phong", "style": "compact", "lights": 3, "materials": 2},
+        ),
+        ("quotient, 4 lights, no highlights", {"method": "quotient", "model": None, "lights": 4}),
     ):
         design = preset(**{"method": "chord", "model": "cosquad", "x_bits": 5, "y_bits": 5} | options)
         renderer = Renderer(design, coarse=CoarseDepth(*_SIZE) if "coarse" in name else None)

@@ -175,11 +175,12 @@ def test_writes_hold_every_constant(lights):
             np.testing.assert_array_equal(words, getattr(constants, name)[light])
 
 
-@pytest.mark.parametrize("lights", [1, 3, 16])
-def test_address_table_tells_every_address_once(lights):
-    constants = FrameConstants(1, np.zeros(3, int), *np.zeros((4, lights, 3), int))
+@pytest.mark.parametrize(("lights", "axes"), [(1, ""), (3, ""), (16, ""), (1, "xyz"), (3, "z"), (16, "xyz")])
+def test_address_table_tells_every_address_once(lights, axes):
+    rows = np.zeros((lights - 1, len(axes), 3), int) if axes else None
+    constants = FrameConstants(1, np.zeros(3, int), *np.zeros((4, lights, 3), int), axes=rows)
     told = []
-    for line in address_table(lights):
+    for line in address_table(lights, axes=tuple(axes)):
         words = line.split()
         first, last = int(words[0]), int(words[2] if words[1] == "to" else words[0])
         told += range(first, last + 1)

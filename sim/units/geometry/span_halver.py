@@ -1,5 +1,7 @@
 """Record of the span halver."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.geometry.span_attributes import SPAN_STEP, WholeSpans
@@ -20,7 +22,7 @@ def _pieces(unit, case):
     words = dict(case.beats)
     words |= {name: Fixed(SPAN_STEP, words[name]) for name in _WORDS}
     words |= {name: words[name].astype(bool) for name in ("right", "flip")}
-    return SpanHalver().compute(WholeSpans(**words, triangle=np.zeros(len(words["x"]), dtype=np.int64)))
+    return unit.parameters.compute(WholeSpans(**words, triangle=np.zeros(len(words["x"]), dtype=np.int64)))
 
 
 def _expect(unit, case):
@@ -88,16 +90,34 @@ def _sizes(unit, rng, count):
     return _case(rng, length, near=near, far=far, inward=inward)
 
 
+def _steep(unit, rng, count):
+    """Spans of two pixels, a component of whose ends differs by about 9/16, of the largest or of less."""
+    near = sphere(rng, count)
+    apart = rng.uniform(-0.1, 0.1, (count, 3))
+    apart[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-1, 1], count) * rng.uniform(
+        0.4, 0.7, count
+    )
+    far = np.clip(near + apart, -1, 1)
+    scale = 2.0 ** -rng.integers(0, 4, (count, 1))
+    return _lines(rng, np.full(count, 2), near * scale, far * scale)
+
+
 RECORD = Record(
     name="span_halver",
     title="Spans cut where N/W grows too short along them",
     source="docs/theory/geometry.md#normals",
-    variants={"": Variant(SpanHalverUnit, note="exact means of the ends")},
+    variants={
+        "": Variant(SpanHalverUnit, note="exact means of the ends"),
+        "several lights": Variant(
+            partial(SpanHalverUnit, SpanHalver(rotates=True)), note="exact means of the ends", long=True
+        ),
+    },
     expect=_expect,
     status=lambda unit, case: {"cut": _pieces(unit, case)[1]},
     stimuli={
         "spans": Stimulus(_spans, 200),
         "short": Stimulus(_short, 1000),
+        "steep": Stimulus(_steep, 1000, variants=("several lights",)),
         "any": Stimulus(_any, 300),
         "sizes": Stimulus(_sizes, 1500),
     },

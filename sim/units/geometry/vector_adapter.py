@@ -1,5 +1,7 @@
 """Record of the vector adapter."""
 
+from functools import partial
+
 import numpy as np
 
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, SPAN_STEP, Pieces
@@ -32,7 +34,7 @@ def _expect(unit, case):
     reach = 1 << (SPAN_NORMAL.fraction_bits - 1 - case.beats["shift"])
     right = Fixed(SPAN_NORMAL, np.repeat(reach[:, np.newaxis], 3, axis=1))
     pieces = Pieces(**words, left=start, right=right, depth_last=words["depth"], triangle=np.zeros(0))
-    return VectorAdapter().compute(pieces).beats
+    return unit.parameters.compute(pieces).beats
 
 
 def _case(rng, **vectors):
@@ -81,7 +83,12 @@ RECORD = Record(
     name="vector_adapter",
     title="N/W at the first pixel of a span and its step, as words of the quotient method",
     source="docs/theory/geometry.md#composition",
-    variants={"": Variant(VectorAdapterUnit, note="1/2 step of each word; shifts are exact")},
+    variants={
+        "": Variant(VectorAdapterUnit, note="1/2 step of each word; shifts are exact"),
+        "several lights": Variant(
+            partial(VectorAdapterUnit, VectorAdapter(rotates=True)), note="1/2 step of each word", long=True
+        ),
+    },
     expect=_expect,
     stimuli={
         "lines": Stimulus(_lines, 1000),

@@ -47,17 +47,20 @@ def test_no_frame_exceeds_its_bound(model):
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_no_frame_by_triangles_exceeds_its_bound(model):
-    """Where the frame shows the triangle that the exact one shows; normals far apart, and slivers, too."""
+    """Where the frame shows the triangle that the exact one shows; normals far apart, and slivers, too.
+
+    With one light or two.
+    """
     rng = np.random.default_rng(7)
     ratios = []
     for k in range(14):
         scene = _scene(rng)
-        scene = replace(scene, lights=scene.lights[:1])
         slivers = k == 0 and model == "blinn"
         if slivers:
             mesh = teapot(10_000)
             scene = replace(scene, mesh=mesh, camera=Camera.framing(mesh.vertices, (1, 2, 3)))
-        renderer = Renderer(preset("quotient", model).for_materials(scene.materials))
+        design = preset("quotient", model, lights=len(scene.lights))
+        renderer = Renderer(design.for_materials(scene.materials))
         drawn = triangle_frame(scene, renderer)
         compared = compare_triangles(scene, renderer, drawn.sent, drawn.image)
         if slivers:

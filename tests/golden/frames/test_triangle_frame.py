@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from blysk.golden.frames.compare import compare_image
-from blysk.golden.frames.triangle_frame import span_angle, triangle_frame
+from blysk.golden.frames.prepare import constants_of
+from blysk.golden.frames.triangle_frame import sent_triangles, span_angle, triangle_frame
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.presets import preset
 from blysk.golden.reference.raster import rasterise
@@ -62,10 +63,45 @@ def test_vectors_within_0_6_lsb_of_exact_normals(model, triangles, exponent, bac
     assert frame.counts["cut"] <= frame.counts["spans"] - whole
 
 
-def test_vectors_without_highlights():
-    """z of the frame is along the light."""
-    drawn = scene("teapot", size=(64, 48), triangles=220, specular=0)
-    frame = triangle_frame(drawn, Renderer(preset("quotient", None)))
+LIGHTS = (-0.5, 0.8, 0.7), (1.0, 0.2, 0.4), (0.3, -1.0, 0.6), (0.2, 1.0, -0.5)
+"""Directions of lights; the last is behind the horizon for most of what is seen."""
+
+
+@pytest.mark.parametrize(
+    ("model", "lights", "triangles", "exponent"),
+    [("blinn", 2, 1000, 50), ("blinn", 4, 64, 1000), ("phong", 2, 64, 50), ("phong", 3, 1000, 1000)],
+)
+def test_vectors_of_several_lights(model, lights, triangles, exponent):
+    """Turned into the frame of each light; the exact frame is made of the lights' directions alone."""
+    drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent, lights=LIGHTS[:lights])
+    # A light that the scene does not have is black.
+    renderer = Renderer(preset("quotient", model, lights=max(lights, 3)))
+    frame, exact = triangle_frame(drawn, renderer), render(drawn, "phong", REFLECTION_MODELS[model])
+    np.testing.assert_array_equal(frame.owner >= 0, exact.mask)
+    error = np.abs(frame.image - exact.image * 255)[exact.mask]
+    assert 0.49 < error.max() < 0.6
+    assert 0 < (error > 0.5).mean() < 0.01
+    with pytest.raises(ValueError, match="axes of further lights"):
+        renderer.compute(frame.sent.triangles, frame.sent.frame, constants_of(drawn, renderer.design))
+
+
+def test_normals_that_are_longer_than_1():
+    """As files may have them: those of a triangle are made shorter by one factor, so that nothing wraps."""
+    drawn = scene("teapot", size=(64, 48), triangles=220, lights=LIGHTS[:2])
+    mesh = replace(drawn.mesh, normals=drawn.mesh.normals * (1 + 2.0**-8))
+    renderer = Renderer(preset("quotient", "blinn", lights=2))
+    sent = sent_triangles(replace(drawn, mesh=mesh), renderer)
+    longest = np.linalg.norm(sent.triangles.normal * 2.0**-23, axis=2).max(axis=1)
+    assert (np.abs(longest - 1) < 2.0**-22).all()
+    error = triangle_frame(replace(drawn, mesh=mesh), renderer).image.astype(int)
+    assert np.abs(error - triangle_frame(drawn, renderer).image).max() <= 1
+
+
+@pytest.mark.parametrize("lights", [1, 3])
+def test_vectors_without_highlights(lights):
+    """z of a frame is along its light."""
+    drawn = scene("teapot", size=(64, 48), triangles=220, specular=0, lights=LIGHTS[:lights])
+    frame = triangle_frame(drawn, Renderer(preset("quotient", None, lights=lights)))
     exact = render(drawn, "phong", REFLECTION_MODELS["blinn"])
     error = np.abs(frame.image - exact.image * 255)[exact.mask]
     assert 0.4 < error.max() < 0.6
@@ -142,8 +178,10 @@ def test_methods_and_geometry_must_fit():
     """Values are not what triangles give, nor normals where lines are taken."""
     with pytest.raises(ValueError, match="triangles give normals, and chord-local takes values"):
         Renderer(preset("chord-local", "cosquad"))
-    with pytest.raises(ValueError, match="vectors for one light, not 2; give one light"):
-        Renderer(preset("quotient", "blinn", lights=2))
+    with pytest.raises(ValueError, match="takes vectors for several lights, the geometry gives vectors"):
+        Renderer(preset("quotient", "blinn", lights=2), Geometry(vectors=True))
+    with pytest.raises(ValueError, match="only vectors are turned"):
+        Geometry(lines=True, rotates=True)
     with pytest.raises(ValueError, match="takes vectors, the geometry gives unit normals"):
         Renderer(preset("quotient", "blinn"), Geometry())
     with pytest.raises(ValueError, match="true lines or vectors, not both"):

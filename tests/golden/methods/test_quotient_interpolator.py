@@ -85,6 +85,46 @@ def test_bound_of_every_span(mirror):
 
 
 @pytest.mark.parametrize("mirror", [False, True])
+def test_bound_of_a_further_light(mirror):
+    """Its words are rounded by themselves, and q by the first's: up to 1 LSB near N·H = 0 at n = 1."""
+    rng = np.random.default_rng(5)
+    method, count, length = QuotientInterpolator(mirror), 1500, 9
+    spans, lobe = method.spans(2, True), QuotientLobe(PHONG if mirror else BLINN)
+    viewer = np.array([0.0, 0.0, 1.0])
+    lengths, largest = np.full(count, length), 0.0
+    for lights in normalise(rng.normal(size=(12, 2, 3))):
+        frames = [light_frame(light, viewer) for light in lights]
+        axes = np.concatenate([f.axes * [[1], [f.cosine if mirror else 1], [1]] for f in frames])
+        if mirror:
+            axes = np.vstack([axes, frames[0].sine * frames[0].axes[1]])
+        left, right = _ends(rng, count, 2.0, 90.0)
+        vectors = SpanVectors.quantise(left @ axes.T, right @ axes.T, lengths)
+        codes = np.zeros((2, 3), dtype=np.int64)
+        codes[:, ::2] = spans.codes_of(*(np.array([f[k] for f in frames]) for k in (1, 2)))
+        operands = method.compute_vectors(spans, vectors, lengths, codes)
+        span, index = pixels_of(lengths)
+        t = (index / (length - 1))[:, np.newaxis]
+        normal = normalise((1 - t) * left[span] + t * right[span])
+        cosine, height = normal @ lights[1], normal @ frames[1].axes[2]
+        if mirror:
+            height = 2 * cosine * (normal @ viewer) - lights[1] @ viewer
+        errors = QuotientErrors.of(vectors, lengths, mirror, further=True)
+        assert np.abs(operands.cosine.values[:, 1] - cosine).max() <= errors.cosine
+        dark = np.zeros(operands.highlight.shape, dtype=bool)
+        for n in (1, 2, 100):
+            off = np.abs(
+                lobe.compute(operands.highlight, dark, lobe.table(n)).values[:, 1]
+                - np.maximum(height, 0) ** n
+            )
+            off[np.abs(height) < 1e-5] = 0
+            worst = slice(span[off.argmax()], span[off.argmax()] + 1)
+            errors = QuotientErrors.of(vectors[worst], lengths[worst], mirror, further=True)
+            assert off.max() <= errors.highlight(lobe.model, n) + TABLE
+            largest = max(largest, 255 * off.max())
+    assert mirror or largest > 0.8
+
+
+@pytest.mark.parametrize("mirror", [False, True])
 def test_errors_are_those_of_the_guide(mirror):
     """Largest error of terms found in 2,000 spans to 1:2 and 90 degrees, 257 pixels at most, in LSB."""
     rng = np.random.default_rng(12)

@@ -139,8 +139,6 @@ def test_what_does_not_fit_is_refused():
     drawing = Drawing.of([scene()])
     with pytest.raises(ValueError, match="a band of 160x8 has 8 and 3"):
         replace(drawing, lines=8)
-    with pytest.raises(ValueError, match="not 2; give one light, or use method renormalise"):
-        Drawing.of([replace(scene(), lights=2 * scene().lights)])
     with pytest.raises(ValueError, match="choose from 2 lists, there are 1"):
         replace(drawing, controls=Controls(lights=2))
     with pytest.raises(ValueError, match="last must be an end"):

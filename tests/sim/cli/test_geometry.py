@@ -132,13 +132,27 @@ def test_same_from_python(capsys):
     assert "_geometry_normals_normaliser" not in text
 
 
+@pytest.mark.long
+def test_several_lights(capsys):
+    """With the defaults: errors within the bound that is printed; Verilog tells of the axes."""
+    lights = "--light", "1,1,1", "--light", "-1,0.5,1"
+    assert main(["render", *SMALL, *HARDWARE, *lights, "-o", "a.png", "--json", "a.json"]) == 0
+    (frame,) = json.loads(Path("a.json").read_text())["frames"]
+    assert 0.4 < frame["method_error"]["steady_lsb"] <= frame["bound_lsb"] < 0.7
+    capsys.readouterr()
+    assert main(["verilog", *HARDWARE, "--lights", "2", "--model", "phong"]) == 0
+    text = capsys.readouterr().out
+    assert "280 to 282" not in text
+    assert "276 to 278   axis y cos a in the frame of light 0, SQ(1, 17) (light 1)" in text
+    assert "vertex normal in the frame of light 0 (H along z, L and V in the xz plane)" in text
+
+
 RENDER, VERILOG = ("render", *SMALL), ("verilog",)
 POINT_LIGHT = "--point-light", "3,4,5"
 SPANS = "a specialised pipeline takes spans; leave out specialise"
 VALUES = "triangles give normals, and chord-local takes values"
 LOCAL = "--method", "chord-local"
 QUOTIENT = "--method", "quotient"
-ONE_LIGHT = "vectors for one light, not 2; give one light"
 NO_SETUP = "spans need no triangle setup; "
 UNKNOWN = "use one of software, hardware"
 
@@ -159,8 +173,6 @@ UNKNOWN = "use one of software, hardware"
         ((*RENDER, "--coarse"), "--coarse", "give geometry hardware, too"),
         ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "give geometry hardware, too"),
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
-        ((*RENDER, *HARDWARE, "--light", "1,1,1", "--light", "0,1,1"), "", ONE_LIGHT),
-        ((*VERILOG, *HARDWARE, *QUOTIENT, "--lights", "2"), "", ONE_LIGHT),
         # It would send spans.
         ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
         ((*VERILOG, "--coarse", "64x48"), "--coarse", "give --top render, too"),
