@@ -63,8 +63,6 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
 
     What is known of the board's bitstream is printed first.
 
-    Triangles give the method quotient vectors for one light: several lights need --method renormalise.
-
     The buttons of the board stop the motion, turn it round, and change the material and the light.
 
     \b

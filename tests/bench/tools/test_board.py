@@ -55,11 +55,6 @@ def pattern_on(board):
             "heavy by a factor of 3.90; use fewer triangles, or a faster --clock",
         ),
         (
-            ["ulx3s-25f", "--light", "0,0,1", "--light", "1,0,0", "--simulate", "1", "-o", "x"],
-            "--method quotient: triangles give vectors for one light, not 2; give one light, or use method "
-            "renormalise",
-        ),
-        (
             ["ulx3s-25f", "--point-light", "1,2,3", "--simulate", "1", "-o", "x"],
             "--light: a board has lights and a viewer at infinity alone; give directions of lights, and a "
             "distant viewer",

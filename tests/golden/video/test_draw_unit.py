@@ -76,6 +76,19 @@ def errors_with_exact_coordinates(drawing, shown, angle, monkeypatch, preset=0):
 
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_several_lights(monkeypatch, model):
+    """Of two lists: matrices into the frame of each one's first light, axes of the other lights in it."""
+    shown = scene()
+    lights = Light((0.5, 0.8, 1)), Light((-1, 0.3, 0.4), (0.3, 0.6, 0.1)), Light((0.2, -1, 0.1))
+    scenes = replace(shown, lights=lights), replace(shown, lights=lights[:0:-1])
+    drawing = Drawing.of(scenes, preset("quotient", model, lights=3))
+    for index, each in enumerate(scenes):
+        assert errors_with_exact_coordinates(drawing, each, 2000, monkeypatch, index).max() < 0.65
+        normal = drawing.vertices(2000, index).normal
+        assert np.linalg.norm(normal, axis=1).max() < 2**23 * (1 + 2.0**-13)
+
+
+@pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_each_light_has_matrices_into_its_frame(monkeypatch, model):
     """Any direction, that of the viewer, the opposite, and none; lights that are equal share a slot."""
     shown = scene()
