@@ -123,9 +123,12 @@ def test_what_the_documents_print_runs_as_hardware_too(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["quotient", "renormalise"])
 def test_every_pixel_is_that_of_the_model(method, capsys):
-    """Of every method with a model of each kind and without, of renormalise with every model."""
-    models = MODELS if method == "renormalise" else [*KINDS, "phong"] if method == "quotient" else KINDS
+    """With a model of each kind and without, of renormalise with every model.
+
+    Other methods with these models have random spans in `tests/hdl/test_pipeline.py`.
+    """
+    models = MODELS if method == "renormalise" else [*KINDS, "phong"]
     assert main(["teapot", STRESS, "--methods", method, "--models", *models, "none"]) == 0
     capsys.readouterr()

@@ -171,17 +171,9 @@ def test_without_a_compiler(monkeypatch, uninstalled):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"method": "linear", "specialise": True},
-        {},
-    ],
-    ids=str,
-)
-def test_several_pipelines_give_the_same_picture(options):
+def test_several_pipelines_give_the_same_picture():
     """In fewer cycles; and the figures say how many they are."""
-    options |= {"size": (64, 48), "triangles": 400}
+    options = {"size": (64, 48), "triangles": 400}
     one, two = (blysk.render("teapot", pipes=pipes, **options) for pipes in (1, 2))
     np.testing.assert_array_equal(two.image, one.image)
     assert (one.pixels, one.simulated.wide_spans) == (two.pixels, two.simulated.wide_spans)
