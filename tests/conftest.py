@@ -26,8 +26,9 @@ BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/too
 BESIDE = {
     "tests/bench/report/test_report_browser.py": "tests/bench/report/test_report.py",
     "tests/bench/tools/test_web_inside.py": "tests/bench/tools/test_web_browser.py",
+    "tests/test_citations.py": "tests/test_house.py",
 }
-"""Files in the group of another file: a session makes the report, and the site, of both once."""
+"""Files in the group of another file: report, site, and parsed sources of both are made once."""
 
 LONGEST = (
     "tests/sim/cli/test_bad_input.py",

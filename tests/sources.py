@@ -4,9 +4,15 @@ import ast
 from collections.abc import Iterator
 from functools import cache
 
-__all__ = ["statements"]
+__all__ = ["statements", "tree"]
 
 _BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
+
+
+@cache
+def tree(source: str) -> ast.Module:
+    """A source, parsed once for all tests of a worker."""
+    return ast.parse(source)
 
 
 @cache
@@ -19,4 +25,4 @@ def statements(source: str) -> tuple[ast.AST, ...]:
             for inner in getattr(node, block, ()):
                 yield from walk(inner)
 
-    return tuple(walk(ast.parse(source)))
+    return tuple(walk(tree(source)))

@@ -2,6 +2,7 @@
 
 import ast
 import io
+import os
 import re
 import subprocess
 import sys
@@ -54,11 +55,17 @@ class Text(NamedTuple):
 def files(suffix: str) -> list[Path]:
     """Files of the project, without what is generated or hidden."""
     found = []
-    for path in PROJECT.rglob(f"*{suffix}"):
-        parts = path.relative_to(PROJECT).parts
-        hidden = any(part.startswith(".") or part.endswith(".egg-info") for part in parts)
-        if not hidden and parts[0] not in _OTHERS and parts[:2] != ("docs", "blocks"):
-            found.append(path)
+    for folder, inner, names in os.walk(PROJECT):
+        # An environment in the clone has as many files as a hundred projects.
+        at = Path(folder).relative_to(PROJECT).parts
+        inner[:] = [
+            name
+            for name in inner
+            if not (name.startswith(".") or name.endswith(".egg-info"))
+            and not (not at and name in _OTHERS)
+            and (*at, name) != ("docs", "blocks")
+        ]
+        found += [Path(folder, name) for name in names if name.endswith(suffix) and not name.startswith(".")]
     return sorted(found)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from .sources import statements
+from .sources import statements, tree
 
 PROJECT = Path(__file__).parents[1]
 LAYERS = ("golden", "hdl", "sim", "bench")
@@ -32,8 +32,8 @@ FILES = {name: path for name, path in FILES.items() if "templates" not in name}
 
 @cache
 def nodes(source: str) -> tuple[ast.AST, ...]:
-    """All nodes of a source, at any depth; it is parsed once for all tests."""
-    return tuple(ast.walk(ast.parse(source)))
+    """All nodes of a source, at any depth."""
+    return tuple(ast.walk(tree(source)))
 
 
 def imports(source: str, package: str) -> set[str]:
