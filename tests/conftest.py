@@ -16,6 +16,7 @@ from xdist.scheduler import LoadScopeScheduling
 from blysk.hdl.emit.processes import Process
 
 from .decided import Decided
+from .lists import OF_DOCUMENTS
 
 # A test that is killed leaves no program behind, nor does a run of tests with its workers.
 subprocess.Popen = Process
@@ -53,6 +54,14 @@ class Groups(LoadScopeScheduling):
 
     def _split_scope(self, nodeid):
         return group_of(nodeid)
+
+
+def pytest_itemcollected(item):
+    """Units of the documents' methods change seldom: `make test` leaves their own tests to CI."""
+    given = {mark.name for mark in item.iter_markers()}
+    if item.path.stem.removeprefix("test_") in OF_DOCUMENTS and not given & {"long", "prove"}:
+        item.add_marker("long")
+        item.add_marker("ci")
 
 
 @pytest.hookimpl(trylast=True)

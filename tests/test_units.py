@@ -32,9 +32,15 @@ SELDOM = (
     *("difference_accumulator", "renormaliser", "renormalise_interpolator", "highlight_cosine"),
     *("chord_interpolator", "chord_setup", "chord_values", "local_chord_interpolator", "light_products"),
     *("highlight_gate", "power", "specular", "value_gate", "render", "pixel_pipelines", "framing"),
+    *("edge_setup", "edge_normals", "gradient_setup", "plane_setup", "plane_assembler", "span_attributes"),
+    *("attribute_serialiser", "vertex_sort", "span_clip", "edge_walk", "vector_normaliser", "span_halver"),
+    *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_test"),
     *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )
-"""Units that the default design does not have: of other methods and models, of renderer, buses and boards."""
+"""Units that the default design does not have: of other methods and models, of renderer, buses and boards.
+
+Of geometry the quick run has the whole, and not its parts.
+"""
 
 DEFAULT_DESIGN = ("pipeline", "quotient, blinn")
 """In the quick run it stands for the default of its record, most of whose stimuli are of unit normals."""
