@@ -1,14 +1,11 @@
 """Input and output of the shading pipeline: raster spans, and pixels."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import SpanVectors
-from blysk.golden.number.unit_vector import quantise
-from blysk.golden.reference.geometry import normalise
 
 __all__ = ["Pixels", "Spans"]
 
@@ -30,9 +27,6 @@ class Spans:
         Index of the material; ``None``: 0 for all.
     values : SpanValues, optional
         Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
-    normal_middle : int array, shape (spans, 3), optional
-        Unit normals in the middle of each span, for methods with `Interpolator.TAKES_MIDDLE`; ``None``: the
-        bisectors of the two ends.
     factors : int64 array, shape (spans, factors, 3), optional
         With values: codes of the factors, in the format of N·L, of the lights in `Design.factors`.
     vectors : SpanVectors, optional
@@ -47,21 +41,12 @@ class Spans:
     normal_right: np.ndarray
     material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
     values: SpanValues | None = None
-    normal_middle: np.ndarray | None = None
     factors: np.ndarray | None = None
     vectors: SpanVectors | None = None
 
     def __post_init__(self):
         if self.material is None:
             object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
-
-    @cached_property
-    def middle(self) -> np.ndarray:
-        """`normal_middle`, or the bisectors of the two ends; the left end where the ends are opposite."""
-        if self.normal_middle is not None:
-            return self.normal_middle
-        total = np.add(self.normal_left, self.normal_right)
-        return quantise(normalise(np.where(np.any(total, axis=1, keepdims=True), total, self.normal_left)))
 
     def __len__(self):
         return len(self.length)
@@ -70,11 +55,10 @@ class Spans:
         """Some of the spans, by a slice, indices or a mask."""
         values = self.values if self.values is None else SpanValues(*(codes[which] for codes in self.values))
         fields = ("x", "y", "length", "normal_left", "normal_right", "material")
-        middle = self.normal_middle if self.normal_middle is None else self.normal_middle[which]
         chosen = {name: getattr(self, name)[which] for name in fields}
         factors = self.factors if self.factors is None else self.factors[which]
         vectors = self.vectors if self.vectors is None else self.vectors[which]
-        return Spans(**chosen, values=values, normal_middle=middle, factors=factors, vectors=vectors)
+        return Spans(**chosen, values=values, factors=factors, vectors=vectors)
 
 
 @dataclass(frozen=True)
@@ -91,9 +75,6 @@ class Pixels:
         Whether a pixel is the last of its span.
     out_of_range_spans : int
         Number of spans with a larger angle than the method serves; their pixels have no error bound.
-    wide_spans : int
-        Number of spans with a larger angle than the method's error bound allows at the exponent; see
-        `SpanLimit`.
     """
 
     x: np.ndarray
@@ -101,4 +82,3 @@ class Pixels:
     color: np.ndarray
     last: np.ndarray
     out_of_range_spans: int
-    wide_spans: int = 0

@@ -74,8 +74,7 @@ class FrameConstants:
     Parameters
     ----------
     exponent : int
-        Specular exponent, 1 to 1000. With a lobe: the exponent at which Blinn's power is as steep as the
-        lobe; it decides how wide spans may be.
+        Specular exponent, 1 to 1000; a pipeline with tables of lobes does not read it.
     ambient : int array, shape (3,)
         Ambient colour operand, ``UQ(11, 6)`` in LSB.
     direction, halfway : int arrays, shape (lights, 3)
@@ -87,8 +86,7 @@ class FrameConstants:
     bank : int
         Bank of that table.
     threshold : int, optional
-        Threshold of that table, see `Design.threshold_of`, for a design in which a gate or a span limit needs
-        it.
+        Threshold of that table, see `Design.threshold_of`, for a design with a gate.
     axes : int array, shape (lights - 1, rows, 3), optional
         Axes of the frame of each further light, in the frame of the first: x, y, z, or with highlights of R·V
         x, ``y cos a``, z, or without highlights z alone; ``SQ(1, 17)``. For a renderer of triangles whose

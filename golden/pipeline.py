@@ -10,7 +10,6 @@ import numpy as np
 from blysk.golden.beats import Pixels, Spans
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import QuotientSpans
-from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.factor import Factor
@@ -21,8 +20,8 @@ from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
 from blysk.golden.lighting.value_gate import ValueGate
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator, Operands
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
@@ -86,8 +85,8 @@ class Design:
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool
-        Whether a gate decides which spans have no highlight; it changes no pixel. Chord methods have a
-        `ValueGate`, other methods of unit normals a `HighlightGate`.
+        Whether a gate decides which spans have no highlight; it changes no pixel. ``chord-local``
+        has a `ValueGate`, methods of unit normals a `HighlightGate`.
     grey : bool
         Whether there is one channel in place of three: it uses the colour operands of red, and the pixel
         repeats it three times.
@@ -208,14 +207,14 @@ class Design:
         materials : sequence of Material
             Materials of the scene.
         scaled : bool
-            Whether a chord method may have a scale for sharp lobes, see `Lobe.scale_of`: for spans that are
+            Whether ``chord-local`` may have a scale for sharp lobes, see `Lobe.scale_of`: for spans that are
             cut for the design.
         """
         specular, interpolator = self.specular, self.interpolator
         if isinstance(specular, Lobe) and specular.fixed is None:
             lobes = {self.highlight_parameter(material): None for material in materials}
             specular = replace(specular, banks=min(len(lobes), Lobe.MAX_BANKS)).for_parameters(list(lobes))
-            if scaled and isinstance(interpolator, ChordInterpolator):
+            if scaled and isinstance(interpolator, LocalChordInterpolator):
                 interpolator = replace(interpolator, scale=specular.scale_of(list(lobes)))
         return replace(self, materials=len(materials), specular=specular, interpolator=interpolator)
 
@@ -259,22 +258,17 @@ class Design:
         return cast(QuotientInterpolator, self.interpolator).spans(self.lights, self.specular is not None)
 
     @cached_property
-    def span_limit(self) -> SpanLimit | None:
-        """Bit-accurate model of the unit that flags wide spans; ``None`` for methods without one."""
-        return SpanLimit() if self.lights and self.interpolator.TAKES_MIDDLE else None
-
-    @cached_property
     def highlight_gate(self) -> HighlightGate | ValueGate:
         """Bit-accurate model of the gate."""
         assert self.specular is not None
-        if isinstance(self.interpolator, ChordInterpolator):
+        if isinstance(self.interpolator, LocalChordInterpolator):
             return ValueGate(self.specular)
         return HighlightGate(self.specular, interpolator=self.interpolator)
 
     @property
     def has_threshold(self) -> bool:
-        """Whether frame constants have a threshold: tables are loaded, and gate or span limit needs it."""
-        return self.loads_tables and (self.gate or self.span_limit is not None)
+        """Whether frame constants have a threshold: tables are loaded, and the gate needs it."""
+        return self.loads_tables and self.gate
 
     @property
     def banks(self) -> int:
@@ -316,7 +310,7 @@ class Design:
         if self.loads_tables:
             threshold = self._thresholds(constants)[spans.material]
         if isinstance(gate, ValueGate):
-            highlight = self._values(spans, constants[0]).highlight.astype(np.int64)
+            highlight = self._values(spans).highlight.astype(np.int64)
             short = np.asarray(spans.length) < 3
             # A span of two pixels has no pixel in the middle.
             highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
@@ -380,29 +374,12 @@ class Design:
             color=color,
             last=step == length[span] - 1,
             out_of_range_spans=out_of_range,
-            wide_spans=self._wide_spans(spans, constants),
         )
 
-    def _values(self, spans: Spans, constants: FrameConstants) -> SpanValues:
-        """Values of spans for a chord method; u is 0 without specular light, so that no u is out of range."""
-        if self.takes_values:
-            values = cast(SpanValues, spans.values)
-        else:
-            normals = spans.normal_left, spans.middle, spans.normal_right
-            words = (Fixed(COMPONENT, codes) for codes in (*normals, constants.direction, constants.halfway))
-            values = cast(Any, self.interpolator).values(*words)
+    def _values(self, spans: Spans) -> SpanValues:
+        """Values of spans; u is 0 without specular light, so that no u is out of range."""
+        values = cast(SpanValues, spans.values)
         return values if self.specular else values._replace(highlight=np.zeros_like(values.highlight))
-
-    def _wide_spans(self, spans: Spans, constants: Sequence[FrameConstants]) -> int:
-        """Number of spans that the span limit flags."""
-        if self.span_limit is None:
-            return 0
-        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
-        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
-        operands = left, right, self._values(spans, constants[0]), spans.length, exponent
-        threshold = self._thresholds(constants)[spans.material] if self.loads_tables else None
-        wide = self.span_limit.compute(*operands, self.specular is not None, threshold)
-        return int(np.count_nonzero(wide))
 
     def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:
         """Refuse constants of another design, and codes out of range."""
@@ -442,13 +419,11 @@ class Design:
         self, spans: Spans, kept: np.ndarray, length: np.ndarray, constants: FrameConstants
     ) -> Callable[[slice], Operands]:
         """Function from a part of the kept spans to the operands of its pixels."""
-        if isinstance(self.interpolator, ChordInterpolator):
+        if isinstance(self.interpolator, LocalChordInterpolator):
             interpolator, given = self.interpolator, spans[kept]
-            factors = given.factors if self.takes_values else None
+            factors = given.factors
             return lambda part: interpolator.compute_values(
-                self._values(given[part], constants),
-                length[part],
-                None if factors is None else factors[part],
+                self._values(given[part]), length[part], None if factors is None else factors[part]
             )
         if isinstance(self.interpolator, QuotientInterpolator):
             method, carried = self.interpolator, cast(Any, spans[kept].vectors)

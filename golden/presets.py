@@ -9,7 +9,6 @@ from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods import (
     angular_interpolator,
     bisection_interpolator,
-    chord_interpolator,
     linear_interpolator,
     local_chord_interpolator,
     quadratic_interpolator,
@@ -41,7 +40,6 @@ _MODULES = (
     quadratic_interpolator,
     angular_interpolator,
     recurrence_interpolator,
-    chord_interpolator,
     local_chord_interpolator,
     quotient_interpolator,
 )

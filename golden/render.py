@@ -41,9 +41,6 @@ class DrawnPixels:
         that were ``hidden``; number of pixels of spans that were ``dropped`` before shading.
     out_of_range_spans : int
         Number of spans with a larger angle than the method serves.
-    wide_spans : int
-        Number of spans with a larger angle than the method's error bound allows at the exponent; see
-        `SpanLimit`.
     """
 
     x: np.ndarray
@@ -54,7 +51,6 @@ class DrawnPixels:
     spans: TrueSpans | LineSpans | VectorSpans
     counts: dict[str, int]
     out_of_range_spans: int
-    wide_spans: int
 
     @property
     def beats(self) -> dict:
@@ -164,7 +160,6 @@ class Renderer:
             | {"spans": len(spans), "pixels": len(drawn), "hidden": int((~drawn).sum())}
             | {"dropped": dropped},
             out_of_range_spans=pixels.out_of_range_spans,
-            wide_spans=pixels.wide_spans,
         )
 
     def _for_lights(

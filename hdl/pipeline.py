@@ -31,8 +31,8 @@ __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 def span_shape(parameters: Design) -> data.StructLayout:
     """Shape of a raster span: first pixel, pixels, and the normals that the method takes.
 
-    Unit normals at the first and last pixel centre, for chord also in the middle; the ends of the true line;
-    or values of each light. Without lights there are none. ``material`` is there with several materials.
+    Unit normals at the first and last pixel centre; the ends of the true line; or values of each light.
+    Without lights there are none. ``material`` is there with several materials.
 
     Parameters
     ----------
@@ -62,14 +62,12 @@ def status_shape() -> data.StructLayout:
     """Shape of the pipeline's counters since reset, which stop at their largest value.
 
     ``out_of_range_spans``: spans whose angle the method does not serve, so that their pixels have no error
-    bound; counted some cycles after the span is accepted. ``wide_spans``, with the chord method: spans that
-    are wider than the error bound of the exponent allows; see `SpanLimit`. ``empty_spans``: spans of length
-    0. ``overrun``: whether a span went past the largest x, after which x goes on from 0.
+    bound; counted some cycles after the span is accepted. ``empty_spans``: spans of length 0. ``overrun``:
+    whether a span went past the largest x, after which x goes on from 0.
     """
     return data.StructLayout(
         {
             "out_of_range_spans": unsigned(16),
-            "wide_spans": unsigned(16),
             "empty_spans": unsigned(16),
             "overrun": unsigned(1),
         }
@@ -86,9 +84,8 @@ class ShadingPipelineUnit(wiring.Component):
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
     each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles, and in the
     throughput style at least ``cycles_per_pixel length``: the fewest if it is short and follows a long one,
-    as up to two prepared spans wait before the accumulator. (With ``chord`` the upper bound is that of a run
-    of spans, and one ``setup_interval`` more; ``bisection`` takes longer where it has several segments.) A
-    span of length 0 is accepted like any other and gives no pixel.
+    as up to two prepared spans wait before the accumulator. (``bisection`` takes longer where it has several
+    segments.) A span of length 0 is accepted like any other and gives no pixel.
 
     With a gate a highlight gate processes each span in parallel with the interpolator, and decides for each
     light whether the span has no highlight: then the specular unit of the light keeps its state, or in the
@@ -355,7 +352,6 @@ class ShadingPipelineUnit(wiring.Component):
         span, status = self.i.payload, self.status
         for counter, event in (
             (status.out_of_range_spans, self._interpolator.out_of_range if self._interpolator else 0),
-            (status.wide_spans, getattr(self._interpolator, "wide", 0)),
             (status.empty_spans, self.i.valid & self.i.ready & (span.length == 0)),
             (status.overrun, admit & (span.x + span.length > 1 << self.parameters.x_bits)),
         ):

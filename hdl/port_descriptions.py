@@ -7,7 +7,6 @@ PORT_DESCRIPTIONS = {
     "i_y": "its row",
     "i_length": "pixels of the span; 0 gives none",
     "i_normal_left": "normal at the first pixel centre, see above",
-    "i_normal_middle": "unit normal in the middle between them",
     "i_normal_right": "normal at the last pixel centre, see above",
     "i_values": "codes of N.L and 1 - N.H of each light at the first pixel, the middle and the last pixel",
     "i_factors": "codes of a, each light's that fades, at the same three pixels",
@@ -24,7 +23,6 @@ PORT_DESCRIPTIONS = {
     "write_address": "frame constant to write, see above",
     "write_data": "its code; accepted when no span is inside",
     "status_out_of_range_spans": "spans since reset beyond what the method serves, up to 65535",
-    "status_wide_spans": "spans since reset wider than the error bound of the exponent allows, up to 65535",
     "status_empty_spans": "spans of length 0 since reset, up to 65535",
     "status_overrun": "a span went past the largest column",
 }

@@ -58,7 +58,6 @@ PORT_DESCRIPTIONS = {
     "status_hidden": "of them those behind what was drawn before",
     "status_dropped": "pixels of spans that the coarse depth test dropped before shading",
     "status_out_of_range_spans": "spans beyond what the method serves",
-    "status_wide_spans": "spans wider than the error bound of the exponent allows",
     "memory_read_place": "pixel whose depth is read",
     "memory_read_enable": "reads; else the data stays",
     "memory_read_data": "its depth, on the next clock",
@@ -74,9 +73,7 @@ _DEEP = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
 _COMPONENTS = 3
 """Components of a vector of geometry."""
 
-_SHADING = ("out_of_range_spans", "wide_spans")
-
-STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", *_SHADING)
+STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans")
 """Counters of `RenderUnit`."""
 
 WAITING_SPANS = 513
@@ -249,7 +246,7 @@ class RenderUnit(wiring.Component):
             *(self.status[name].eq(geometry.status[name]) for name in COUNTERS),
             self.status.spans.eq(count),
             *(self.status[name].eq(depth.status[name]) for name in ("pixels", "hidden")),
-            *(self.status[name].eq(pipeline.status[name]) for name in _SHADING),
+            self.status.out_of_range_spans.eq(pipeline.status.out_of_range_spans),
         ]
         return m
 

@@ -232,7 +232,7 @@ def test_there_is_something_to_check():
         ("[T]", "t"),
         ("[T]: speed in software", "t-speed-in-software"),
         ("Energy-normalised forms", "energy-normalised-forms"),
-        ("The `chord` method, [in short](x.md)", "the-chord-method-in-short"),
+        ("The `linear` method, [in short](x.md)", "the-linear-method-in-short"),
     ],
 )
 def test_anchors_are_those_of_github(heading, anchor):
@@ -263,7 +263,7 @@ def test_wrong_names_are_found(text, wrong):
 @pytest.mark.parametrize(
     ("page", "wrong"),
     [
-        ("[a](models.md) [b](models.md#lighting) ![c](figures/chord-error.svg) [d](#own)\n# Own", []),
+        ("[a](models.md) [b](models.md#lighting) ![c](figures/linear-error.svg) [d](#own)\n# Own", []),
         ("[a](nothing.md)", ["nothing.md"]),
         ("[a](models.md#nowhere)", ["models.md#nowhere"]),
         ("[T]\n\n[T]: references.md#tt", ["references.md#tt"]),
@@ -274,7 +274,7 @@ def test_wrong_links_are_found(page, wrong, tmp_path):
     for name in ("models.md", "references.md"):
         (tmp_path / name).write_text((THEORY / name).read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "figures").mkdir()
-    (tmp_path / "figures" / "chord-error.svg").touch()
+    (tmp_path / "figures" / "linear-error.svg").touch()
     path = tmp_path / "page.md"
     path.write_text(page, encoding="utf-8")
     assert wrong_links(path, page) == wrong

@@ -140,7 +140,7 @@ import numpy as np
 import blysk
 
 scene: blysk.Scene = blysk.scene("teapot", size=(64, 48), lights=[blysk.Light((1, 1, 1))], background="#fff")
-design: blysk.Design = blysk.design(method="chord", lights=2, gate=True)
+design: blysk.Design = blysk.design(method="quadratic", lights=2, gate=True)
 frame: blysk.RenderedFrame = blysk.render(scene, design=design, engine="auto")
 other = blysk.render("teapot", method="quotient", exponent=200, view=(0, 0, 1))
 image: np.ndarray = frame.image

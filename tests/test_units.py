@@ -30,7 +30,7 @@ FEW = 24
 SELDOM = (
     *OF_DOCUMENTS,
     *("difference_accumulator", "renormaliser", "renormalise_interpolator", "highlight_cosine"),
-    *("chord_interpolator", "chord_setup", "chord_values", "local_chord_interpolator", "light_products"),
+    *("chord_setup", "local_chord_interpolator", "light_products"),
     *("highlight_gate", "power", "specular", "value_gate", "render", "pixel_pipelines", "framing"),
     *("edge_setup", "edge_normals", "gradient_setup", "plane_setup", "plane_assembler", "span_attributes"),
     *("attribute_serialiser", "vertex_sort", "span_clip", "edge_walk", "vector_normaliser", "span_halver"),
@@ -42,8 +42,8 @@ SELDOM = (
 Of geometry the quick run has the whole, and not its parts.
 """
 
-DEFAULT_DESIGN = ("pipeline", "quotient, blinn")
-"""In the quick run it stands for the default of its record, most of whose stimuli are of unit normals."""
+OF_NORMALS = ("pipeline", "renormalise, blinn")
+"""It gets the stimuli of unit normals, which the default design does not take."""
 
 SELDOM_STIMULI = ("ties", "terminator")
 """Stimuli whose expected beats take the longest: integers of any size, and many spans."""
@@ -53,8 +53,7 @@ CI = [pytest.mark.long, pytest.mark.ci]
 
 
 def marks_of(name, variant, stimulus, usual):
-    replaced = name == DEFAULT_DESIGN[0] and variant != DEFAULT_DESIGN[1]
-    seldom = name in SELDOM or stimulus in SELDOM_STIMULI or replaced
+    seldom = name in SELDOM or stimulus in SELDOM_STIMULI or (name, variant) == OF_NORMALS
     return CI[:1] if not usual else CI if seldom else []
 
 
@@ -78,7 +77,7 @@ def _runs():
         for variant, given in record.variants.items():
             stimuli = record.stimuli_of(variant)
             for stimulus, sent in stimuli.items():
-                usual = variant == record.default or (name, variant) == DEFAULT_DESIGN
+                usual = variant == record.default or (name, variant) == OF_NORMALS
                 usual = usual and not (given.long or sent.long)
                 # The default variant gets every stimulus, the others the first and those that name them.
                 if variant == record.default or stimulus == next(iter(stimuli)) or variant in sent.variants:

@@ -226,7 +226,6 @@ def measure(
             "empty_spans": np.count_nonzero(spans.length == 0),
             "overrun": np.any((spans.x + spans.length > 4096) & (spans.length > 0)),
         }
-        status |= {"wide_spans": shaded.wide_spans} if design.span_limit else {}
         _hold("cxxrtl", f"{where}, status", found.status[None], {k: np.array([v]) for k, v in status.items()})
         if verilated is not None:
             stimulus = free_stimulus(verilated.ports, beats, constants.writes(), len(shaded.x), _IDLE_TIMEOUT)

@@ -17,15 +17,12 @@ from blysk.bench.report.stability_cases import (
     cases_of,
     single_spans,
 )
-from blysk.golden.cosines.chord_setup import SpanValues
-from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans, split_pairs
 from blysk.golden.frames.local import line_ends, local_values
 from blysk.golden.frames.prepare import constants_of, span_vectors, spans_for
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.methods.quotient_interpolator import QuotientErrors
 from blysk.golden.normals.renormaliser import Renormaliser
-from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset
@@ -106,44 +103,14 @@ def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
         # The same numbers.
         shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
         return Spans(raster.x, raster.y, raster.length, left << shift, right << shift)
-    return Spans(raster.x, raster.y, raster.length, left, right, normal_middle=_middle_codes(left, right))
-
-
-def _middle_codes(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Codes of bisectors with the mean length of the ends; 0 for opposite ends."""
-    total = left + right
-    length = (np.linalg.norm(left, axis=1) + np.linalg.norm(right, axis=1))[:, np.newaxis] / 2
-    middle = length * np.where(total.any(axis=1, keepdims=True), normalise(total), 0.0)
-    return np.clip(np.rint(middle), COMPONENT.min_code, COMPONENT.max_code).astype(np.int64)
-
-
-def _flagged(design: Design, spans: Spans, constants: FrameConstants) -> np.ndarray:
-    """Whether the pipeline counts each span as out of range or as wide; bool, shape (spans,)."""
-    flagged = design.operands(spans, constants).out_of_range
-    if design.span_limit is None:
-        return flagged
-    values, (left, _, right) = _three_values(design, spans, constants)
-    exponent = np.full(len(spans), constants.exponent)
-    return flagged | design.span_limit.compute(left, right, values, spans.length, exponent)
-
-
-def _three_values(
-    design: Design, spans: Spans, constants: FrameConstants
-) -> tuple[SpanValues, tuple[Fixed, Fixed, Fixed]]:
-    """Values of a method with true middle normals, and the three normals of which they are computed."""
-    codes = spans.normal_left, spans.middle, spans.normal_right, constants.direction, constants.halfway
-    *normals, direction, halfway = (Fixed(COMPONENT, of) for of in codes)
-    return design.interpolator.values(*normals, direction, halfway), tuple(normals)
+    return Spans(raster.x, raster.y, raster.length, left, right)
 
 
 def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray:
     """Picture of the method's own curve in float64, computed from the codes of the spans."""
     scene, model, method = case.scene, design.specular.model, design.interpolator
-    if method.TAKES_MIDDLE or design.takes_values:
-        values = spans.values
-        if values is None:
-            values, _ = _three_values(design, spans, FrameConstants.of(scene))
-        cosine, u = method.exact_operands(values, spans.length)
+    if design.takes_values:
+        cosine, u = method.exact_operands(spans.values, spans.length)
         return shade_operands(scene, raster, cosine, 1 - u, model)
     if design.takes_vectors:
         left, right = case.codes or line_ends(raster)
@@ -160,7 +127,7 @@ def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
     scene, material = case.scene, case.scene.materials[0]
     spans, (constants,) = spans_of(case, design, raster), constants_of(scene, design)
     color = design.compute(spans, constants).color
-    out_of_range = _flagged(design, spans, constants)
+    out_of_range = design.operands(spans, constants).out_of_range
 
     by_codes = design.interpolator.takes_line and not design.takes_vectors
     degrees = _line_angles(spans) if by_codes else _angles(raster)
@@ -301,7 +268,7 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
     cut, _ = cut_spans(case.scene, raster, design)
     first = np.flatnonzero(cut.offset == 0)
     parts = np.bincount(raster.span[first], minlength=len(raster.length))
-    if design.takes_values or design.takes_vectors or design.span_limit:
+    if design.takes_values or design.takes_vectors:
         inside = parts == 1
     else:
         widest = design.interpolator.widest_span(case.scene.materials[0].exponent)
@@ -344,19 +311,16 @@ def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
     case = single_spans(2, "", ends, 5, SWEEP_EXPONENT)
     design = _design(case, method)
     (constants,) = constants_of(case.scene, design)
-    return _flagged(design, spans_of(case, design, case.raster), constants)
+    return design.operands(spans_of(case, design, case.raster), constants).out_of_range
 
 
 def widest_span(method: str, exponent: int) -> float:
     """Widest span in degrees that a method serves.
 
-    For a method with a span limit it is the widest lit span that is not flagged as wide; for ``chord-local``
-    and ``quotient`` the widest angle at which no span of a sample is cut; else the widest span that is not
-    cut.
+    For ``chord-local`` and ``quotient`` it is the widest angle at which no span of a sample is cut; else the
+    widest span that is not cut.
     """
     design = preset(method, model_of(method))
-    if design.span_limit is not None:
-        return design.span_limit.angle(exponent)
     if not (design.takes_values or design.takes_vectors):
         return METHODS[method].widest_span(exponent)
     low, high = 0.0, METHODS[method].MAX_ANGLE

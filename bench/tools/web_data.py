@@ -21,7 +21,7 @@ from blysk.golden.frame_constants import (
     THRESHOLD_ADDRESS,
     FrameConstants,
 )
-from blysk.golden.frames.cut import cut_by_angle, cut_spans
+from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.local import line_ends
 from blysk.golden.frames.prepare import quantise_spans, spans_for, with_tables
 from blysk.golden.frames.vector_axes import vector_axes
@@ -224,17 +224,15 @@ COLUMNS = (
     {"name": "length", "bytes": 2, "bias": 0},
     *({"name": f"normal_left.{c}", "bytes": 3, "bias": 1 << 23} for c in range(3)),
     *(
-        {"name": f"normal_{place}.{c}", "bytes": 3, "bias": 1 << 23, "from": f"normal_left.{c}"}
-        for place in ("right", "middle")
+        {"name": f"normal_right.{c}", "bytes": 3, "bias": 1 << 23, "from": f"normal_left.{c}"}
         for c in range(3)
     ),
     {"name": "ratio", "bytes": 3, "bias": 1 << 23},
 )
 """Columns of the spans in a file, one for each field: its codes, or their change from the previous span
 (``running``) or from another column (``from``), plus ``bias``, so that none is negative, in a number of
-``bytes``. The middle normal is the left one if the method takes none. The ratio is of the lengths of the
-interpolated normals at the ends, ``round(2^19 log2(m_r / m_l))``; it is 0 for a method that takes these
-normals themselves."""
+``bytes``. The ratio is of the lengths of the interpolated normals at the ends, ``round(2^19 log2(m_r /
+m_l))``; it is 0 for a method that takes these normals themselves."""
 
 
 def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -> bytes:
@@ -254,8 +252,7 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
     """
     logarithm = np.clip(np.log2(np.broadcast_to(ratio, len(spans))), -15, 15)
     codes = {"x": spans.x, "y": spans.y, "length": spans.length, "ratio": np.rint(2**19 * logarithm)}
-    middle = spans.normal_left if spans.normal_middle is None else spans.normal_middle
-    for name, normal in (("left", spans.normal_left), ("right", spans.normal_right), ("middle", middle)):
+    for name, normal in (("left", spans.normal_left), ("right", spans.normal_right)):
         codes |= {f"normal_{name}.{c}": normal[:, c] for c in range(3)}
     parts = [np.array([len(spans), len(visible)], dtype="<u4").tobytes()]
     for column in COLUMNS:
@@ -273,8 +270,7 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
 def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raster, Spans]:
     """Spans of a view, before and after the rounding of their normals, for a light that moves.
 
-    They are cut for the light of `START`. For a method with a span limit they are cut to the widest angle of
-    a lit span, as the highlight may be anywhere. Spans of a method that takes vectors have the ends of the
+    They are cut for the light of `START`. Spans of a method that takes vectors have the ends of the
     true line, in the scene's frame; see `with_vectors`.
 
     Parameters
@@ -288,8 +284,6 @@ def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raste
     """
     scene = scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent})
     raster = rasterise(scene)
-    if design.span_limit is not None:
-        raster, _ = cut_by_angle(raster, design.span_limit.angle(exponent))
     cut, _ = cut_spans(scene, raster, design)
     if not design.takes_vectors:
         return cut, spans_for(scene, cut, design)
@@ -473,5 +467,4 @@ def method(name: str) -> dict[str, Any]:
     """Values of a method for the page: curve, whether it uses the chord, and a text."""
     interpolator = METHODS[name]
     text = inspect.getdoc(type(interpolator)).split("\n\n")[0]
-    curve = "three" if interpolator.TAKES_MIDDLE else interpolator.CURVE
-    return {"curve": curve, "chord": interpolator.uses_chord, "text": " ".join(text.split())}
+    return {"curve": interpolator.CURVE, "chord": interpolator.uses_chord, "text": " ".join(text.split())}

@@ -10,24 +10,7 @@ from blysk.golden.number.reciprocal import step_words
 from blysk.golden.number.spans import LENGTH_BITS, checked_lengths
 from blysk.golden.number.unit_vector import ONE_SQUARED
 
-__all__ = ["ChordSetup", "Differences", "SpanValues", "largest_span_angle"]
-
-
-def largest_span_angle(exponent: int) -> float:
-    """Widest span, in degrees, for which the quadratic fit is good: ``min(15, 20 n^(-1/6))``.
-
-    At full reflection the fit differs from exactly normalised interpolation by about ``c sqrt(n) psi^3`` LSB
-    in the specular term, 0.25 LSB at this angle, and by up to 0.12 LSB in the diffuse term. This
-    holds if the lengths of the two normals, before they are normalised, are nearly equal.
-
-    Parameters
-    ----------
-    exponent : int
-        n, 1 to 1000.
-
-    Source: docs/theory/chord.md#error-bound.
-    """
-    return min(15.0, 20.0 * exponent ** (-1 / 6))
+__all__ = ["ChordSetup", "Differences", "SpanValues"]
 
 
 class SpanValues(NamedTuple):
@@ -51,7 +34,7 @@ class SpanValues(NamedTuple):
         diffuse, highlight : float64 arrays, shape (spans, lights, 3)
             N·L, -1 to 1, and u, 0 to 2.
         scale : int
-            s: if over 0, the words of u are ``min(2^s u, 1)``; see `ChordValues`.
+            s: if over 0, the words of u are ``min(2^s u, 1)``; see `LocalChordInterpolator`.
 
         Raises
         ------
@@ -136,7 +119,7 @@ class ChordSetup:
 
     @classmethod
     def check_scale(cls, scale: int) -> None:
-        """Refuse a scale of u that is out of range, see `ChordValues`.
+        """Refuse a scale of u that is out of range, see `LocalChordInterpolator`.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.lighting import distant_cosine, halfway_vector
 from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
@@ -47,7 +47,7 @@ __all__ = [
 BORDER = 0.002
 """Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off."""
 
-_BOUNDED = ("chord", "chord-local", "renormalise")
+_BOUNDED = ("chord-local", "renormalise")
 """Methods whose spans are cut, or need no cut, so that `error_bound` holds."""
 
 
@@ -138,7 +138,7 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
         In [0, 1].
     """
     interpolator = design.interpolator
-    if isinstance(interpolator, ChordInterpolator):
+    if isinstance(interpolator, LocalChordInterpolator):
         fading = [index for index, light in enumerate(scene.lights) if light.fades]
         operands = local_operands(scene, raster, factors=fading, scale=interpolator.scale)
         cosine, one_minus_cosine, *given = interpolator.exact_operands(
@@ -193,7 +193,7 @@ def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> floa
     Returns
     -------
     float or None
-        The bound of the method error; ``None`` where no bound is known: of another method than ``chord``,
+        The bound of the method error; ``None`` where no bound is known: of another method than
         ``chord-local``, ``renormalise`` and ``quotient``, of a pipeline that was not made for the scene's
         materials, of a measured curve, and of a roughness under `LEAST_ROUGHNESS`. ``renormalise`` has none
         either where `Lobe.scale_of` gives a scale: its words of 1 - N·H are too coarse for so sharp a lobe.

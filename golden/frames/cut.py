@@ -214,10 +214,9 @@ def cut_by_error(
     perspective-correct. A span is halved if
 
     - its angle is over the method's `Interpolator.widest_span`;
-    - the chord method would flag it: a word of `ChordSetup` would overflow, or the span is wide by
-      `SpanLimit`;
+    - ``chord-local`` would flag it: a word of `ChordSetup` would overflow;
     - it has pixels between those through which the method's curve is put, and vectors turn farther along it
-      than `ChordInterpolator` allows, or the error of N·L or u is over its tolerance. The tolerance of u
+      than `LocalChordInterpolator` allows, or the error of N·L or u is over its tolerance. The tolerance of u
       depends on the exponent of the span's material and on the least u of the span, as dark spans may have
       larger errors;
     - N·L of a light changes its sign, or nearly, where its highlight shows, and N·L of a pixel might have

@@ -25,8 +25,6 @@ class Frame:
         The pipeline's spans.
     out_of_range_spans : int
         Spans whose angle the pipeline reports as larger than its method serves.
-    wide_spans : int
-        Spans that the pipeline reports as wider than the error bound of the exponent allows.
     seconds : dict
         Time by step: ``raster`` (rasterise, cut, quantise), and ``model`` or ``simulate`` for the pixels.
     """
@@ -34,7 +32,6 @@ class Frame:
     image: np.ndarray
     prepared: PreparedFrame
     out_of_range_spans: int
-    wide_spans: int
     seconds: dict[str, float]
 
     @property
@@ -104,6 +101,5 @@ def model_frame(scene: Scene, design: Design) -> Frame:
         image=frame_buffer(scene, prepared.cut_raster, pixels.color),
         prepared=prepared,
         out_of_range_spans=pixels.out_of_range_spans,
-        wide_spans=pixels.wide_spans,
         seconds={"raster": rastered - start, "model": perf_counter() - rastered},
     )

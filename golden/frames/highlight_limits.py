@@ -7,9 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from blysk.golden.cosines.span_limit import SpanLimit
-from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.lobes import curve_lines
@@ -39,7 +37,7 @@ class _Curve:
     def tolerance(self, u: np.ndarray) -> np.ndarray:
         """As of `HighlightLimits`."""
         slope = np.maximum(self._from(self._points[1], u), 2.0**-self.scale)
-        return ChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
+        return LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
 
     @cached_property
     def turn(self) -> float:
@@ -47,7 +45,7 @@ class _Curve:
         u, _, slope = curve_lines(self.model, self.parameter)
         # Each slope counts up to the next argument.
         steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slope)).max()
-        return ChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
+        return LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
 
     def is_lit(self, u: np.ndarray) -> np.ndarray:
         """As of `HighlightLimits`."""
@@ -58,8 +56,8 @@ class _Curve:
 class HighlightLimits:
     """Tolerances of u = 1 - N·H for the highlights of materials.
 
-    For a polynomial or a power the tolerance follows from the exponent, as in `ChordInterpolator`; for a lobe
-    from its curve: it is `ChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope from u on.
+    For a polynomial or a power the tolerance follows from the exponent, as in `LocalChordInterpolator`; for a
+    lobe from its curve: it is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope from u on.
 
     Parameters
     ----------
@@ -67,15 +65,12 @@ class HighlightLimits:
         Exponent, or `ReflectionModel.steepness`, of each material.
     curves : sequence of _Curve or None
         Curve of each material; ``None`` for one without a lobe.
-    least_dark : float array, shape (materials,)
-        u from which on `SpanLimit` takes a span as not lit.
 
     Source: docs/theory/chord.md#where-spans-are-cut.
     """
 
     exponents: np.ndarray
     curves: Sequence[_Curve | None]
-    least_dark: np.ndarray
 
     STEEPEST: ClassVar[float] = 0.77
 
@@ -86,8 +81,6 @@ class HighlightLimits:
             exponents = [material.exponent for material in materials]
         else:
             exponents = [design.steepness(material) for material in materials]
-        words = np.clip(np.ceil(exponents), 1, MAX_EXPONENT)
-        dark = [SpanLimit.lit(word) for word in words]
         curves: list[_Curve | None] = [None] * len(materials)
         if design is not None and design.loads_tables:
             model = design.specular.model
@@ -95,20 +88,12 @@ class HighlightLimits:
             for index, material in enumerate(materials):
                 parameter = design.highlight_parameter(material)
                 if parameter not in made:
-                    level = 2.0
-                    if design.has_threshold:
-                        level = design.threshold_of(design.specular.table(parameter)).values.item() / 2
-                    made[parameter] = _Curve(model, parameter, design.specular.scale), level
-                curves[index], dark[index] = made[parameter]
-        return cls(np.asarray(exponents, dtype=np.float64), tuple(curves), np.asarray(dark))
-
-    @property
-    def words(self) -> np.ndarray:
-        """The exponents for `SpanLimit`: whole numbers, 1 to 1000."""
-        return np.clip(np.ceil(self.exponents), 1, MAX_EXPONENT)
+                    made[parameter] = _Curve(model, parameter, design.specular.scale)
+                curves[index] = made[parameter]
+        return cls(np.asarray(exponents, dtype=np.float64), tuple(curves))
 
     def tolerance(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Largest error of u that keeps `ChordInterpolator.HIGHLIGHT_BUDGET`, where no smaller u occurs.
+        """Largest error of u that keeps `LocalChordInterpolator.HIGHLIGHT_BUDGET`, where no smaller u occurs.
 
         Parameters
         ----------
@@ -117,20 +102,22 @@ class HighlightLimits:
         u : array, shape (pieces, lights)
             Least value of u, at least 0.
         """
-        return self._of("tolerance", ChordInterpolator().highlight_tolerance, material, u)
+        return self._of("tolerance", LocalChordInterpolator().highlight_tolerance, material, u)
 
     def turn(self, material: np.ndarray) -> np.ndarray:
-        """Angle in radians by which a normal may turn for `ChordInterpolator.HIGHLIGHT_BUDGET`, whatever u.
+        """Angle in radians by which a normal may turn, whatever u.
 
-        It is the budget over the steepest slope of S over gamma: of a polynomial or a power at most
-        `STEEPEST` times ``sqrt n``, of a lobe the largest ``sqrt(2u) |dS/du|`` of its curve.
+        It is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope of S over gamma: of a
+        polynomial or a power at most `STEEPEST` times ``sqrt n``, of a lobe the largest ``sqrt(2u) |dS/du|``.
 
         Parameters
         ----------
         material : int array, shape (pieces,)
             Material of each piece of a span.
         """
-        of_material = ChordInterpolator.HIGHLIGHT_BUDGET / (255 * self.STEEPEST * np.sqrt(self.exponents))
+        of_material = LocalChordInterpolator.HIGHLIGHT_BUDGET / (
+            255 * self.STEEPEST * np.sqrt(self.exponents)
+        )
         for index, curve in enumerate(self.curves):
             if curve is not None:
                 of_material[index] = curve.turn
@@ -141,7 +128,7 @@ class HighlightLimits:
 
         Parameters are those of `tolerance`.
         """
-        return self._of("is_lit", ChordInterpolator.is_lit, material, u)
+        return self._of("is_lit", LocalChordInterpolator.is_lit, material, u)
 
     def _of(self, name, by_exponent, material, u):
         result = by_exponent(self.exponents[material][:, np.newaxis], u)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import SpanValues
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.reference.geometry import any_component, normalise, sum_of_components
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
@@ -20,7 +20,6 @@ __all__ = [
     "lines_along",
     "local_operands",
     "local_values",
-    "middle_normals",
     "weights_along",
 ]
 
@@ -47,13 +46,6 @@ def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[n
         raster.magnitude_left[span, np.newaxis] * raster.normal_left[span],
         raster.magnitude_right[span, np.newaxis] * raster.normal_right[span],
     )
-
-
-def middle_normals(raster: Raster) -> np.ndarray:
-    """True unit normals in the middle of spans, shape (spans, 3); the left one between opposite normals."""
-    spans = np.arange(len(raster.length))
-    line = lines_along(raster, spans, np.full(len(spans), 0.5))
-    return np.where(any_component(line)[:, np.newaxis], normalise(line), raster.normal_left)
 
 
 @dataclass(frozen=True)
@@ -113,7 +105,7 @@ class SurfacePoints:
         highlight = np.where(any_component(halfway).T, highlight, 2.0)
         return replace(self, normal=normal, diffuse=diffuse, highlight=highlight)
 
-    def turned(self, other: "SurfacePoints", method: ChordInterpolator) -> np.ndarray:
+    def turned(self, other: "SurfacePoints", method: LocalChordInterpolator) -> np.ndarray:
         """Whether N, V or an L changes by more than the method allows from here to ``other``; (count,)."""
         least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
         result = np.einsum("sk,sk->s", self.normal, other.normal) < least
@@ -132,7 +124,7 @@ def chunks(count: int) -> Iterator[slice]:
 
 
 def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> SpanValues:
-    """Input of the chord methods for each span: exact values of N·L and u at three places, as codes.
+    """Input of ``chord-local`` for each span: exact values of N·L and u at three places, as codes.
 
     N, L and H are of unit length at each place. Where a point light is on the surface itself N·L is 0; where
     there is no half-way vector (``L = -V``) u is 2. The middle values of a span of two pixels are means of

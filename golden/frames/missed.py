@@ -72,13 +72,12 @@ def _missed(
 
 
 def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dict[str, int]:
-    """Numbers of the pieces that are off by more than the tolerances of `ChordInterpolator`.
+    """Numbers of the pieces that are off by more than the tolerances of `LocalChordInterpolator`.
 
     Geometry cuts a span by an angle. The angle bounds the error of a method's curve only where the lengths of
-    N/W at both ends of a piece are equal: for ends in the ratio g the chord method's error is about
-    ``12 n (g - 1) psi^2`` LSB more. So N·L and u of the curve are compared with those of the piece's own line
-    at its quarters, as `cut_by_error` does before it cuts. The quarters know the error in between up to a
-    factor that was found by search, see `ChordInterpolator`.
+    N/W at both ends of a piece are equal. So N·L and u of the curve are compared with those of the piece's
+    own line at its quarters, as `cut_by_error` does before it cuts. The quarters know the error in between up
+    to a factor that was found by search, see `LocalChordInterpolator`.
 
     The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle, which turns
     a normal of length m by that over m. Where this alone is over a tolerance, the normals are short.

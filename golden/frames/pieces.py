@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import CHUNK, SurfacePoints, lines_along, weights_along
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.interpolator import Interpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import pixels_of, runs_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.reference.raster import Raster
@@ -47,38 +46,22 @@ class Pieces:
         self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray, turn: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Whether the curve with its words, and the words alone, are too far off; see `missed_pieces`."""
-        return self._scaled(interpolator)._off(interpolator, limits, material, turn[:, np.newaxis])
-
-    def _scaled(self, interpolator: Interpolator) -> "Pieces":
-        """The pieces with u of their places in the scale of the method's words."""
-        scale = getattr(interpolator, "scale", 0)
-        return replace(self, places=tuple(place.scaled(scale) for place in self.places)) if scale else self
-
-    def _off(self, interpolator, limits, material, turn) -> tuple[np.ndarray, np.ndarray]:
-        """Result of `off`; u of the places has the scale of the method's words."""
-        chord = isinstance(interpolator, ChordInterpolator)
+        turn = turn[:, np.newaxis]
         curves = {name: _Quadratic.of(self.places, name) for name in ("diffuse", "highlight")}
-        scale = 2.0 ** getattr(interpolator, "scale", 0)
         words = {
             "diffuse": turn,
-            "highlight": np.sqrt(2 * scale * np.maximum(curves["highlight"].largest, 0)) * turn
-            + scale * turn**2 / 2,
+            "highlight": np.sqrt(2 * np.maximum(curves["highlight"].largest, 0)) * turn + turn**2 / 2,
         }
         if interpolator.takes_line:
             misses = dict.fromkeys(curves, np.zeros_like(turn))
-        elif chord:
-            misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
         else:
             misses = self._misses_of_normals(interpolator)
         margin = self._margin()[:, np.newaxis]
         curve = {name: margin * misses[name] for name in curves}
-        if chord:
-            for name in curves:
-                curve[name] += getattr(interpolator.setup, f"{name}_error")(*curves[name].sizes)
 
         def too_far(off, inner):
             least = np.maximum(curves["highlight"].least - inner, 0)
-            wrong = off["diffuse"] > ChordInterpolator().diffuse_tolerance
+            wrong = off["diffuse"] > LocalChordInterpolator().diffuse_tolerance
             wrong = wrong | (off["highlight"] > limits.tolerance(material, least))
             return wrong & (curves["diffuse"].largest + off["diffuse"] >= 0)
 
@@ -86,15 +69,20 @@ class Pieces:
         if interpolator.takes_line:
             return np.zeros(len(turn), dtype=bool), by_words.any(axis=1)
         both = {name: curve[name] + words[name] for name in curves}
-        inner = margin / ChordInterpolator.MARGIN * misses["highlight"] + words["highlight"]
+        inner = margin / LocalChordInterpolator.MARGIN * misses["highlight"] + words["highlight"]
         by_curve = too_far(both, inner).any(axis=1)
-        by_curve |= self.places[0].turned(self.places[-1], ChordInterpolator())
-        return by_curve & (self.last - self.first >= (3 if chord else 2)), by_words.any(axis=1)
+        by_curve |= self.places[0].turned(self.places[-1], LocalChordInterpolator())
+        return by_curve & (self.last - self.first >= 2), by_words.any(axis=1)
+
+    def _scaled(self, interpolator: Interpolator) -> "Pieces":
+        """The pieces with u of their places in the scale of the method's words."""
+        scale = getattr(interpolator, "scale", 0)
+        return replace(self, places=tuple(place.scaled(scale) for place in self.places)) if scale else self
 
     def _miss(self, interpolator, limits, material) -> np.ndarray:
         """Result of `miss`; u of the places has the scale of the method's words."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
-        chord = isinstance(interpolator, ChordInterpolator)
+        chord = isinstance(interpolator, LocalChordInterpolator)
         # From so many pixels on there are pixels between the three, or two, values of the curve.
         between = pixels > (3 if chord else 2)
         fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
@@ -102,12 +90,12 @@ class Pieces:
         curves = {name: _Quadratic.of(self.places, name) for name in names}
         diffuse, highlight = curves["diffuse"], curves["highlight"]
         if chord:
-            wrong = self._flagged(interpolator, limits, material, curves)
+            wrong = self._flagged(interpolator, curves)
             misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
         else:
             wrong = np.zeros(len(self.origin), dtype=bool)
             misses = self._misses_of_normals(interpolator)
-        wrong |= between[:, 0] & self.places[0].turned(self.places[-1], ChordInterpolator())
+        wrong |= between[:, 0] & self.places[0].turned(self.places[-1], LocalChordInterpolator())
         margin = self._margin()[:, np.newaxis]
         errors = {name: margin * miss for name, miss in misses.items()}
         if chord:
@@ -115,8 +103,8 @@ class Pieces:
             errors["diffuse"] += setup.diffuse_error(*diffuse.sizes)
             errors["highlight"] += setup.highlight_error(*highlight.sizes)
         in_front = diffuse.largest + errors["diffuse"] >= 0
-        least = np.maximum(highlight.least - margin / ChordInterpolator.MARGIN * misses["highlight"], 0)
-        too_far = errors["diffuse"] > ChordInterpolator().diffuse_tolerance
+        least = np.maximum(highlight.least - margin / LocalChordInterpolator.MARGIN * misses["highlight"], 0)
+        too_far = errors["diffuse"] > LocalChordInterpolator().diffuse_tolerance
         tolerance, lit = limits.tolerance(material, least), limits.is_lit(material, least)
         # For a light that fades every pixel is checked, below.
         too_far |= (errors["highlight"] > tolerance) & ~fading
@@ -154,7 +142,7 @@ class Pieces:
         -------
         bool array, shape (chosen, lights)
         """
-        method = ChordInterpolator()
+        method = LocalChordInterpolator()
         names = ("diffuse", "factor")
         curves = {name: curves[name].part(chosen) for name in names}
         ends = (field[chosen] for field in (self.origin, self.first, self.last))
@@ -170,8 +158,8 @@ class Pieces:
     def _margin(self) -> np.ndarray:
         """Bound of the largest error on each piece, as a multiple of the error at its quarters.
 
-        The largest of `ChordInterpolator.MARGIN`, the ratio of the interpolated normals' lengths at the two
-        ends, and the ratio of the weights there: a large ratio moves all change near to one end.
+        The largest of `LocalChordInterpolator.MARGIN`, the ratio of the interpolated normals' lengths at the
+        two ends, and the ratio of the weights there: a large ratio moves all change near to one end.
         """
         ends, steps = [], np.maximum(self.raster.length[self.origin] - 1, 1)
         for place in (self.first, self.last):
@@ -179,13 +167,11 @@ class Pieces:
             ends.append([np.linalg.norm(lines_along(*at), axis=1), weights_along(*at).sum(axis=1)])
         smaller, larger = np.sort(ends, axis=0)
         ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
-        return np.maximum(ratio, ChordInterpolator.MARGIN)
+        return np.maximum(ratio, LocalChordInterpolator.MARGIN)
 
-    def _flagged(
-        self, interpolator: ChordInterpolator, limits: HighlightLimits, material, curves
-    ) -> np.ndarray:
-        """Whether the chord method may flag a piece; if ``False``, it does not."""
-        setup, limit, one = interpolator.setup, SpanLimit(), float(ONE_SQUARED.values)
+    def _flagged(self, interpolator: LocalChordInterpolator, curves) -> np.ndarray:
+        """Whether ``chord-local`` may flag a piece; if ``False``, it does not."""
+        setup, one = interpolator.setup, float(ONE_SQUARED.values)
         formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
         formats["factor"] = setup.DIFFUSE_SLOPE_FORMAT
         flagged = np.zeros(len(self.origin), dtype=bool)
@@ -194,21 +180,7 @@ class Pieces:
             # One rounding step less than the words hold.
             flagged |= (curvature > 2.0 ** (setup.CURVATURE_FORMAT.integer_bits - 1) - 2.0**-19).any(axis=1)
             flagged |= (slope > 2.0 ** (formats[name].integer_bits - 1) - 2.0**-17).any(axis=1)
-        if interpolator.TAKES_VALUES:
-            return flagged
-        cosine = np.einsum("ij,ij->i", self.places[0].normal, self.places[-1].normal)
-        angle = np.degrees(np.arccos(np.minimum(cosine, 1)))
-        angles = np.array([limit.angle(word) for word in limits.words])[material]
-        lit = limits.least_dark[material]
-        diffuse, highlight = (
-            np.stack([getattr(self.places[k], name) for k in (0, 2, 4)], axis=-1)
-            for name in ("diffuse", "highlight")
-        )
-        # Values are off by the rounding of N, L and H.
-        near = limit.least(highlight) / 2 < lit[:, np.newaxis] + 1e-4 * 2**interpolator.scale
-        near &= diffuse.max(axis=2) > float(limit.BEHIND.values) - 1e-4
-        wide = (angle > limit.WIDEST) | ((angle > angles) & near.any(axis=1))
-        return flagged | (wide & (self.last - self.first + 1 >= limit.SHORTEST))
+        return flagged
 
     def _misses_of_normals(self, interpolator: Interpolator) -> dict[str, np.ndarray]:
         """Largest errors of N·L and u of a method's normals, at the places `Interpolator.CHECKED_AT`."""
@@ -322,6 +294,6 @@ def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, curv
         wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
         # Nearer to 0 no word tells the sign; the little light of one that fades may be shown or not.
         wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
-        wrong &= (exact.factor > ChordInterpolator.FACTOR_BUDGET / 255) & lights[of_pixel]
+        wrong &= (exact.factor > LocalChordInterpolator.FACTOR_BUDGET / 255) & lights[of_pixel]
         result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0
     return result

@@ -9,14 +9,14 @@ from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.highlight_limits import HighlightLimits
-from blysk.golden.frames.local import line_ends, local_operands, middle_normals
+from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.missed import missed_spans
 from blysk.golden.frames.vector_axes import light_frames, vector_axes
 from blysk.golden.normals.line_setup import quantise_line
-from blysk.golden.number.unit_vector import quantise, quantise_direction
+from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.reference.faces import face_normals
-from blysk.golden.reference.lighting import Material, halfway_vector
+from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.scene import Scene
 
@@ -104,13 +104,6 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
     elif design.interpolator.takes_line:
         left, right = quantise_line(*_true_ends(scene, cut))
         spans = replace(spans, normal_left=left, normal_right=right)
-    elif design.interpolator.TAKES_MIDDLE:
-        spans = replace(spans, normal_middle=quantise(middle_normals(cut)))
-        if scale:
-            # Sharp lobes: directions count more than lengths.
-            normals = cut.normal_left, cut.normal_right, middle_normals(cut)
-            ends = dict(zip(("normal_left", "normal_right", "normal_middle"), normals, strict=True))
-            spans = replace(spans, **{name: quantise_direction(normal) for name, normal in ends.items()})
     return spans
 
 
@@ -167,19 +160,7 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
             if scene.lights[index].is_on:
                 codes[index] = np.rint(frame.direction * QuotientSpans.ONE)
         constants = [replace(of, direction=codes, halfway=np.zeros_like(codes)) for of in constants]
-    if getattr(design.interpolator, "scale", 0) and not scene.local:
-        constants = [replace(of, halfway=_halfway_directions(scene, of.halfway)) for of in constants]
     return with_tables(constants, scene.materials, design) if design.loads_tables else constants
-
-
-def _halfway_directions(scene: Scene, codes: np.ndarray) -> np.ndarray:
-    """Codes of half-way vectors by `quantise_direction`; vectors of 0 stay 0."""
-    result = codes.copy()
-    for index, light in enumerate(scene.lights):
-        if codes[index].any():
-            exact = halfway_vector(light.direction, scene.camera.viewer)
-            result[index] = quantise_direction(exact)
-    return result
 
 
 def with_tables(
@@ -222,10 +203,9 @@ def with_tables(
         design.threshold_of(table).codes.item() if design.has_threshold else None for table in tables
     ]
     chosen = map(banks.index, parameters)
-    exponents = HighlightLimits.of(materials, design).words.astype(np.int64).tolist()
     return [
-        replace(of_material, exponent=exponent, lobe=tables[bank], bank=bank, threshold=thresholds[bank])
-        for of_material, exponent, bank in zip(constants, exponents, chosen, strict=True)
+        replace(of_material, lobe=tables[bank], bank=bank, threshold=thresholds[bank])
+        for of_material, bank in zip(constants, chosen, strict=True)
     ]
 
 

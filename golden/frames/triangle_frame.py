@@ -6,27 +6,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.vector_axes import further_axes, triangle_axes
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
 from blysk.golden.geometry.triangles import Frame
-from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
 __all__ = [
+    "SPAN_ANGLE",
     "TriangleFrame",
     "frame_of_pixels",
     "sent_triangles",
-    "span_angle",
     "triangle_constants",
     "triangle_frame",
 ]
 
-_SPAN_ANGLE = 5.0
-"""Widest piece of a span in degrees, for methods without a `SpanLimit`."""
+SPAN_ANGLE = 5.0
+"""Widest piece of a span in degrees, for methods of unit normals."""
 
 
 @dataclass(frozen=True)
@@ -51,18 +49,6 @@ class TriangleFrame:
     counts: Mapping[str, int]
 
 
-def span_angle(scene: Scene, design: Design) -> float:
-    """Widest piece of a span in degrees.
-
-    `SpanLimit.angle` of the steepest highlight; 5 for methods without a limit. True lines and vectors are not
-    cut at an angle.
-    """
-    limit = design.span_limit
-    if limit is None:
-        return _SPAN_ANGLE
-    return min(limit.angle(word) for word in HighlightLimits.of(scene.materials, design).words)
-
-
 def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None) -> SceneTriangles:
     """The triangles of a scene for a renderer, sorted by material, with spans cut at an angle.
 
@@ -73,7 +59,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     renderer : Renderer
         Geometry and shading.
     angle : float, optional
-        In degrees, 0 to 60; by default `span_angle`. True lines and vectors are not cut at an angle.
+        In degrees, 0 to 60; by default `SPAN_ANGLE`. True lines and vectors are not cut at an angle.
 
     Raises
     ------
@@ -82,7 +68,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     """
     if scene.local:
         raise ValueError("point lights and a near viewer need spans with values, which triangles do not give")
-    angle = span_angle(scene, renderer.design) if angle is None else angle
+    angle = SPAN_ANGLE if angle is None else angle
     design = renderer.design
     axes = triangle_axes(scene, design) if design.takes_vectors and design.lights else None
     return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle), axes).by_material()

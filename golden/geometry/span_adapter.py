@@ -104,7 +104,7 @@ def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
     Parameters
     ----------
     spans : TrueSpans, LineSpans or VectorSpans
-        From `EdgeNormals`, with left, middle and right unit normals; from `LineAdapter`; or from
+        From `EdgeNormals`, with left and right unit normals; from `LineAdapter`; or from
         `VectorAdapter`: their normals are 0.
     """
     if isinstance(spans, VectorSpans):
@@ -118,5 +118,4 @@ def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
         normal_left=spans.normal_left,
         normal_right=spans.normal_right,
         material=spans.material,
-        normal_middle=spans.normal_middle if isinstance(spans, TrueSpans) else None,
     )

@@ -112,7 +112,7 @@ class Lobe(HighlightOperand):
     cutoff : float
         Entries of a table under this value are 0; at least 0, under 1.
     scale : int
-        s: the operand is ``min(2^s u, 1)``, of chord methods, for lobes that are 0 from ``u = 2^-s`` on.
+        s: the operand is ``min(2^s u, 1)``, of ``chord-local``, for lobes that are 0 from ``u = 2^-s`` on.
     fixed : tuple of float or None
         Parameters of the tables that are fixed at build time, one for each bank (``None`` for a model without
         a parameter). ``None``: tables are loaded by writes.

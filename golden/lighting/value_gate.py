@@ -1,4 +1,4 @@
-"""Value gate: which spans of the chord methods can hold a visible highlight, from three values of u."""
+"""Value gate: which spans of ``chord-local`` can hold a visible highlight, from three u."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -6,9 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.cosines.span_limit import SpanLimit
 from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand, Specular
-from blysk.golden.number.fixed import UQ, Fixed
+from blysk.golden.number.fixed import SQ, UQ, Fixed
 
 __all__ = ["ValueGate"]
 
@@ -19,11 +18,11 @@ class ValueGate:
 
     The u of the pixels lie on a quadratic, ``u_l + P t + G t^2`` with ``G = 2 (u_l + u_r - 2 u_m)``. It is
     the straight line from u_l to u_r minus ``G t (1 - t)``, hence at least ``min(u_l, u_r) - max(G, 0) / 4``;
-    twice this bound is `SpanLimit.least`. A span is lit unless
+    twice this bound is `least`. A span is lit unless
 
     - ``|u_l + u_r - 2 u_m| < 2^-5`` and ``|u_r - u_l| < 2^-3``, so that ``|G| < 1/16`` and ``|P| < 3/16`` fit
       their words; and
-    - `SpanLimit.least` is at least a threshold, from a PROM addressed by the exponent.
+    - `least` is at least a threshold, from a PROM addressed by the exponent.
 
     The distance of a pixel's u from the quadratic through the values is less than
     ``2^-23 + ChordSetup.walk_error(3/16, 1/16) + 2^-26`` (`margin`): the rounding of G, the reciprocal of the
@@ -44,7 +43,7 @@ class ValueGate:
 
     specular: HighlightOperand = field(default_factory=lambda: Specular(operand="one_minus_cosine"))
 
-    LEVEL_FORMAT = SpanLimit.LEVEL_FORMAT
+    LEVEL_FORMAT = SQ(4, ChordSetup.HIGHLIGHT_FORMAT.fraction_bits)
     THRESHOLD_FORMAT = UQ(3, 15)
     LARGEST_BULGE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 5
     LARGEST_RISE = 1 << ChordSetup.HIGHLIGHT_FORMAT.fraction_bits - 3
@@ -62,7 +61,7 @@ class ValueGate:
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
         """Thresholds from the largest arguments with a term over 0, in steps of 2^-25; rounded up.
 
-        If every argument may be lit, the threshold is over 4, which is more than any `SpanLimit.least`.
+        If every argument may be lit, the threshold is over 4, which is more than any `least`.
         """
         format = self.THRESHOLD_FORMAT
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25 + self.margin
@@ -101,4 +100,10 @@ class ValueGate:
             np.abs(right - left) < self.LARGEST_RISE
         )
         level = threshold.extend(self.LEVEL_FORMAT).codes
-        return ~held | (SpanLimit.least(highlight) < level)
+        return ~held | (self.least(highlight) < level)
+
+    @staticmethod
+    def least(highlight: np.ndarray) -> np.ndarray:
+        """``2 min(u_l, u_r) - max(u_l + u_r - 2 u_m, 0)``, from the three values along the last axis."""
+        left, middle, right = np.moveaxis(highlight, -1, 0)
+        return 2 * np.minimum(left, right) - np.maximum(left + right - 2 * middle, 0)

@@ -87,8 +87,6 @@ class Interpolator:
     END_FORMAT : Format
         Format of the normals at a span's ends: ``SQ(1, 17)`` for unit normals; another format for ends of the
         true line, which have lengths, relative to the larger one.
-    TAKES_MIDDLE : bool
-        Whether spans carry the true normal in their middle besides those at their ends.
     CHECKED_AT : tuple of float
         Places t in a span at which the method's curve is compared with exact normals, to decide whether the
         span is cut.
@@ -102,7 +100,6 @@ class Interpolator:
     TAKES_VALUES: ClassVar[bool] = False
     TAKES_VECTORS: ClassVar[bool] = False
     END_FORMAT: ClassVar[Format] = COMPONENT
-    TAKES_MIDDLE: ClassVar[bool] = False
     CUT_BY_ERROR: ClassVar[bool] = True
     CHECKED_AT: ClassVar[tuple[float, ...]] = (0.25, 0.5, 0.75)
 

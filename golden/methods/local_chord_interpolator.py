@@ -1,19 +1,49 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
 
+import numpy as np
+
+from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
+from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.interpolator import Interpolator, Operands
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
+from blysk.golden.number.fixed import SQ, Fixed
+from blysk.golden.number.spans import pixels_of
+from blysk.golden.number.unit_vector import ONE_SQUARED
 
 __all__ = ["METHODS", "LocalChordInterpolator"]
 
 
 @dataclass(frozen=True)
-class LocalChordInterpolator(ChordInterpolator):
+class LocalChordInterpolator(Interpolator):
     """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, with L and H of the pixel.
 
-    A span carries three values of N·L and three of u, computed where positions are known; everything else is
-    as in `ChordInterpolator`.
+    A span brings three values of N·L and three of u: at the first pixel centre, in the middle and at the last
+    pixel centre, computed where positions are known. `ChordSetup` computes the quadratics through them, with
+    a bound of the drift, and accumulators of 49 bits the pixels. The specular unit takes u as its ``1 - cos
+    gamma``. In a span of one or two pixels each pixel has its own values, and needs no setup.
+
+    The quadratic is good for short spans only. Spans should be cut until
+
+    - the normals at their ends are at most 30 degrees apart;
+    - N, V and each light's L change by at most `MAX_VECTOR_ANGLE` degrees from end to end, and ``|dV| +
+      |dL|`` is at most `MAX_HALFWAY_CHANGE` of ``|L + V|``: where L is nearly -V, H changes fast;
+    - the errors of the quadratics at t = 1/4 and 3/4, times `MARGIN` for the positions between, are within
+      `highlight_tolerance` and `diffuse_tolerance` minus the bounds of the arithmetic. In place of `MARGIN`
+      stands the ratio of the normals' lengths at the two ends, if it is larger. These factors were found by
+      search: with equal lengths the largest error at any t was 1.31 times that at 1/4 and 3/4, and with
+      lengths in the ratio g up to ``1.03 max(4/3, g)`` times.
+
+    The budget of fit and arithmetic together is 0.4 LSB against exactly normalised interpolation in the
+    specular term and 0.12 in the diffuse one, at full reflection. It is checked at these places, and not
+    proved for every pixel; see `blysk.golden.frames.compare.error_bound` for what a frame keeps.
+
+    Where N·L changes its sign the highlight ends, however bright it is. A pixel whose N·L is as near to 0 as
+    the error may have the highlight or not; a span with such pixels where `is_lit` should be cut further.
 
     A light that fades, by its distance or as a spot, has a factor a. Its values of N·L are multiplied by a
     before, ``a N·L``; its specular term is multiplied by a at each pixel (`Factor`), where a is a third
@@ -23,31 +53,203 @@ class LocalChordInterpolator(ChordInterpolator):
     are together within `HIGHLIGHT_BUDGET`. A light that fades may be brighter than white: all errors are
     multiplied by the largest channel of its colour, if that is over 1.
 
+    ========== ========== ========================================
+    word       format     why
+    ========== ========== ========================================
+    sums       SQ(3, 46)  hold u up to 2
+    N·L        SQ(2, 25)  cut
+    u          UQ(1, 25)  cut, saturates
+    ========== ========== ========================================
+
     Parameters
     ----------
     fraction_bits : int
-        As for `ChordInterpolator`.
+        Fraction bits of the setup's words.
+    scale : int
+        s: the words of u are ``min(2^s u, 1)``, for a lobe that is 0 from ``2^-s`` on: a small u keeps s bits
+        more, at the cost of wires alone; see `Lobe.scale_of`.
 
-    Source: docs/theory/chord.md#local-lights.
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+
+    Source: docs/theory/chord.md#local-lights, docs/theory/chord.md#differences.
     """
 
+    fraction_bits: int = 46
+    scale: int = 0
+
+    operand: ClassVar = "one_minus_cosine"
+    COSINE_FORMAT = SQ(2, 25)
+    CURVE = "quadratic"
     TAKES_VALUES = True
-    TAKES_MIDDLE = False
+    HIGHLIGHT_BUDGET: ClassVar[float] = 0.4
+    DIFFUSE_BUDGET: ClassVar[float] = 0.12
+    FACTOR_BUDGET: ClassVar[float] = 0.25
+    MAX_VECTOR_ANGLE: ClassVar[float] = 30.0
+    MAX_HALFWAY_CHANGE: ClassVar[float] = 0.5
+    MARGIN: ClassVar[float] = 4 / 3
+
+    def __post_init__(self):
+        _ = self.setup
+        ChordSetup.check_scale(self.scale)
 
     @property
     def name(self):
         """Name on the command line and in tables."""
         return "chord-local"
 
-    def compute(self, normal_left, normal_right, length, direction, halfway, normal_middle=None):
-        """Raise `ValueError`: the normals of a span do not give its position."""
-        raise ValueError("the local chord method takes values of its spans, not normals; see compute_values")
+    @cached_property
+    def setup(self) -> ChordSetup:
+        """Model of the setup."""
+        return ChordSetup(self.fraction_bits)
+
+    @property
+    def accumulators(self) -> dict[str, DifferenceAccumulator]:
+        """Models of the accumulators: ``diffuse`` for N·L, ``highlight`` for u, ``factor`` for a."""
+        format, difference = SQ(3, self.fraction_bits), self.setup.format
+        starts = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIGHT_FORMAT}
+        starts["factor"] = ChordSetup.DIFFUSE_FORMAT
+        results = {"diffuse": self.COSINE_FORMAT, "highlight": Specular.ARGUMENT_FORMAT}
+        results["factor"] = Factor.FORMAT
+        return {
+            name: DifferenceAccumulator(start, format, difference, results[name])
+            for name, start in starts.items()
+        }
+
+    def widest_span(self, exponent):
+        """Largest angle of a span, in degrees, whatever the light."""
+        return 30.0
 
     def operand_error(self, length, degrees):
         """Error of the setup, for slopes up to 1/2 and squares up to 1/8, plus the cut of the results."""
         errors = (f(0.5, 0.125) for f in (self.setup.highlight_error, self.setup.diffuse_error))
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
 
+    def compute(self, normal_left, normal_right, length, direction, halfway):
+        """Raise `ValueError`: the normals of a span do not give its position."""
+        raise ValueError("the local chord method takes values of its spans, not normals; see compute_values")
 
-METHODS = {LocalChordInterpolator(): "the same for point lights and a near viewer"}
+    def compute_values(
+        self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None
+    ) -> Operands:
+        """Bit-accurate operands of every pixel, in the order of the spans.
+
+        Parameters
+        ----------
+        values : SpanValues
+            Values of each span and light; those in the middle have an effect from 3 pixels on, those at the
+            end from 2.
+        length : int array, shape (spans,)
+            Pixels, 1 to 4095.
+        factors : int64 array, shape (spans, fading lights, 3), optional
+            Codes of the factors of lights that fade, in the format of N·L.
+
+        Raises
+        ------
+        ValueError
+            If a code or a length is out of range.
+        """
+        length = np.asarray(length)
+        given = tuple(values) if factors is None else (*values, factors)
+        *quadratics, out_of_range = self.setup.compute(
+            Fixed(ChordSetup.DIFFUSE_FORMAT, values.diffuse),
+            Fixed(ChordSetup.HIGHLIGHT_FORMAT, values.highlight),
+            length,
+            None if factors is None else Fixed(ChordSetup.DIFFUSE_FORMAT, factors),
+        )
+        # Each pixel of a span of one or two pixels is treated as a span of its own.
+        short = length < 3
+        pieces, place = pixels_of(np.where(short, length, 1))
+        pieces_short = short[pieces]
+        pixels = pixels_of(np.where(pieces_short, 1, length[pieces]))
+        results = []
+        for quadratic, codes, model in zip(quadratics, given, self.accumulators.values(), strict=False):
+            start = np.where(place[:, np.newaxis], codes[pieces, :, 2], codes[pieces, :, 0])
+            first, second = (
+                Fixed(word.format, np.where(pieces_short[:, np.newaxis], 0, word.codes[pieces]))
+                for word in (quadratic.first, quadratic.second)
+            )
+            results.append(model.compute(Fixed(model.start_format, start), first, second, *pixels))
+        return Operands(*results[:2], out_of_range & ~short, *results[2:])
+
+    def exact_operands(
+        self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None
+    ) -> tuple[np.ndarray, ...]:
+        """Values at every pixel of the quadratics through the values of spans, in float64, in units of 1.
+
+        Parameters
+        ----------
+        values : SpanValues
+            Values of each span and light.
+        length : int array, shape (spans,)
+            Pixels.
+        factors : int64 array, shape (spans, fading lights, 3), optional
+            As for `compute_values`.
+
+        Returns
+        -------
+        cosine, one_minus_cosine : float64 arrays, shape (pixels, lights)
+            1 - N·H without the scale; because of the scale it is good up to ``2^-s`` only.
+        factor : float64 array, shape (pixels, fading lights)
+            Only if ``factors`` are given.
+        """
+        span, step = pixels_of(length)
+        t = (step / np.maximum(length - 1, 1)[span])[:, np.newaxis]
+        formats = [ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT, ChordSetup.DIFFUSE_FORMAT]
+        results = []
+        for codes, format in zip((*values, factors), formats, strict=True):
+            if codes is None:
+                continue
+            left, middle, right = np.moveaxis(codes * (format.step / float(ONE_SQUARED.values)), 2, 0)
+            square = 2 * (left + right - 2 * middle)
+            slope = right - left - square
+            results.append(left[span] + t * (slope[span] + t * square[span]))
+        results[1] = np.ldexp(results[1], -self.scale)
+        return tuple(results)
+
+    def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Largest error of u that keeps `HIGHLIGHT_BUDGET`, where no smaller u occurs.
+
+        The slope of a term over u is about n at the peak, and smaller farther off: ``n (1 - n u/2)`` for the
+        cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With ``x = (n - 1) u`` neither is more
+        than ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other models are at most 1.25 times
+        this bound, and 1.6 times for n = 1.
+
+        Parameters
+        ----------
+        exponent : int array
+            n, 1 to 1000.
+        u : array
+            Least value of u, at least 0.
+        """
+        x = (np.asarray(exponent) - 1) * u / 2
+        return self.HIGHLIGHT_BUDGET / (255 * np.asarray(exponent)) * (1 + x * (1 + x * (1 + x)))
+
+    @staticmethod
+    def is_lit(exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
+
+        Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``, which is under a quarter of an LSB from
+        ``x = 7`` on; the other models reach 0 earlier, or decrease as fast.
+
+        Parameters
+        ----------
+        exponent : int array
+            n, 1 to 1000.
+        u : array
+            Least value of u, at least 0.
+        """
+        return (np.asarray(exponent) - 1) * u < 7
+
+    @property
+    def diffuse_tolerance(self) -> float:
+        """Largest error of N·L that keeps `DIFFUSE_BUDGET`."""
+        return self.DIFFUSE_BUDGET / 255
+
+
+METHODS = {
+    LocalChordInterpolator(): "no normals: 1 - N.H is nearly a quadratic; for point lights, a near viewer"
+}
 """The method of this module, and a line about it."""

@@ -18,7 +18,6 @@ __all__ = [
     "ONE",
     "ONE_SQUARED",
     "quantise",
-    "quantise_direction",
     "values",
 ]
 
@@ -76,33 +75,6 @@ def quantise(vectors: np.ndarray) -> np.ndarray:
         np.minimum(smallest, miss, out=smallest)
     upper = (best[..., np.newaxis] >> np.arange(3, dtype=np.uint8) & 1).astype(bool)
     return np.clip(np.where(upper, high, low), -ONE, ONE)
-
-
-def quantise_direction(vectors: np.ndarray) -> np.ndarray:
-    """Codes of unit vectors with a more exact direction, and a less exact length, than those of `quantise`.
-
-    Of the 27 codes around the nearest one with a length error within `CODE_LENGTH_ERROR`, the one with the
-    least error of direction is taken. It is for squared chords with sharp lobes: an error of length changes
-    them at second order only. Parameters, result and errors are those of `quantise`.
-    """
-    best = quantise(vectors)
-    scaled = np.asarray(vectors, dtype=np.float64) * ONE
-
-    def miss(codes):
-        off = codes - scaled
-        along = np.einsum("...i,...i->...", off, scaled) / ONE
-        across = np.einsum("...i,...i->...", off, off) - along**2
-        return np.where(np.abs(along) <= CODE_LENGTH_ERROR / COMPONENT.step, across, np.inf)
-
-    smallest = miss(best)
-    near = np.rint(scaled).astype(np.int64)
-    for move in np.stack(np.mgrid[-1:2, -1:2, -1:2], axis=-1).reshape(-1, 3):
-        candidate = np.clip(near + move, -ONE, ONE)
-        found = miss(candidate)
-        better = found < smallest
-        best[better] = candidate[better]
-        smallest = np.minimum(smallest, found)
-    return best
 
 
 def values(codes: np.ndarray) -> np.ndarray:

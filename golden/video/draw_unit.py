@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.triangle_frame import span_angle, triangle_constants
+from blysk.golden.frames.triangle_frame import SPAN_ANGLE, triangle_constants
 from blysk.golden.frames.vector_axes import triangle_axes
 from blysk.golden.geometry.triangles import Frame, Triangles
 from blysk.golden.pipeline import Design
@@ -174,7 +174,7 @@ class Drawing:
         if renderer.rows:
             axes = axes * _SHORTER
         presets = tuple(tuple(triangle_constants(each, renderer)) for each in scenes)
-        widest = [span_angle(each, design) if angle is None else angle for each in scenes]
+        widest = Frame.limit_of(SPAN_ANGLE if angle is None else angle)
         return cls(
             mesh=mesh,
             motion=Motion.of(mesh, scene.camera, size, axis, transform, axes),
@@ -182,10 +182,7 @@ class Drawing:
             presets=presets,
             renderer=renderer,
             size=size,
-            frames=tuple(
-                Frame.centred(*size, back_faces=scene.back_faces, limit=Frame.limit_of(each))
-                for each in widest
-            ),
+            frames=tuple(Frame.centred(*size, back_faces=scene.back_faces, limit=widest) for _ in scenes),
             controls=controls or Controls(materials=len(scenes)),
             lines=lines,
             transform=transform,

@@ -166,7 +166,6 @@ _TEXTS = {
     "pixels": "pixels shaded",
     "hidden": "of them those behind others",
     "out_of_range_spans": "spans beyond what the method serves",
-    "wide_spans": "spans wider than the error bound of the exponent allows",
     "empty_spans": "spans of length 0",
     "overrun": "whether a span went past the largest column",
     "frames": "frames that have ended",

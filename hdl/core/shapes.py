@@ -15,18 +15,9 @@ def normal_shape() -> data.ArrayLayout:
     return data.ArrayLayout(FixedShape(COMPONENT), 3)
 
 
-def span_normals_shape(length_bits: int = LENGTH_BITS, *, middle: bool = False) -> data.StructLayout:
-    """Shape of a span: the normals at its ends, perhaps that in its middle, and its length in pixels.
-
-    Parameters
-    ----------
-    length_bits : int
-        Bits of the length.
-    middle : bool
-        Whether there is ``normal_middle``.
-    """
-    places = ("left", "middle", "right") if middle else ("left", "right")
-    normals = {f"normal_{place}": normal_shape() for place in places}
+def span_normals_shape(length_bits: int = LENGTH_BITS) -> data.StructLayout:
+    """Shape of a span: the normals at its ends, and its length in pixels, of ``length_bits``."""
+    normals = {f"normal_{place}": normal_shape() for place in ("left", "right")}
     return data.StructLayout(normals | {"length": unsigned(length_bits)})
 
 

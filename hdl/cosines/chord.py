@@ -14,21 +14,13 @@ from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.word import Word
 
-__all__ = ["ChordUnit", "chord", "chord_exact"]
+__all__ = ["ChordUnit", "chord"]
 
 
 def chord(
     graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View], symbol: str | None = None
 ) -> Word:
-    """Word of ``|a - b|^2 / 2`` in ``UQ(2, 35)``; the parameters are those of `chord_exact`."""
-    square = chord_exact(graph, name, a, b, symbol)
-    return graph.register(name, lambda square: square.saturate(Chord.FORMAT), square)
-
-
-def chord_exact(
-    graph: Dataflow, name: str, a: Word, b: Word | Callable[[], data.View], symbol: str | None = None
-) -> Word:
-    """Word of ``|a - b|^2 / 2`` in ``SQ(5, 35)``, not saturated: three multiplications of the graph.
+    """Word of ``|a - b|^2 / 2`` in ``UQ(2, 35)``: three multiplications of the graph.
 
     Parameters
     ----------
@@ -70,7 +62,8 @@ def chord_exact(
     operand = graph.wire(f"{name}_operand", halved, difference, formula="Δ")
     square = dot(graph, f"{name}_square", operand, lambda v: v)
     square = graph.register(f"{name}_aligned", aligned, square, far, formula=f"|{formula}|²")
-    return graph.wire(f"{name}_half", lambda square: square.scale(-1), square)
+    half = graph.wire(f"{name}_half", lambda square: square.scale(-1), square)
+    return graph.register(name, lambda square: square.saturate(Chord.FORMAT), half)
 
 
 class ChordUnit(PipelinedUnit):

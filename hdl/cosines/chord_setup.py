@@ -15,10 +15,27 @@ from blysk.hdl.core.word import Word
 __all__ = [
     "ChordSetupUnit",
     "chord_differences_shape",
+    "light_values_shape",
     "span_factors_shape",
     "span_operands_shape",
     "span_values_shape",
 ]
+
+
+def light_values_shape(lights: int, *, highlights: bool = True) -> data.ArrayLayout:
+    """Shape of N·L and u of each light at one place.
+
+    Parameters
+    ----------
+    lights : int
+        Number of lights.
+    highlights : bool
+        Whether there is u.
+    """
+    light = {"diffuse": FixedShape(ChordSetup.DIFFUSE_FORMAT)}
+    if highlights:
+        light["highlight"] = FixedShape(ChordSetup.HIGHLIGHT_FORMAT)
+    return data.ArrayLayout(data.StructLayout(light), lights)
 
 
 def span_values_shape(lights: int, highlights: bool = True) -> data.ArrayLayout:

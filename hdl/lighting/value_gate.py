@@ -1,4 +1,4 @@
-"""Value gate unit: which spans of the chord methods can hold a visible highlight, from three values of u."""
+"""Value gate unit: which spans of ``chord-local`` can hold a visible highlight, from three u."""
 
 from amaranth.hdl import Cat, Const, Mux, Signal, unsigned
 from amaranth.lib import data

@@ -1,4 +1,4 @@
-"""Spans of the chord methods: differences of three values a span, and accumulators of a pixel's values."""
+"""Spans of ``chord-local``: differences of three values a span, and accumulators of a pixel's values."""
 
 from collections.abc import Sequence
 
@@ -7,13 +7,17 @@ from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect
-from blysk.hdl.cosines.chord_setup import ChordSetupUnit, chord_differences_shape, span_operands_shape
-from blysk.hdl.cosines.chord_values import light_values_shape
+from blysk.hdl.cosines.chord_setup import (
+    ChordSetupUnit,
+    chord_differences_shape,
+    light_values_shape,
+    span_operands_shape,
+)
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import operands_shape
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
@@ -31,7 +35,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     Parameters
     ----------
-    parameters : ChordInterpolator
+    parameters : LocalChordInterpolator
         Formats.
     lights : int
         Number of lights, at least 1.
@@ -59,14 +63,14 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     def __init__(
         self,
-        parameters: ChordInterpolator | None = None,
+        parameters: LocalChordInterpolator | None = None,
         lights: int = 1,
         *,
         highlights: bool = True,
         gated: bool = False,
         factors: Sequence[int] = (),
     ):
-        self.parameters = p = parameters or ChordInterpolator()
+        self.parameters = p = parameters or LocalChordInterpolator()
         self.gated, self.factors = gated, tuple(factors)
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
         differences = chord_differences_shape(lights, highlights, p.setup, len(self.factors))
@@ -147,7 +151,7 @@ class ChordSpansUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : ChordInterpolator
+    parameters : LocalChordInterpolator
         Bit-accurate model.
     lights : int
         Number of lights, at least 1.
@@ -180,7 +184,7 @@ class ChordSpansUnit(wiring.Component):
 
     def __init__(
         self,
-        parameters: ChordInterpolator,
+        parameters: LocalChordInterpolator,
         lights: int,
         *,
         initiation_interval: int = 3,

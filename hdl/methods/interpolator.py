@@ -85,7 +85,7 @@ class InterpolatorUnit(wiring.Component):
     product_interval : int
         Least cycles from a pixel to the next in the products with L and H, for methods that find normals.
     gate : ValueGateUnit or None
-        Decides which spans have no highlight, for the chord methods; operands then have ``gated``.
+        Decides which spans have no highlight, for ``chord-local``; operands then have ``gated``.
     takes_threshold : bool
         Whether a threshold tells where highlights end, in place of the exponent; see `Design.threshold_of`.
     factors : sequence of int

@@ -234,13 +234,6 @@ def header_of(unit: ShadingUnit) -> list[str]:
         )
     elif made.lights:
         lines.append("i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)")
-    if made.span_limit:
-        angles = ", ".join(f"{n}: {made.span_limit.angle(n):.1f}" for n in (1, 10, 50, 100, 200, 500, 1000))
-        lines += [
-            f"safe angle of a lit span of 4 pixels or more, degrees by exponent: {angles}; unlit: "
-            f"{made.span_limit.WIDEST:g}; wider ones are counted in status_wide_spans; N/W is taken to be of "
-            "equal length at both ends",
-        ]
     lines += [
         f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
         "before the first span: rst high for a cycle, then write every frame constant in any order",
@@ -337,7 +330,7 @@ def _coarse_lines(unit: RenderUnit) -> list[str]:
 def _geometry_lines(geometry: GeometryUnit) -> list[str]:
     """Description of the input of a core from triangles to spans."""
     grid = geometry.grid
-    spans = "their true lines, uncut" if geometry.lines else "three unit normals, wide ones cut"
+    spans = "their true lines, uncut" if geometry.lines else "two unit normals, wide ones cut"
     normal, limit = "vertex normal", "is not read" if geometry.lines else _LIMIT
     if geometry.vectors:
         spans, limit = "N/W and its step, cut where N/W grows short", "is not read"

@@ -20,7 +20,6 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 __all__ = ["ObservedPipeline", "Probe", "probes_of"]
 
 _GATED_BITS = 32
-_CHORD_SPANS = "interpolator.chord_spans"
 
 
 @dataclass(frozen=True)
@@ -204,7 +203,7 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
         return Probe(name, title, block, value.shape(), age, exact, scale), value
 
     one, one_squared = COMPONENT.max_code * COMPONENT.step, float(ONE_SQUARED.values)
-    yield from _accumulators(fragment, design, number, one, one_squared)
+    yield from _accumulators(fragment, number, one)
 
     interpolator, light = _unit(fragment, "interpolator"), _unit(fragment, "light_0")
     operands = interpolator.o.payload[0]
@@ -261,16 +260,8 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
         yield Probe(name, title, "output", Shape.cast(value.shape()), age, ""), value
 
 
-def _accumulators(fragment, design: Design, number, one: float, one_squared: float):
-    """Probes for the sums of methods with accumulators, and for their increments."""
-    words = _registers(_part(fragment, f"{_CHORD_SPANS}.chord_accumulator"))
-    if words:
-        for name, title, exact in (
-            ("diffuse", "sum for N·L", "cosine"),
-            ("highlight", "sum for 1 − N·H", "one_minus_cosine"),
-        ):
-            formats = design.interpolator.accumulators[name]
-            yield from _sums(number, words, f"{name}_0", title, exact, formats, -1, one_squared)
+def _accumulators(fragment, number, one: float):
+    """Probes for the sums of methods with an accumulator of normals, and for their increments."""
     words = _registers(_part(fragment, "interpolator.difference_accumulator"))
     if words:
         age = -1 - _unit(fragment, "interpolator").product_latency

@@ -61,10 +61,8 @@ def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dic
     members = unit.i.payload.shape().members
     vectors = {} if spans.vectors is None else spans.vectors._asdict()
     given = {name: vectors[name] for name in members if name in vectors}
-    others = [name for name in members if name not in ("values", "normal_middle") and name not in given]
+    others = [name for name in members if name != "values" and name not in given]
     beats = {name: getattr(spans, name) for name in others} | given
-    if "normal_middle" in members:
-        beats["normal_middle"] = spans.middle
     if "values" in members:
         beats["values"] = values = np.zeros(len(spans), dtype_of(members["values"]))
         for name in members["values"].elem_shape.members:
@@ -187,7 +185,6 @@ class FrameSimulator:
             image=frame_buffer(scene, raster, _colors(beats)),
             prepared=prepared,
             out_of_range_spans=int(run.status["out_of_range_spans"]),
-            wide_spans=int(run.status["wide_spans"]),
             seconds={"raster": rastered - start, "simulate": perf_counter() - rastered},
             cycles=run.total_cycles,
             engine=run.engine,

@@ -83,7 +83,7 @@ def specialise(
     is one exponent; two of three channels, if all colours are grey; and the upper bits of coordinates and
     lengths. The words of the arithmetic keep their widths, so that every pixel stays the same. Vectors of
     spans depend on all lights and on the highlights: a method that takes them keeps both. If not
-    ``exact`` and all spans are short, the differences of the chord method also get fewer bits: the error
+    ``exact`` and all spans are short, the differences of ``chord-local`` also get fewer bits: the error
     bound stays, pixels may change.
 
     Parameters
@@ -115,7 +115,7 @@ def specialise(
     reductions += _with_fixed_values(design, constants, reductions)
     longest = max(int(frame.spans.length.max(initial=0)) for frame in prepared)
     reductions += _with_fewer_bits(full, scenes[0], longest)
-    if not exact and design.method == "chord" and design.lights:
+    if not exact and design.takes_values and design.lights:
         reductions += _with_shorter_words(prepared, longest)
     return Specialisation(full, tuple(reductions), scenes)
 
@@ -231,7 +231,7 @@ def _with_fewer_bits(full: Design, scene: Scene, longest: int) -> list[Reduction
 
 
 def _with_shorter_words(prepared: Sequence[PreparedFrame], longest: int) -> list[Reduction]:
-    """Reduction of the chord method's differences to the fraction bits that the longest span needs."""
+    """Reduction of the differences of ``chord-local`` to the fraction bits that the longest span needs."""
     found = []
     bits = min(bits for bits in range(36, 47, 2) if longest <= ChordSetup(fraction_bits=bits).longest)
     if bits < 46:

@@ -27,7 +27,6 @@ _COUNTS = {
     "missed_spans": "spans that this method misses by over 0.25 LSB",
     "missed_pieces": "spans that this method misses by over 0.25 LSB, as lengths of their normals differ",
     "short_normals": "spans with normals too short for the words, as W differs much, perhaps 0.25 LSB off",
-    "wide_spans": "spans wider than the error bound of the exponent allows",
     "out_of_range_spans": "spans out of range in the pipeline",
     "sharp_lobes": "lobes too sharp for this method's table, perhaps over 0.25 LSB off",
 }
@@ -38,7 +37,6 @@ _REMEDIES = {
     "missed_spans": "use quotient or renormalise",
     "missed_pieces": "use geometry software, or smaller triangles",
     "short_normals": "use geometry software, or divide the triangles",
-    "wide_spans": "use smaller triangles",
     "out_of_range_spans": "pixels of theirs are wrong: use another method, or divide the triangles",
     "sharp_lobes": "use method chord-local",
 }
@@ -46,7 +44,7 @@ _REMEDIES = {
 
 _WARNINGS = (
     *("opposed_faces", "repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals"),
-    *("wide_spans", "out_of_range_spans", "far_triangles", "sharp_lobes"),
+    *("out_of_range_spans", "far_triangles", "sharp_lobes"),
 )
 """Counts that may come from a fault of the mesh or the design."""
 

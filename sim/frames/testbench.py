@@ -106,7 +106,6 @@ def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[s
             "status",
             {
                 "out_of_range_spans": [pixels.out_of_range_spans],
-                "wide_spans": [pixels.wide_spans],
                 "empty_spans": [1],
                 "overrun": [0],
             },

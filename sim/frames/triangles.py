@@ -154,7 +154,7 @@ class TriangleSimulator:
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     angle : float, optional
-        Widest piece of a span in degrees; by default `span_angle`.
+        Widest piece of a span in degrees; by default `SPAN_ANGLE`.
     setups : int
         As `GeometryUnit` has it.
 

@@ -252,7 +252,7 @@ def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.nda
 
     Some start within a few last bits of it, as the sign of N.L, of 34 bits or rounded to 25, decides whether
     there is a highlight. Some cross it as slowly as they can. Along some N.L rises by a whole number of steps
-    of 18 bits and half a step, where the chord method rounds.
+    of 18 bits and half a step.
     """
     light = normalise(code)
 

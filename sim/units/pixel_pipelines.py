@@ -37,7 +37,6 @@ def _status(unit, case):
     length, pixels = case.beats["length"], _pixels(unit, case)
     return {
         "out_of_range_spans": min(pixels.out_of_range_spans, _MOST),
-        "wide_spans": min(pixels.wide_spans, _MOST),
         "empty_spans": min(int(np.count_nonzero(length == 0)), _MOST),
         "overrun": int(np.any(case.beats["x"] + length > 1 << unit.parameters.design.x_bits)),
     }
@@ -98,7 +97,7 @@ def _variants():
     for name, pipes, waiting, design in (
         (_DEFAULT, 2, 5, preset(model="cosquad", lights=0, materials=2, **few)),
         ("4 pipelines, linear", 4, 9, preset("linear", "cosquad", y_bits=4)),
-        ("4 pipelines, chord, 3 materials", 4, 33, preset("chord", "cosquad", materials=3)),
+        ("4 pipelines, quotient, 3 materials", 4, 33, preset(materials=3)),
         ("8 pipelines, quadratic, compact", 8, 17, preset("quadratic", "cosquad", style="compact")),
     ):
         unit = partial(MergedPipelinesUnit, PixelPipelines(design, pipes), waiting)
@@ -123,9 +122,7 @@ RECORD = Record(
         "pixel_assembler.$signal$*": "A pipeline has scanlines of one remainder: the bit is 0 already.",
     },
     still={
-        "without an interpolator no span is out of range, or wide": (
-            "pipelines.sum_out_of_range_spans[0-15] pipelines.sum_wide_spans[0-15]"
-        ),
+        "without an interpolator no span is out of range": "pipelines.sum_out_of_range_spans[0-15]",
         "a counter stops at its largest value, and a flag that is set stays": (
             "sum_empty_spans[15] sum_overrun[0]"
         ),

@@ -2,8 +2,8 @@
 
 Components without a record: the frame constants, the
 pixel assembler and the pixel merger, whose ports are not a stream ``i`` to a stream ``o``, and the
-accumulator of the chord method. The records of the pipelines and of the chord interpolators, of which they
-are parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own. So have
+accumulator of ``chord-local``. The records of the pipelines and of this interpolator, of which they are
+parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own. So have
 units with other ports: band depths, controls, the draw unit, and the units of the display that have two
 clocks or never wait.
 """

@@ -52,7 +52,7 @@ def _made(unit, case):
 
 def _status(unit, case):
     made = _made(unit, case)
-    return made.counts | {"out_of_range_spans": made.out_of_range_spans, "wide_spans": made.wide_spans}
+    return made.counts | {"out_of_range_spans": made.out_of_range_spans}
 
 
 def _triangles(unit, rng, count, size=6.0, spread=0.2):
@@ -81,23 +81,23 @@ def _wide(unit, rng, count):
 
 def _variants():
     for name, options in (
-        ("chord", {}),
-        ("chord, compact", {"style": "compact"}),
+        ("quotient", {}),
+        ("quotient, compact", {"style": "compact"}),
         ("renormalise, 2 lights, 3 materials", {"method": "renormalise", "lights": 2, "materials": 3}),
-        ("linear, coarse", {"method": "linear"}),
-        ("quotient", {"method": "quotient", "model": "blinn"}),
-        ("quotient, phong, coarse", {"method": "quotient", "model": "phong"}),
-        ("quotient, phong, compact", {"method": "quotient", "model": "phong", "style": "compact"}),
-        ("quotient, 2 lights", {"method": "quotient", "model": "blinn", "lights": 2}),
+        ("linear, coarse", {"method": "linear", "model": "cosquad"}),
+        ("linear, compact", {"method": "linear", "model": "cosquad", "style": "compact"}),
+        ("quotient, phong, coarse", {"model": "phong"}),
+        ("quotient, phong, compact", {"model": "phong", "style": "compact"}),
+        ("quotient, 2 lights", {"lights": 2}),
         (
             "quotient, phong, 3 lights, compact, coarse",
-            {"method": "quotient", "model": "phong", "style": "compact", "lights": 3, "materials": 2},
+            {"model": "phong", "style": "compact", "lights": 3, "materials": 2},
         ),
-        ("quotient, 4 lights, no highlights", {"method": "quotient", "model": None, "lights": 4}),
+        ("quotient, 4 lights, no highlights", {"model": None, "lights": 4}),
     ):
-        design = preset(**{"method": "chord", "model": "cosquad", "x_bits": 5, "y_bits": 5} | options)
+        design = preset(**{"x_bits": 5, "y_bits": 5} | options)
         renderer = Renderer(design, coarse=CoarseDepth(*_SIZE) if "coarse" in name else None)
-        yield name, Variant(partial(RenderUnit, renderer, _SIZE), long=name != "chord")
+        yield name, Variant(partial(RenderUnit, renderer, _SIZE), long=name != "quotient")
 
 
 RECORD = Record(
@@ -114,8 +114,8 @@ RECORD = Record(
     },
     axis="",
     still={
-        "a counter counts more than a run has": "count_spans[10-31]",
-        "depths have room whenever the pipeline takes a span": "depths_room[0]",
+        "a counter counts more than a run has": "count_spans[9-31]",
+        "depths have room whenever the pipeline takes a span": "depths_room[0] depths_level[5]",
         "a line of the picture has fewer than 64 pixels": "spans.storage.r_port__data[16-21]",
     },
     remembers=True,

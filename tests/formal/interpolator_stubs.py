@@ -5,7 +5,6 @@ from amaranth.hdl import Cat, Const, Fragment, Signal, Value
 import blysk.hdl.cosines.highlight_cosine
 import blysk.hdl.methods.angular_interpolator
 import blysk.hdl.methods.bisection_interpolator
-import blysk.hdl.methods.chord_interpolator
 import blysk.hdl.methods.chord_spans
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
@@ -132,16 +131,8 @@ def line_setup(span, gives):
     yield gives.length.eq(span.length)
 
 
-def chord_values(normal, gives):
-    yield put(gives[0].diffuse, word(normal[0]))
-
-
 def chord_setup(span, gives):
     yield put(light_difference(gives), first_word(value(span)))
-
-
-def nothing(operands, gives):
-    yield from ()
 
 
 def value_gate(values, gives):
@@ -271,9 +262,6 @@ def replace_parts(monkeypatch) -> None:
         (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
         (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
         (blysk.hdl.methods.chord_spans, "ChordSetupUnit", chord_setup, 3),
-        # A tag takes three cycles beside it.
-        (blysk.hdl.methods.chord_interpolator, "ChordValuesUnit", chord_values, 3),
-        (blysk.hdl.methods.chord_interpolator, "SpanLimitUnit", nothing, 2),
         (blysk.hdl.methods.angular_interpolator, "AngularSetupUnit", angular_setup, 3),
         (blysk.hdl.methods.recurrence_interpolator, "RecurrenceSetupUnit", recurrence_setup, 3),
         (blysk.hdl.methods.quotient_interpolator, "QuotientUnit", quotients, 3),

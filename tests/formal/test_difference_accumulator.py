@@ -100,7 +100,7 @@ def of_sums(unit):
         start, first, second = (Value.cast(operand) for operand in operands)
         shift = p.format.fraction_bits - p.start_format.fraction_bits
         cut = p.format.fraction_bits - p.result_format.fraction_bits
-        # The chord method adds the half of a step, where it would take a sum to begin with, to the result.
+        # ``chord-local`` adds the half of a step, where it would take a sum to begin with, to the result.
         half = 1 << (cut - 1)
         late = half if "words" in unit.signature.members and shift < cut else 0
         with m.If(load):
@@ -129,7 +129,7 @@ def of_sums(unit):
 
 SUMS = {
     "normal": DifferenceAccumulatorUnit,
-    "chord": lambda: ChordAccumulatorUnit(),
+    "chord-local": lambda: ChordAccumulatorUnit(),
 }
 
 
@@ -138,7 +138,7 @@ def test_sums_are_exact(prove, name):
     """Inductive, all formats and lengths as built: the values that leave are the exact sums, cut and clamped.
 
     So no sum wraps as long as the exact values of a span's pixels fit its format. Differences of a normal may
-    be any: these may wrap, and do no harm. Those of the chord method, two bits shorter than the sums, must
+    be any: these may wrap, and do no harm. Those of ``chord-local``, two bits shorter than the sums, must
     fit theirs.
     """
     prove(of_sums(SUMS[name]()))

@@ -20,7 +20,6 @@ from amaranth.lib import stream
 import blysk.hdl.cosines.highlight_cosine
 import blysk.hdl.methods.angular_interpolator
 import blysk.hdl.methods.bisection_interpolator
-import blysk.hdl.methods.chord_interpolator
 import blysk.hdl.methods.interpolator
 import blysk.hdl.methods.linear_interpolator
 import blysk.hdl.methods.quadratic_interpolator
@@ -28,8 +27,8 @@ import blysk.hdl.methods.recurrence_interpolator
 import blysk.hdl.normals.difference_accumulator
 from blysk.golden.methods.angular_interpolator import AngularInterpolator
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
@@ -37,10 +36,10 @@ from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolato
 from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
 from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
 from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
-from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
 from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.methods.linear_interpolator import LinearInterpolatorUnit
+from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.hdl.methods.quadratic_interpolator import QuadraticInterpolatorUnit
 from blysk.hdl.methods.quotient_interpolator import QuotientInterpolatorUnit
 from blysk.hdl.methods.recurrence_interpolator import RecurrenceInterpolatorUnit
@@ -49,6 +48,7 @@ from blysk.hdl.methods.renormalise_interpolator import RenormaliseInterpolatorUn
 from .interpolator_stubs import (
     INTERVAL,
     LENGTH_BITS,
+    WORD_BITS,
     constant_coefficient,
     cosine,
     first_value,
@@ -189,25 +189,6 @@ def words_meet(harness: Harness, unit: ChordSpansUnit) -> None:
     harness.claim(~(accumulator.taken & unit._takes_long) | same)
 
 
-def gathered(came, place, leaves):
-    """Of one normal, a span of one pixel, of two one each; of three normals their values."""
-    pixel = Mux(place == 0, tag(came.normal_left[0]), tag(came.normal_right[0]))
-    places = zip((came.normal_left, came.normal_middle, came.normal_right), range(3), strict=True)
-    three = Cat(tag(n[0]) == tag(value(leaves, k)) for n, k in places).all()
-    short = (leaves.length == 1) & (tag(value(leaves)) == pixel)
-    return Mux(came.length <= 2, short, (leaves.length == came.length) & three)
-
-
-def chord_stretches(unit) -> Iterator[Stretch]:
-    """Values of normals one by one, gathered; then those of spans of values."""
-    spans = unit._spans
-    # Two normals that are still to be sent, those inside, the values of two that wait for a third.
-    capacity = 2 + held(unit._values) + 2
-    pieces = lambda span: Mux(span.length == 2, 2, 1)  # noqa: E731
-    yield Stretch(unit.i, spans.i, left, value, capacity, gathered, pieces)
-    yield from spans_stretches(spans, unit.o)
-
-
 def angular_stretches(unit) -> Iterator[Stretch]:
     """Setup, registers, cosine, of each chain."""
     for setup, cosines in unit._chains.values():
@@ -248,7 +229,7 @@ OPTIONS = {"setup_interval": INTERVAL, "length_bits": LENGTH_BITS}
 def spans_of(lights: int, *, gated: bool = False) -> ChordSpansUnit:
     """Spans of values, with a gate or without."""
     options = {"initiation_interval": INTERVAL, "length_bits": LENGTH_BITS}
-    return ChordSpansUnit(ChordInterpolator(), lights, gate=gate() if gated else None, **options)
+    return ChordSpansUnit(LocalChordInterpolator(), lights, gate=gate() if gated else None, **options)
 
 
 UNITS = {
@@ -267,10 +248,6 @@ UNITS = {
     ),
     "chord_spans": (partial(spans_of, 1), spans_stretches),
     "chord_spans, gated": (partial(spans_of, 1, gated=True), spans_stretches),
-    "chord_interpolator": (
-        partial(ChordInterpolatorUnit, ChordInterpolator(), 1, setup_interval=3, length_bits=LENGTH_BITS),
-        chord_stretches,
-    ),
     "angular": (partial(AngularInterpolatorUnit, AngularInterpolator(), 1, **OPTIONS), angular_stretches),
     "recurrence_interpolator": (
         partial(RecurrenceInterpolatorUnit, RecurrenceInterpolator(), 2, **OPTIONS),
@@ -309,14 +286,28 @@ def in_step(harness: Harness) -> None:
 
 
 def tells_length(harness: Harness) -> None:
-    """Assume of what spans of values come with that it is as `chord_interpolator` claims."""
+    """Assume of what spans of values come with that it is as `of_pairs` claims."""
     unit = harness.unit
     if isinstance(unit, ChordSpansUnit):
         harness.assume(unit.long == (unit.i.payload.length > 1))
         words_meet(harness, unit)
-    if isinstance(unit, ChordInterpolatorUnit):
-        spans = unit._spans
-        harness.claim(~spans.i.valid | (spans.long == (spans.i.payload.length > 1)))
+
+
+def of_pairs() -> Harness:
+    """Of spans of values one of two pixels becomes two of one, from its ends; any other passes as it is."""
+    h = Harness(unit := LocalChordInterpolatorUnit(LocalChordInterpolator(), 1, **OPTIONS))
+    given, spans, long = unit.i, unit._spans.i, unit._spans.long
+    came, goes, pair = given.payload, spans.payload, given.payload.length == 2
+    waits, kept = Signal(name="second_waits"), Signal(WORD_BITS, name="second_value")
+    with h.m.If(taken(spans)):
+        h.m.d.sync += [waits.eq(taken(given) & pair), kept.eq(word(value(came, 2)))]
+    single, starts = (goes.length == 1) & ~long, word(value(goes)) == word(value(came))
+    whole = Cat(word(value(goes, k)) == word(value(came, k)) for k in range(3)).all()
+    whole &= (goes.length == came.length) & (long == (goes.length > 2))
+    second = spans.valid & ~given.ready & single & (word(value(goes)) == kept)
+    first = ~given.valid | Mux(pair, single & starts, whole)
+    h.claim(Mux(waits, second, first & (spans.valid == given.valid) & (taken(spans) == taken(given))))
+    return h
 
 
 def of_stretch(name: str, place: int) -> Harness:
@@ -345,7 +336,11 @@ def of_cycles(name: str, *, exact: bool = False) -> Harness:
     inside = [stretch.follow(h, exact=exact).any() for stretch in found]
     answers(h, Cat(inside).any(), taken(unit.o), unit.latency, unit.o.ready)
     # Beside a FIFO a span may wait for the pixels of another, and for the interval of its setup.
-    patience = (1 << LENGTH_BITS) - 1 + INTERVAL if isinstance(unit, ChordSpansUnit) else 0
+    patience = (
+        (1 << LENGTH_BITS) - 1 + INTERVAL
+        if isinstance(unit, ChordSpansUnit | LocalChordInterpolatorUnit)
+        else 0
+    )
     answers(h, unit.i.valid, unit.i.ready, unit.latency + patience, unit.o.ready)
     return h
 
@@ -357,7 +352,6 @@ STRETCHES = {
     "quadratic-eval": 3,
     "chord_spans": 1,
     "chord_spans, gated": 1,
-    "chord_interpolator": 2,
     "angular": 6,
     "recurrence_interpolator": 5,
     "bisection_interpolator": 2,
@@ -365,11 +359,11 @@ STRETCHES = {
 }
 
 
-BOUNDED = {"chord_spans": 14, "chord_spans, gated": 14, "chord_interpolator": 16}
+BOUNDED = {"chord_spans": 14, "chord_spans, gated": 14}
 """Cycles from power-up of what is not decided in time for runs of any length: FIFOs beside a setup. These
 take 15 seconds of a processor; each further cycle more than doubles that."""
 
-JOINED = (("chord_spans", 0), ("chord_spans, gated", 0), ("chord_interpolator", 1))
+JOINED = (("chord_spans", 0), ("chord_spans, gated", 0))
 """The stretches with these FIFOs."""
 
 
@@ -426,18 +420,6 @@ BUGS = {
         "kept, entered, taken & takes_long,",
         "_keep_words",
     ),
-    "of two normals one is not sent": (
-        "chord_interpolator",
-        "several = span.length[1:].any()",
-        "several = span.length.all()",
-        "_send",
-    ),
-    "each value makes a span": (
-        "chord_interpolator",
-        "spans.i.valid.eq(values.o.valid & complete)",
-        "spans.i.valid.eq(values.o.valid)",
-        "_collect",
-    ),
     "angles are lost": ("angular", "setup.o.ready.eq(prepared.ready)", "setup.o.ready.eq(1)"),
     "cosines are lost": ("angular", "cosine.o.ready.eq(self.o.ready)", "cosine.o.ready.eq(1)"),
     "one light has a span too many": (
@@ -485,6 +467,24 @@ def test_lost_products_are_found(refute, inject, name):
     flag = "self.out_of_range.eq(out_of_range)"
     inject(NormalInterpolatorUnit, "elaborate", flag, f"products.o.ready.eq(1), {flag}")
     refute(of_cycles(name, exact=True), 30)
+
+
+def test_pairs_are_divided(prove):
+    """Inductive, at once."""
+    prove(of_pairs())
+
+
+@pytest.mark.parametrize(
+    ("text", "change"),
+    [
+        ("second.eq(pair & ~second)", "second.eq(0)"),
+        ("self.i.ready.eq(spans.i.ready & ~second)", "self.i.ready.eq(spans.i.ready)"),
+        ("Value.cast(given[0]).eq(Value.cast(end))", "Value.cast(given[0]).eq(Value.cast(values[2]))"),
+    ],
+)
+def test_lost_second_pixels_are_found(refute, inject, text, change):
+    inject(LocalChordInterpolatorUnit, "elaborate", text, change)
+    refute(of_pairs(), 30)
 
 
 def test_dropped_cosines_are_found(refute, monkeypatch):

@@ -7,7 +7,7 @@ import pytest
 from amaranth.hdl import Cat, Mux, Signal
 
 import blysk.hdl.core.stream
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
@@ -25,12 +25,11 @@ pytestmark = pytest.mark.prove
 # Of each record the default variant, and others that have another control.
 FURTHER = {
     "arccos": ("refitted, sequential",),
-    "chord_interpolator": ("gated",),
-    "chord_values": ("1 lights, interval 3",),
+    "local_chord_interpolator": ("gated",),
     "intensity": ("2 lights, compact",),
     "light": ("cosquad, interval 3",),
     "light_products": ("cosines, 2 lights, interval 3",),
-    "pipeline": ("chord, cosquad", "compact", "gate"),
+    "pipeline": ("linear, cosquad", "compact", "gate"),
     "power": ("sequential",),
     "quadratic_evaluator": ("horner",),
     "quotient": ("interval 3",),
@@ -42,7 +41,7 @@ UNITS = {
     for name, record in RECORDS.items()
     for variant in (record.default, *FURTHER.get(name, ()))
 } | {
-    "chord_accumulator": partial(ChordAccumulatorUnit, ChordInterpolator(), 1),
+    "chord_accumulator": partial(ChordAccumulatorUnit, LocalChordInterpolator(), 1),
     "line_accumulator": partial(LineAccumulatorUnit, RenormaliseInterpolator()),
 }
 KINDS = {name: getattr(make, "func", make) for name, make in UNITS.items()}

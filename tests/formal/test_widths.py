@@ -11,7 +11,7 @@ from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
@@ -24,11 +24,9 @@ from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
-from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
-from blysk.hdl.cosines.span_limit import SpanLimitUnit
 from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
@@ -175,9 +173,9 @@ def test_sums_are_cut_in_these_places_alone():
     units = (
         *(make() for make in UNITS.values()),
         *(make() for make in (BisectionUnit, BisectionChainUnit, RenormaliserUnit, HalfChordUnit)),
-        *(make() for make in (ChordValuesUnit, SpanLimitUnit, RecurrenceSetupUnit, RecurrenceUnit)),
+        *(make() for make in (RecurrenceSetupUnit, RecurrenceUnit)),
         *(make() for make in (DifferenceAccumulatorUnit, AdaptiveNormaliserUnit)),
-        ChordAccumulatorUnit(ChordInterpolator(), 1),
+        ChordAccumulatorUnit(LocalChordInterpolator(), 1),
         LineAccumulatorUnit(RenormaliseInterpolator()),
     )
     assert set.union(*map(cut_by, units)) == set(CUTS)
@@ -244,9 +242,9 @@ def test_sums_of_segments_do_not_wrap(wraps, levels):
 
 @pytest.mark.parametrize(("name", "bits"), [("diffuse", 46), ("highlight", 36), ("highlight", 46)])
 def test_sums_of_chords_do_not_wrap(wraps, name, bits):
-    """The same, for any values, P and G; so differences of a pixel to the next. Of local chords too."""
+    """The same, for any values, P and G; so differences of a pixel to the next."""
     of_chord_sums(name, bits)
-    assert wrapped_by(ChordAccumulatorUnit(ChordInterpolator(fraction_bits=bits), 1)) <= set(wraps)
+    assert wrapped_by(ChordAccumulatorUnit(LocalChordInterpolator(fraction_bits=bits), 1)) <= set(wraps)
 
 
 def test_bounds_hold():

@@ -10,7 +10,7 @@ from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
@@ -144,7 +144,7 @@ def of_segments(levels):
 
 def of_chord_sums(name, fraction_bits, format=None):
     """Any values at the first pixel, any P and G."""
-    unit = ChordInterpolator(fraction_bits=fraction_bits)
+    unit = LocalChordInterpolator(fraction_bits=fraction_bits)
     sums, setup = unit.accumulators[name], unit.setup
     if format is not None:
         sums = replace(sums, format=format)

@@ -41,27 +41,29 @@ def several(parameters, name="roughness"):
 @pytest.mark.parametrize("exponent", [1, 10, 100, 1000])
 def test_frame_is_exact_blinn(exponent):
     """No channel is off by more than rounding and 0.05 LSB of the method in float64."""
-    design = preset("chord", "blinn")
+    design = preset("renormalise", "blinn")
     given = scene(exponent, mesh=teapot(2000))
     found = compare(given, design, model_frame(given, design))
     assert found.arithmetic_error.max_lsb < 0.55
-    product = preset("chord", "blinn_product")
+    product = preset("renormalise", "blinn_product")
     of_products = compare(given, product, model_frame(given, product))
     assert found.total_error.max_lsb < of_products.total_error.max_lsb + 0.03
-    of_squares = compare(given, preset("chord", "cosquad"), model_frame(given, preset("chord", "cosquad")))
+    of_squares = compare(
+        given, preset("renormalise", "cosquad"), model_frame(given, preset("renormalise", "cosquad"))
+    )
     assert found.total_error.rmse_lsb < (0.5 if exponent < 1000 else 0.6) * of_squares.total_error.rmse_lsb
     # What is left is the method's: normals are linear along a span.
     assert found.method_error.max_lsb < 0.75
 
 
 def test_frame_is_exact_where_a_lobe_has_a_kink():
-    design, given = preset("chord", "phong_coplanar"), scene(1, mesh=teapot(2000))
+    design, given = preset("renormalise", "phong_coplanar"), scene(1, mesh=teapot(2000))
     assert compare(given, design, model_frame(given, design)).method_error.max_lsb < 0.75
 
 
 @pytest.mark.parametrize("roughness", [0.05, 0.1, 0.3, 0.6, 1])
 def test_frame_is_exact_ggx(roughness):
-    design = preset("chord", "ggx")
+    design = preset("renormalise", "ggx")
     given = scene(roughness=roughness, mesh=teapot(2000))
     found = compare(given, design, model_frame(given, design))
     assert found.arithmetic_error.max_lsb < 0.6
@@ -89,7 +91,9 @@ def test_every_method_serves_every_lobe(method, model):
 @pytest.mark.parametrize(("model", "parameters"), [("blinn", (3, 40, 900)), ("ggx", (0.2, 0.35, 0.9))])
 def test_gate_changes_no_pixel(model, parameters, cutoff):
     given = several(parameters, "roughness" if model == "ggx" else "exponent")
-    plain, gated = (preset("chord", model, materials=3, gate=gate, cutoff=cutoff) for gate in (False, True))
+    plain, gated = (
+        preset("quadratic", model, materials=3, gate=gate, cutoff=cutoff) for gate in (False, True)
+    )
     image = model_frame(given, plain).image
     np.testing.assert_array_equal(model_frame(given, gated).image, image)
     constants = constants_of(given, gated)
@@ -98,14 +102,14 @@ def test_gate_changes_no_pixel(model, parameters, cutoff):
     shares = [lit[frame.prepared.spans.material == index].mean() for index in range(3)]
     # The narrower the highlight, the fewer spans it is on.
     assert 0 < min(shares[0], shares[2]) < max(shares[0], shares[2]) <= 1
-    exact = model_frame(given, preset("chord", model, materials=3))
+    exact = model_frame(given, preset("quadratic", model, materials=3))
     # Half an LSB at intensity 1, and the rounding of a channel.
     assert np.abs(exact.image.astype(int) - image).max() <= (1 if cutoff else 0)
 
 
 def test_equal_lobes_share_a_bank():
     given = several((0.3, 0.6, 0.3))
-    design = preset("chord", "ggx", materials=3, gate=True)
+    design = preset("quadratic", "ggx", materials=3, gate=True)
     assert design.specular.banks == 3
     constants = constants_of(given, design)
     assert [of.bank for of in constants] == [0, 1, 0]
@@ -126,26 +130,26 @@ def test_banks_that_do_not_suffice_are_refused():
         r"build it with more banks, up to 64$"
     )
     with pytest.raises(ValueError, match=message):
-        constants_of(several((0.3, 0.6, 0.9)), preset("chord", "ggx", materials=3, banks=2))
+        constants_of(several((0.3, 0.6, 0.9)), preset("renormalise", "ggx", materials=3, banks=2))
 
 
 def test_fixed_tables():
     """They take no writes, and the pixels are the same; other lobes are refused."""
     given = scene(40)
-    fixed, loaded = preset("chord", "blinn", exponent=40), preset("chord", "blinn")
+    fixed, loaded = preset("renormalise", "blinn", exponent=40), preset("renormalise", "blinn")
     np.testing.assert_array_equal(model_frame(given, fixed).image, model_frame(given, loaded).image)
     (constants,) = constants_of(given, fixed)
     assert LOBE_ADDRESS not in constants.writes()["address"]
     with pytest.raises(ValueError, match=r"^the exponent is fixed at 40, not 41$"):
         constants_of(scene(41), fixed)
     with pytest.raises(ValueError, match=r"^the roughness is fixed at 0.3, not 0.4$"):
-        constants_of(scene(roughness=0.4), preset("chord", "ggx", roughness=0.3))
+        constants_of(scene(roughness=0.4), preset("renormalise", "ggx", roughness=0.3))
 
 
 def test_a_curve_of_ones_own():
     """A function as the model: rendered as it is in float64."""
     curve = TabulatedModel("steps", function=lambda c: np.round(c * 4) / 4)
-    design = preset("chord", curve)
+    design = preset("renormalise", curve)
     assert (design.model, design.specular.banks) == ("steps", 1)
     given = scene()
     image = model_frame(given, design).image
@@ -166,18 +170,18 @@ def test_a_curve_of_ones_own():
             {"model": "phong"},
             r"^phong is a lobe of R·V: take the method quotient, or phong_coplanar$",
         ),
-        ({"model": "cosquad", "banks": 2}, r"^method chord has no option banks$"),
+        ({"model": "cosquad", "banks": 2}, r"^method renormalise has no option banks$"),
         ({"model": "ggx", "banks": 65}, r"^banks must be 1 to 64, not 65$"),
     ],
 )
 def test_bad_options_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
-        preset("chord", **options)
+        preset("renormalise", **options)
 
 
 def test_bad_designs_are_refused():
     lobe = Lobe(GGX, fraction_bits=30)
-    design = preset("chord", "ggx")
+    design = preset("renormalise", "ggx")
     with pytest.raises(ValueError, match=r"^1 - N·H has 25 fraction bits in a pipeline, the lobe 30$"):
         replace(design, specular=lobe)
     assert replace(preset("linear", "ggx"), specular=lobe).specular.fraction_bits == 30

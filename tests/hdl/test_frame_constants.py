@@ -258,8 +258,8 @@ def pixels_of(design, spans, constants):
         pytest.param(150, 1, "quadratic", marks=pytest.mark.long),
         pytest.param(150, 3, "quadratic", marks=pytest.mark.long),
         pytest.param(220, 3, "quadratic", marks=pytest.mark.long),
-        pytest.param(80, 1, "chord", marks=pytest.mark.long),
-        pytest.param(150, 3, "chord", marks=[pytest.mark.ci, pytest.mark.long]),
+        pytest.param(80, 1, "quotient", marks=pytest.mark.long),
+        pytest.param(150, 3, "quotient", marks=[pytest.mark.ci, pytest.mark.long]),
     ],
 )
 def test_constants_never_change_under_a_span(late_cycle, materials, method):
@@ -307,8 +307,8 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
         pytest.param(131, 1, "quadratic", marks=pytest.mark.long),
         pytest.param(131, 2, "quadratic", marks=pytest.mark.long),
         pytest.param(180, 2, "quadratic", marks=pytest.mark.long),
-        pytest.param(60, 1, "chord", marks=pytest.mark.long),
-        pytest.param(131, 2, "chord", marks=[pytest.mark.ci, pytest.mark.long]),
+        pytest.param(60, 1, "quotient", marks=pytest.mark.long),
+        pytest.param(131, 2, "quotient", marks=[pytest.mark.ci, pytest.mark.long]),
     ],
 )
 def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method):

@@ -25,14 +25,14 @@ from blysk.sim.units.operands import component_words, sphere
 from ..checks import assert_beats_equal
 
 DESIGNS = {
-    "chord": preset("chord", "blinn"),
-    "materials, lights, gate": preset("chord", "ggx", materials=3, lights=2, gate=True),
-    "two banks of three materials": preset("chord", "beckmann", materials=3, banks=2),
+    "renormalise": preset("renormalise", "blinn"),
+    "materials, lights, gate": preset("quadratic", "ggx", materials=3, lights=2, gate=True),
+    "two banks of three materials": preset("linear", "beckmann", materials=3, banks=2),
     "compact, gate": preset("quadratic", "beckmann", materials=3, style="compact", gate=True, cutoff=1 / 510),
-    "fixed, gate, compact": preset("chord", "blinn", 2, exponent=20, gate=True, style="compact"),
+    "fixed, gate, compact": preset("chord-local", "blinn", 2, exponent=20, gate=True, style="compact"),
     "fixed roughness": preset("linear", "ggx", roughness=0.3),
     "values": preset("chord-local", "ggx"),
-    "other size": preset("chord", "ggx", octaves=12, steps=32),
+    "other size": preset("linear", "ggx", octaves=12, steps=32),
 }
 
 
@@ -103,7 +103,7 @@ def test_gate_by_threshold():
 
 def test_rate_is_that_of_cosquad():
     """And the latency, but for a register of the shift, of the table and of the multiplier."""
-    units = [ShadingPipelineUnit(preset("chord", model)) for model in ("blinn", "cosquad")]
+    units = [ShadingPipelineUnit(preset("renormalise", model)) for model in ("blinn", "cosquad")]
     assert len({(unit.cycles_per_pixel, unit.setup_interval) for unit in units}) == 1
     assert units[0].latency == units[1].latency + 3
     assert units[0].cycles_per_pixel == 1

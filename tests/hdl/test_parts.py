@@ -18,12 +18,10 @@ from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
-from blysk.hdl.cosines.chord_values import ChordValuesUnit
 from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.quotient import QuotientUnit
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
-from blysk.hdl.cosines.span_limit import SpanLimitUnit
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.power import PowerUnit
@@ -119,10 +117,6 @@ def test_intervals(name):
 
 
 OF_LIGHTS = {
-    ChordValuesUnit: {
-        **{(1, 1): (6, 9), (1, 3): (2, 11), (1, 6): (1, 13)},
-        **{(2, 1): (12, 9), (2, 3): (4, 11), (3, 6): (4, 14)},
-    },
     # Not always as few as there are products: beats may come at any distance, and a multiplier serves those
     # that are less than an interval apart.
     ChordSetupUnit: {
@@ -149,10 +143,6 @@ def test_times_and_parts_of_lights(make, lights, interval):
     assert (unit.multipliers, unit.latency) == (multipliers, latency)
     assert not shifters or [unit.shifters] == shifters
     assert (cost.multipliers, cost.constant_multipliers) == ({(18, 18): multipliers}, 0)
-    if make is ChordValuesUnit:
-        dark = ChordValuesUnit(None, lights, initiation_interval=interval, highlights=False)
-        assert -(-3 * lights // interval) <= cost_of(dark).multiplier_count == dark.multipliers <= multipliers
-        assert interval > 1 or dark.multipliers == 3 * lights
 
 
 @pytest.mark.parametrize("make", [ChordSetupUnit, RecurrenceSetupUnit])
@@ -176,20 +166,12 @@ def test_unknown_form(make, form):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("unit", "times", "multipliers", "rom_bits"),
-    [(RenormaliserUnit(), (16, 1), 8, 64 * 48), (SpanLimitUnit(), (10, 3), 1, 0)],
-    ids=["renormaliser", "span_limit"],
-)
-def test_times_and_parts_of_one_structure(unit, times, multipliers, rom_bits):
+def test_times_and_parts_of_the_renormaliser():
+    unit = RenormaliserUnit()
     cost = cost_of(unit)
-    assert (unit.latency, unit.initiation_interval) == times
-    assert (cost.multiplier_count, cost.constant_multipliers, cost.rom_bits) == (multipliers, 0, rom_bits)
+    assert (unit.latency, unit.initiation_interval) == (16, 1)
+    assert (cost.multiplier_count, cost.constant_multipliers, cost.rom_bits) == (8, 0, 64 * 48)
     assert all(max(pair) <= 18 for pair in cost.multipliers)
-
-
-def test_span_limit_without_highlights_has_no_constants():
-    assert "constants" not in SpanLimitUnit(highlights=False).signature.members
 
 
 QUOTIENTS = {

@@ -28,7 +28,7 @@ from blysk.sim.units.pipeline_spans import any_constants, any_spans, operands_of
 from ..checks import assert_beats_equal
 from ..lists import KINDS
 
-FROM_NORMALS = [method for method in METHODS if method != "chord-local"]
+FROM_NORMALS = [name for name, of in METHODS.items() if not (of.TAKES_VALUES or of.TAKES_VECTORS)]
 
 
 def shade(unit, spans, constants, pixels=None, engine="auto", **stalls):
@@ -59,12 +59,12 @@ def intervals():
     for method in FROM_NORMALS:
         choice = unit_of(METHODS[method]).setup_intervals(METHODS[method])
         choice = [*choice[:2], *choice[2:][-1:]]
-        if method in ("linear", "quadratic", "angular", "chord", "recurrence"):
+        if method in ("linear", "quadratic", "angular", "recurrence"):
             for interval in choice:
-                quick = interval == choice[-1] and method == "chord"
+                quick = interval == choice[-1] and method == "linear"
                 marks = () if quick else pytest.mark.long
                 yield pytest.param(method, interval, marks=marks)
-        quick = method == "chord"
+        quick = method == "renormalise"
         yield pytest.param(method, None, marks=() if quick else pytest.mark.long)
 
 
@@ -89,16 +89,6 @@ def test_cycles(method, interval):
         return
     assert first[0] == found.input_cycles[0] + unit.latency
     assert np.all(within == unit.cycles_per_pixel)
-    if method == "chord":
-        # A third of the interval for each of the values at up to three pixels; values of short spans wait
-        # where long ones took longer than their setup, so that distances count in sum, and a run shows the
-        # turn at its end.
-        turn = unit.setup_interval // 3
-        cost = np.maximum(length, np.minimum(length, 3) * turn)
-        assert np.all(np.cumsum(taken) <= np.cumsum(cost) + unit.setup_interval)
-        np.testing.assert_array_equal(taken[48:60], turn)
-        assert unit.setup_interval == (interval or 3)
-        return
     assert np.all(taken <= np.maximum(length * unit.cycles_per_pixel, unit.setup_interval))
     if interval is not None:
         # In a run of single pixels each costs the interval.
@@ -111,8 +101,7 @@ def test_cycles(method, interval):
     ("method", "latency", "interval"),
     [
         pytest.param("quadratic", 73, 4, marks=pytest.mark.long),
-        pytest.param("renormalise", 58, 3, marks=pytest.mark.long),
-        ("chord", 49, 3),
+        ("renormalise", 58, 3),
     ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):
@@ -135,7 +124,6 @@ INTERVALS = {
     "quadratic-horner": (),
     "angular": range(1, 7),
     "renormalise": (1, 2, 3, 4, 5, 9),
-    "chord": (3, 9, 18),
     "chord-local": (1, 2, 3, 6),
     "recurrence": range(1, 47),
 }
@@ -152,7 +140,8 @@ def never_built():
 
 @pytest.mark.usefixtures("never_built")
 @pytest.mark.parametrize(
-    "method", [m if m in ("chord", "linear") else pytest.param(m, marks=pytest.mark.long) for m in INTERVALS]
+    "method",
+    [m if m in ("renormalise", "linear") else pytest.param(m, marks=pytest.mark.long) for m in INTERVALS],
 )
 def test_setup_intervals(method):
     """Those that there are; the largest to 4 by default, of renormalise 3; others are refused."""
@@ -164,11 +153,10 @@ def test_setup_intervals(method):
         )
     spelled = {
         "renormalise": "1, 2, 3, 4, 5 or 9",
-        "chord": "3, 9 or 18",
         "chord-local": "1, 2, 3 or 6",
     }
     words = spelled.get(method) or (f"{choice[0]} to {choice[-1]}" if choice else "left out")
-    between = {"renormalise": 6, "chord": 4, "chord-local": 5}.get(method, 0)
+    between = {"renormalise": 6, "chord-local": 5}.get(method, 0)
     for interval in (0, between, choice[-1] + 1 if choice else 4):
         text = f"setup_interval of {method} must be {words}, not {interval}"
         with pytest.raises(ValueError, match=f"^{text}$"):
@@ -176,7 +164,7 @@ def test_setup_intervals(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("method", "interval"), [("chord", 3), ("chord", 9), ("quadratic", 7)])
+@pytest.mark.parametrize(("method", "interval"), [("chord-local", 3), ("quadratic", 4), ("quadratic", 7)])
 def test_gate_costs_no_cycle(method, interval):
     """Decisions come in time for spans of every length, however many single pixels are on the way.
 
@@ -198,7 +186,7 @@ def test_gate_costs_no_cycle(method, interval):
 def test_compact_style_takes_three_cycles_a_term():
     """Highlights cost cycles, and pixels without one do not."""
     rng = np.random.default_rng(1)
-    design = preset("chord", "cosquad", style="compact")
+    design = preset("renormalise", "cosquad", style="compact")
     spans, (constants,) = spans_in_range(rng, design, np.full(30, 60), 20.0)
     constants = replace(constants, exponent=3)
     cosine, highlight, dark = operands_of(design, spans, constants)
@@ -214,7 +202,7 @@ def test_compact_style_takes_three_cycles_a_term():
 def test_gate_spares_the_compact_style_cycles():
     """A power takes 42 cycles a pixel, but for pixels behind the light and in spans without a highlight."""
     rng = np.random.default_rng(3)
-    design = preset("chord", "blinn_product", style="compact")
+    design = preset("quadratic", "blinn_product", style="compact")
     spans, (constants,) = spans_in_range(rng, design, np.full(30, 40), 20.0)
     constants.direction[:] = constants.halfway
     constants = replace(constants, exponent=300)
@@ -235,9 +223,9 @@ def test_gate_spares_the_compact_style_cycles():
 
 
 def pairs():
-    """Every method with a model of each kind of specular unit, and the chord with every model."""
+    """Every method with a model of each kind of specular unit, and renormalise with every model."""
     for method in FROM_NORMALS:
-        for model in MODELS if method == "chord" else KINDS:
+        for model in MODELS if method == "renormalise" else KINDS:
             yield method, model
 
 
@@ -271,7 +259,7 @@ LEFT_OUT = {
 }
 
 
-FULL = preset("chord", "cosquad", lights=2, gate=True)
+FULL = preset("quadratic", "cosquad", lights=2, gate=True)
 
 
 @cache

@@ -19,7 +19,7 @@ from blysk.sim.units.registry import RECORDS
 
 from ..checks import assert_beats_equal
 
-DESIGN = preset("chord", "cosquad", x_bits=5, y_bits=5)
+DESIGN = preset(x_bits=5, y_bits=5)
 UNITS = {
     "geometry": ("geometry", GeometryUnit),
     "geometry, two lanes": ("geometry", partial(GeometryUnit, setups=2)),

@@ -112,17 +112,16 @@ def scene_of(mesh: Mesh, camera: Camera, exponent: int) -> Scene:
 
 FRAMES = [
     (method, name, projection, exponent)
-    for method in ("chord", "renormalise")
+    for method in ("quadratic", "renormalise")
     for name in MESHES
     for projection in ("perspective", "orthographic")
     for exponent in (1, 50, 1000)
 ]
 SHORT = {
-    ("chord", "coarse torus", "perspective", 1000),
-    ("chord", "coarse torus", "orthographic", 1),
-    ("chord", "triangle", "perspective", 50),
-    ("chord", "needle", "perspective", 1000),
-    ("renormalise", "triangle", "perspective", 1000),
+    ("renormalise", "coarse torus", "perspective", 1000),
+    ("renormalise", "coarse torus", "orthographic", 1),
+    ("renormalise", "needle", "perspective", 1000),
+    ("quadratic", "triangle", "perspective", 50),
 }
 """Frames of the short run."""
 
@@ -145,7 +144,7 @@ def test_frame(method, name, projection, exponent):
 def test_models(model):
     errors, _ = held(
         scene_of(MESHES["coarse torus"], camera_of("coarse torus", "perspective"), 100),
-        preset("chord", model),
+        preset("renormalise", model),
     )
     assert errors.max() <= 1.0
 
@@ -179,7 +178,7 @@ def test_quotient(model, name, projection, exponent):
 def test_camera_inside(exponent):
     """In the tube of a torus, at a wall that crosses the near plane."""
     camera = Camera((1.0, 0.0, 0.05), (0.4, 0.1, 1.0), projection="perspective", field_of_view=80.0)
-    errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("chord", "cosquad"))
+    errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("renormalise", "cosquad"))
     assert errors.max() <= 1.0
 
 
@@ -193,9 +192,9 @@ def test_fresnel():
     scene = scene_of(mesh, camera, 10)
     material = replace(scene.material, fresnel=f0)
     scene = replace(scene, material=material, lights=(Light(light),))
-    errors, _ = held(scene, preset("chord", "cosquad"), light, f0=f0)
+    errors, _ = held(scene, preset("renormalise", "cosquad"), light, f0=f0)
     assert errors.max() <= 1.0
-    without, _ = held(scene, preset("chord", "cosquad"), light)
+    without, _ = held(scene, preset("renormalise", "cosquad"), light)
     assert without.max() > 20
 
 
@@ -210,12 +209,12 @@ def test_two_sided():
     camera = camera_of("coarse torus", "perspective")
     scene = Scene(mesh, camera, *SIZE, both, (Light(LIGHT),), back_faces="cull")
     one_sided = set(np.flatnonzero(mesh.material).tolist())
-    errors, _ = held(scene, preset("chord", "cosquad", materials=2), one_sided=one_sided)
+    errors, _ = held(scene, preset("renormalise", "cosquad", materials=2), one_sided=one_sided)
     assert errors.max() <= 1.0
-    flipped = model_frame(replace(scene, back_faces="flip"), preset("chord", "cosquad", materials=2))
+    flipped = model_frame(replace(scene, back_faces="flip"), preset("renormalise", "cosquad", materials=2))
     assert (
         np.any(
-            flipped.image != model_frame(scene, preset("chord", "cosquad", materials=2)).image, axis=-1
+            flipped.image != model_frame(scene, preset("renormalise", "cosquad", materials=2)).image, axis=-1
         ).sum()
         > 500
     )
@@ -224,6 +223,10 @@ def test_two_sided():
 def test_caster_finds_a_wrong_curve():
     """Ends joined without their magnitudes, as an earlier version did, are 10 LSB and more off."""
     scene = scene_of(MESHES["triangle"], camera_of("triangle", "perspective"), 50)
-    wrong = shade_spans(scene, rasterise(scene), "normalised", preset("chord", "cosquad").specular.model)
-    right = compare(scene, preset("chord", "cosquad"), model_frame(scene, preset("chord", "cosquad"))).golden
+    wrong = shade_spans(
+        scene, rasterise(scene), "normalised", preset("renormalise", "cosquad").specular.model
+    )
+    right = compare(
+        scene, preset("renormalise", "cosquad"), model_frame(scene, preset("renormalise", "cosquad"))
+    ).golden
     assert 255 * np.abs(wrong - right).max() > 10

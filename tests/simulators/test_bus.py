@@ -24,8 +24,8 @@ from .verilog_bench import SIMULATORS, missing_tool, without_initial_values
 SMALL = {"x_bits": 5, "y_bits": 5}
 CORES = {
     "shader": preset("linear", "cosquad"),
-    "render": Renderer(preset("chord", "cosquad", **SMALL)),
-    "geometry": Renderer(preset("chord", "cosquad", **SMALL)),
+    "render": Renderer(preset("linear", "cosquad", **SMALL)),
+    "geometry": Renderer(preset("linear", "cosquad", **SMALL)),
 }
 SIZES = {"render": {"size": (32, 24)}}
 BUSES = {"axi": "axi", "wishbone": "wishbone", "wishbone, classic": "wishbone"}

@@ -32,8 +32,7 @@ BEATS = 300
 
 UNITS = (
     ("dot_product", ""),
-    ("chord_values", "interval 1"),
-    ("chord_values", "2 lights, interval 3"),
+    ("light_products", "cosines, 2 lights, interval 3"),
     ("chord_setup", "interval 3"),
     ("intensity", "3 lights, compact"),
     ("quadratic_evaluator", "direct"),

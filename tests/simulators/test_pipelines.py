@@ -18,7 +18,7 @@ QUICK = ("quotient, blinn",)
 FRAMES = {"verilator": ((320, 240), 5000), "icarus": ((64, 48), 200)}
 """Size of the picture, and triangles, of the long run."""
 VERILATED = (
-    *("quotient, blinn", "chord, blinn", "chord-local", "3 lights", "compact", "gate, compact"),
+    *("quotient, blinn", "renormalise, blinn", "chord-local", "3 lights", "compact", "gate, compact"),
     *("values, the second of 2 lights fades", "no specular light, grey, few bits"),
 )
 """Pipelines that Verilator runs, and Icarus the others: both read the same text."""

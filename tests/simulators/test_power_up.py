@@ -17,12 +17,12 @@ from .verilog_bench import VerilogBench, assert_beats, missing_tool, pauses, wit
 
 CASES = {
     ("pipeline", "linear, cosquad"): 40,
-    ("pipeline", "chord, blinn"): 200,
+    ("pipeline", "renormalise, blinn"): 200,
     ("pipeline", "quotient, blinn"): 200,
     ("geometry", ""): 60,
     ("geometry", "two lanes"): 60,
-    ("render", "chord"): 60,
-    ("render", "chord, compact"): 60,
+    ("render", "quotient"): 60,
+    ("render", "quotient, compact"): 60,
     ("pixel_pipelines", "2 pipelines, without lights"): 200,
     ("pipeline", "compact"): 40,
 }

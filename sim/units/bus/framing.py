@@ -114,7 +114,7 @@ def _misfits(unit, rng, count):
 
 def _variants():
     yield "shader", Variant(partial(FramingUnit, "shader", preset(model="cosquad", lights=0)))
-    design = preset("chord", "cosquad", x_bits=5, y_bits=5)
+    design = preset("linear", "cosquad", x_bits=5, y_bits=5)
     yield "render", Variant(partial(FramingUnit, "render", Renderer(design), size=(32, 24)), long=True)
     yield "geometry", Variant(partial(FramingUnit, "geometry", Renderer(design)), long=True)
 

@@ -16,7 +16,11 @@ from blysk.sim.units.record import Case, Record, Stimulus, Variant
 
 __all__ = ["RECORD"]
 
-_COUNTERS = (("pixels", 32, "pixels"), ("wide", 16, "wide spans"), ("overrun", 1, "past the last column"))
+_COUNTERS = (
+    ("pixels", 32, "pixels"),
+    ("empty", 16, "empty spans"),
+    ("overrun", 1, "past the last column"),
+)
 
 
 def _expect(unit, case):

@@ -161,7 +161,7 @@ def _variants():
 
 RECORD = Record(
     name="value_gate",
-    title="Whether a span of the chord methods can hold a visible highlight",
+    title="Whether a span of chord-local can hold a visible highlight",
     source="docs/theory/units.md#highlight-gate",
     variants=dict(_variants()),
     expect=_expect,

@@ -3,11 +3,16 @@
 from functools import partial
 
 import numpy as np
+from amaranth.lib.wiring import Component
 
 from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.lighting.value_gate import ValueGate
+from blysk.golden.methods.interpolator import Operands
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.sim.units.cosines.chord_setup import (
     FORMATS,
@@ -23,18 +28,22 @@ from blysk.sim.units.cosines.chord_setup import (
 from blysk.sim.units.cosines.chord_setup import RECORD as SETUP
 from blysk.sim.units.lighting.specular import any_exponent
 from blysk.sim.units.lighting.value_gate import parabolas_near
-from blysk.sim.units.methods.chord_interpolator import (
-    EXPONENT,
-    STILL_SPANS,
-    gated,
-    gated_beats,
-    mixed_lengths,
-)
-from blysk.sim.units.methods.interpolator import long_lengths, of_setup, options
+from blysk.sim.units.methods.interpolator import long_lengths, of_setup, operand_beats, options
 from blysk.sim.units.operands import any_codes, short_lengths, span_lengths
 from blysk.sim.units.record import Case, Record, Sample, Stimulus, Variant
 
-__all__ = ["RECORD"]
+__all__ = ["RECORD", "gated", "mixed_lengths"]
+
+EXPONENT = 60
+"""Exponent of a run that needs only one."""
+
+_STILL = {
+    "twice a number is even": "{diffuse,highlight}_0_second_difference[0]",
+    "spans come while under 28 are counted inside, under 12 long ones, and three more before they count": (
+        "spans_inside[5] lengths.inner_level[5] long_inside[4] behind[4]"
+    ),
+}
+"""Register bits that cannot toggle."""
 
 _METHOD = LocalChordInterpolator()
 
@@ -55,11 +64,51 @@ def _measure(rng, count):
     return Sample(found[:, kept], exact[:, kept], formula[:, kept], pixel[kept])
 
 
+def gated(lights: int, exponent: int | None = None, *, takes_threshold: bool = False) -> ValueGateUnit:
+    """Gate of an interpolator.
+
+    Parameters
+    ----------
+    lights : int
+        Number of lights.
+    exponent, takes_threshold
+        As for `ValueGateUnit`.
+    """
+    return ValueGateUnit(ValueGate(), lights, exponent=exponent, takes_threshold=takes_threshold)
+
+
+def _gated_beats(
+    unit: Component,
+    operands: Operands,
+    values: SpanValues,
+    length: np.ndarray,
+    exponent: int,
+    threshold: int | None = None,
+) -> np.ndarray:
+    """Output beats of a unit with these operands, and the decisions of its gate, if it has one.
+
+    The gate decides a pixel of a span of one or two pixels by its own u, the pixels of a longer span
+    together. It uses the threshold's code, if there is one, in place of the exponent.
+    """
+    if unit.gate is None:
+        return operand_beats(unit, operands)
+    span, pixel = pixels_of(length)
+    u = values.highlight[span].astype(np.int64)
+    own = np.where(pixel[:, np.newaxis] == 0, u[..., 0], u[..., 2])
+    u = np.where((length[span] < 3)[:, np.newaxis, np.newaxis], own[..., np.newaxis], u)
+    gate = unit.gate.parameters
+    if threshold is None:
+        lit = gate.compute(u, unit.gate.exponent or exponent)
+    else:
+        lit = gate.compute_by(u, Fixed(gate.THRESHOLD_FORMAT, np.int64(threshold)))
+    return operand_beats(unit, operands, gated=~lit)
+
+
 def _expect(unit, case):
     values, length = values_of(case.beats), case.beats["length"]
     operands = unit.parameters.compute_values(values, length, factors_of(case.beats))
     constant = {"threshold" if unit.takes_threshold else "exponent": case.constants}
-    return gated_beats(unit, operands, values, length, **{"exponent": 1} | constant)
+    return _gated_beats(unit, operands, values, length, **{"exponent": 1} | constant)
 
 
 def _status(unit, case):
@@ -75,6 +124,15 @@ def _case(unit, rng, length, values=None, exponent=EXPONENT):
     if unit.takes_threshold:
         constants = int(unit.gate.parameters.thresholds.codes[exponent])
     return Case(value_beats(unit, values, length), constants)
+
+
+def mixed_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Lengths of 1 to 4 pixels in runs and mixed, and every tenth up to 40."""
+    length = rng.integers(1, 5, count)
+    runs = rng.integers(1, 5, count // 12 + 1).repeat(12)[:count]
+    length[: count // 2] = runs[: count // 2]
+    length[::10] = rng.integers(1, 41, len(length[::10]))
+    return length
 
 
 def _spans(unit, rng, count):
@@ -158,5 +216,5 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
-    still=STILL_SPANS,
+    still=_STILL,
 )

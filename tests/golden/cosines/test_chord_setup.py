@@ -1,23 +1,19 @@
-"""Chord setup: quadratics through three given values, against float64; how well a quadratic fits."""
+"""Chord setup: quadratics through three given values, against float64."""
 
 import numpy as np
 import pytest
 
-from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues, largest_span_angle
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
+from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.reciprocal import step_words
 from blysk.golden.number.unit_vector import ONE
-from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.sim.units.cosines.chord_setup import any_values, parabola, value_at
+from blysk.sim.units.cosines.chord_setup import any_values, value_at
 
 P = ChordSetup()
 FORMATS = P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT
 SCALE = (ONE / 2**17) ** 2
 """Product of two unit vectors."""
-
-EXPONENTS = [1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000]
-MODELS = ["cosquad", "cosquad7", "cosquad_lin", "lyon1_refitted", "lyon2", "lyon3", "exp"]
 
 
 def setup(diffuse, highlight, length, parameters=P):
@@ -149,7 +145,7 @@ def test_sums_never_wrap():
         for step in (length - 1, *(rng.integers(0, length) for _ in range(5))):
             worst = max(worst, np.abs(at(differences, step)).max())
     assert 2 < worst < 2.63
-    assert {unit.format for unit in ChordInterpolator().accumulators.values()} == {SQ(3, 46)}
+    assert {unit.format for unit in LocalChordInterpolator().accumulators.values()} == {SQ(3, 46)}
 
 
 @pytest.mark.parametrize("curved", [False, True])
@@ -237,55 +233,3 @@ def test_quantise():
         SpanValues.quantise(np.zeros((1, 1, 3)), np.full((1, 1, 3), -0.1))
     with pytest.raises(ValueError, match=r"outside|exceed"):
         SpanValues.quantise(np.full((1, 1, 3), 1.1), np.zeros((1, 1, 3)))
-
-
-# The fit itself, in float64.
-
-
-def azimuth_at(t, psi):
-    """Angle from the left normal of ``normalise((1-t) N_l + t N_r)``."""
-    return np.arctan2(t * np.sin(psi), (1 - t) + t * np.cos(psi))
-
-
-def three_points(function, psi, t):
-    return parabola(np.stack([function(0.0), function(psi / 2), function(psi)], axis=-1), t)
-
-
-def fit_error(model, exponent, psi):
-    """Largest error of the specular term of the fit in LSB, over all directions of H: beta and lambda."""
-    t = np.linspace(0, 1, 101)
-    # From the middle outwards, one side: the other is its mirror. Beyond, all of the span is dark.
-    reach = min(np.pi / 2, 3 / np.sqrt(exponent) + psi)
-    azimuth = np.linspace(psi / 2, psi / 2 + reach, 300)[:, np.newaxis]
-    worst = 0.0
-    for beta in np.linspace(0, min(np.pi / 2, 3 / np.sqrt(exponent)), 40):
-
-        def u(a, beta=beta):
-            return 1 - np.cos(beta) * np.cos(azimuth - a)
-
-        exact, fit = u(azimuth_at(t, psi)), three_points(u, psi, t)
-        terms = [REFLECTION_MODELS[model].reflect(1 - value, exponent) for value in (fit, exact)]
-        worst = max(worst, 255 * np.abs(terms[0] - terms[1]).max())
-    return worst
-
-
-@pytest.mark.parametrize("exponent", EXPONENTS)
-def test_fit_of_the_highlight(exponent):
-    """At `largest_span_angle`, every model at full reflection: at most a quarter of an LSB."""
-    psi = np.radians(largest_span_angle(exponent))
-    errors = {model: fit_error(model, exponent, psi) for model in MODELS}
-    assert max(errors.values()) <= 0.25
-    if exponent >= 10:
-        assert max(errors.values()) > 0.15
-
-
-def test_fit_of_the_diffuse_term():
-    t = np.linspace(0, 1, 401)
-    azimuth = np.linspace(0, 2 * np.pi, 1441)[:, np.newaxis]
-    psi = np.radians(largest_span_angle(1))
-
-    def f(a):
-        return np.cos(azimuth - a)
-
-    worst = 255 * np.abs(three_points(f, psi, t) - f(azimuth_at(t, psi))).max()
-    assert 0.1 < worst <= 0.12

@@ -42,11 +42,11 @@ def ball(rings=8):
 
 @pytest.mark.parametrize("name", [*LOBES, *MODELS, *CURVES])
 def test_no_warning_at_the_ends_of_a_model(name):
-    """By the default method: design, tables, cuts, pipeline, golden frame and comparison."""
+    """By a method that serves all: design, tables, cuts, pipeline, golden frame and comparison."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         mesh = ball()
-        design = preset("chord", CURVES.get(name, name), 1)
+        design = preset("renormalise", CURVES.get(name, name), 1)
         camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", 4 / 3)
         parameter = design.specular.model.PARAMETER
         for value in ENDS[parameter]:

@@ -102,14 +102,14 @@ def test_design_without_the_factor_is_refused():
     with pytest.raises(ValueError, match=r"^light 0 fades, and the design has no factor for it: give fact"):
         model_frame(scene, preset("chord-local", "blinn"))
     with pytest.raises(ValueError, match=r"^point lights and a near viewer need the method chord-local$"):
-        model_frame(scene, preset("chord", "blinn"))
+        model_frame(scene, preset("renormalise", "blinn"))
 
 
 @pytest.mark.parametrize(
     ("options", "says"),
     [
         (
-            {"method": "chord", "factors": (0,)},
+            {"method": "renormalise", "factors": (0,)},
             r"^factors of lights need values of spans, of chord-local, and ",
         ),
         ({"model": None, "factors": (0,)}, r"and specular light$"),

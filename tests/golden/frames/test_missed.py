@@ -19,14 +19,16 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
 COLUMNS, ROWS = 100, 40
+ARCS = preset("quadratic", "blinn", operand="one_minus_cosine")
+"""A method of unit normals, whose spans hardware cuts by an angle."""
 LIGHT = tuple(normalise((0.05, 0.03, 1.0)))
 PROMISED = 0.5 + 1 / 16 + 1 / 4
 """LSB, docs/guide/accuracy.md, for diffuse and specular light of 1 together."""
 
-# A search that climbs found it: W of 9.511 to 10.684, normals within 10.3 degrees.
+# A search that climbs found it, with W nearer to each other: W of 9.05 to 11.4, normals within 10.3 degrees.
 WORST = (
     [(75.56, 19.3), (21.85, 35.73), (4.36, 14.49)],
-    [10.684, 9.511, 9.568],
+    [11.415, 9.046, 9.155],
     [(0.0177, -0.0577), (-0.0707, 0.0305), (0.0375, 0.1205)],
 )
 
@@ -69,14 +71,13 @@ def by_hardware(scene, design):
 
 
 def test_unequal_lengths_are_counted():
-    """Hardware cuts by an angle alone, and is 3 LSB off, which is told; software is not."""
+    """Hardware cuts by an angle alone, and is 2 LSB off, which is told; software is not."""
     scene = scene_of(*([part] for part in WORST), 992, 0.98)
-    design = preset("chord", "blinn")
-    error, counts = by_hardware(scene, design)
-    assert error.max() > 3
+    error, counts = by_hardware(scene, ARCS)
+    assert error.max() > 2
     assert counts["missed_pieces"] > 5
     assert counts["short_normals"] == counts["out_of_range"] == 0
-    assert errors(scene, design, model_frame(scene, design).image).max() < PROMISED
+    assert errors(scene, ARCS, model_frame(scene, ARCS).image).max() < PROMISED
 
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
@@ -93,15 +94,14 @@ def test_unequal_lengths_do_not_matter_to_vectors(model):
 def test_what_is_not_counted_is_as_promised(exponent):
     """The worst triangle, flatter and flatter, and its like: each is within the promise or counted."""
     rng = np.random.default_rng(3)
-    design = preset("chord", "blinn")
     counted = {True: [], False: []}
-    for share in (0.2, 0.4, 0.7, 1.0, 1.3):
+    for share in (0.03, 0.07, 0.2, 0.5, 1.0):
         places, w, tilts = (np.array(part) for part in WORST)
         places = places + rng.uniform(-3, 3, (4, 3, 2))
         w = 10 * (w / 10) ** rng.uniform(0, 2, (4, 1))
         tilts = (tilts * share + rng.normal(0, 0.003, (4, 3, 2))) * np.sqrt(992 / exponent) ** 0.3
         scene = scene_of(places, w, tilts, exponent, 0.98)
-        error, counts = by_hardware(scene, design)
+        error, counts = by_hardware(scene, ARCS)
         counted[counts["missed_pieces"] > 0].append(error.max())
     assert max(counted[False]) < PROMISED
     if exponent == 992:
@@ -116,7 +116,7 @@ def deep_scene(ratio, exponent):
     return scene_of(places, w, rng.normal(0, 0.4, (2, 3, 2)), exponent)
 
 
-CHEAP = "chord", "chord-local", "renormalise", "linear"
+CHEAP = "chord-local", "renormalise", "linear"
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_no_method_is_silently_wrong_in_any_depth(method):
     for ratio in (300.0, 1e5):
         scene = deep_scene(ratio, 30)
         frame = model_frame(scene, design)
-        assert frame.wide_spans == frame.out_of_range_spans == 0
+        assert frame.out_of_range_spans == 0
         assert errors(scene, design, frame.image).max() < PROMISED or frame.prepared.missed_spans
         if not design.takes_values:
             error, counts = by_hardware(scene, design)
@@ -146,7 +146,7 @@ def test_far_surfaces_that_change_places_are_counted(far, wrong):
     # The second sheet lies before the first one.
     corners[2] = corners[1] / 1.001
     scene = replace(scene, mesh=replace(scene.mesh, vertices=corners.reshape(-1, 3)))
-    frame = triangle_frame(scene, Renderer(preset("chord", "blinn")))
+    frame = triangle_frame(scene, Renderer(preset("renormalise", "blinn")))
     assert (frame.owner == 1).any() == wrong
     assert frame.sent.far == 2 * wrong
 

@@ -83,7 +83,7 @@ def test_corners(name, model):
     for exponent in (1, 1000):
         scene = replace(scene, material=replace(scene.material, exponent=exponent))
         frame, errors = drawn(scene, model)
-        assert frame.out_of_range_spans == frame.wide_spans == 0
+        assert frame.out_of_range_spans == 0
         assert errors.visible_pixels > 10
         assert errors.method_error.steady_lsb < 0.56
         assert 2 not in frame.cut_raster.length

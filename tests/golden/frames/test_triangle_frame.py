@@ -7,7 +7,7 @@ import pytest
 
 from blysk.golden.frames.compare import compare_image
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.triangle_frame import sent_triangles, span_angle, triangle_frame
+from blysk.golden.frames.triangle_frame import sent_triangles, triangle_frame
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.presets import preset
 from blysk.golden.reference.raster import rasterise
@@ -16,7 +16,7 @@ from blysk.golden.reference.renderer import render
 from blysk.golden.render import Renderer
 from blysk.sim.api.scene import scene
 
-METHODS = "chord", "renormalise"
+METHODS = "quadratic", "renormalise"
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -24,7 +24,7 @@ METHODS = "chord", "renormalise"
 def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
     """At every pixel of a frame, and at the pixels of the rasteriser in float64, all and no others."""
     drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent)
-    renderer = Renderer(preset(method, "cosquad"))
+    renderer = Renderer(preset(method, "cosquad", operand="one_minus_cosine"))
     frame = triangle_frame(drawn, renderer)
     exact = render(drawn, "phong", renderer.design.specular.model)
     np.testing.assert_array_equal(frame.owner >= 0, exact.mask)
@@ -135,14 +135,14 @@ def test_another_surface_only_within_the_depths_rounding():
 
 
 def test_true_lines_are_not_cut():
-    """One span a scanline and triangle, as the rasteriser's, hidden ones included; chord has more."""
+    """One span a scanline and triangle, as the rasteriser's, hidden ones included; arcs have more."""
     drawn = scene("teapot", size=(160, 120), triangles=220, back_faces="cull")
     counts = {method: triangle_frame(drawn, Renderer(preset(method, "cosquad"))).counts for method in METHODS}
-    assert counts["renormalise"]["cut"] == 0 < counts["chord"]["cut"]
+    assert counts["renormalise"]["cut"] == 0 < counts["quadratic"]["cut"]
     raster = rasterise(drawn)
     assert counts["renormalise"]["spans"] == len(raster.length) + raster.hidden_spans
-    assert counts["renormalise"]["spans"] < counts["chord"]["spans"]
-    assert counts["renormalise"]["pixels"] == counts["chord"]["pixels"]
+    assert counts["renormalise"]["spans"] < counts["quadratic"]["spans"]
+    assert counts["renormalise"]["pixels"] == counts["quadratic"]["pixels"]
 
 
 def test_two_sided_materials():
@@ -152,7 +152,7 @@ def test_two_sided_materials():
     mesh = replace(drawn.mesh, faces=faces, material=np.arange(len(faces)) // 16 % 2)
     both = replace(drawn.material[0], two_sided=True), drawn.material[0]
     drawn = replace(drawn, mesh=mesh, material=both)
-    renderer, masks = Renderer(preset("chord", "cosquad", materials=2)), []
+    renderer, masks = Renderer(preset("quadratic", "cosquad", materials=2)), []
     for back_faces in ("cull", "flip"):
         given = replace(drawn, back_faces=back_faces)
         frame, exact = triangle_frame(given, renderer), render(given, "phong", REFLECTION_MODELS["cosquad"])
@@ -161,17 +161,6 @@ def test_two_sided_materials():
         masks.append(exact.mask.sum())
     single = render(replace(drawn, material=(both[1],) * 2), "phong", REFLECTION_MODELS["cosquad"])
     assert single.mask.sum() + 100 < masks[0] < masks[1] - 100
-
-
-def test_widest_span():
-    """By the steepest highlight of the materials; 5 degrees of methods without a limit of their own."""
-    angles = []
-    for exponent in (1, 100, 1000):
-        drawn = scene("teapot", size=(16, 12), triangles=200, exponent=exponent)
-        angles.append(span_angle(drawn, preset("chord", "cosquad")))
-        assert span_angle(drawn, preset("quadratic", "cosquad")) == 5
-        assert angles[-1] == preset("chord", "cosquad").span_limit.angle(exponent)
-    assert 15 >= angles[0] > angles[1] > angles[2] > 5
 
 
 def test_methods_and_geometry_must_fit():
@@ -187,6 +176,6 @@ def test_methods_and_geometry_must_fit():
     with pytest.raises(ValueError, match="true lines or vectors, not both"):
         Geometry(lines=True, vectors=True)
     with pytest.raises(ValueError, match="takes unit normals, the geometry gives true lines"):
-        Renderer(preset("chord", "cosquad"), Geometry(lines=True))
+        Renderer(preset("quadratic", "cosquad"), Geometry(lines=True))
     with pytest.raises(ValueError, match="takes true lines, the geometry gives unit normals"):
         Renderer(preset("renormalise", "cosquad"), Geometry())

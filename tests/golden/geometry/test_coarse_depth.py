@@ -82,7 +82,7 @@ def test_spans_that_go_out_of_the_picture_are_kept_and_change_nothing():
 def test_frames_are_the_same(back_faces, least):
     """The picture of a teapot to the bit, with fewer pixels shaded."""
     scene = blysk.scene("teapot", triangles=1000, size=(160, 120), back_faces=back_faces)
-    design = preset("chord", "blinn")
+    design = preset("renormalise", "blinn")
     plain = triangle_frame(scene, Renderer(design))
     frame = triangle_frame(scene, Renderer(design, coarse=CoarseDepth(160, 120)))
     np.testing.assert_array_equal(frame.image, plain.image)

@@ -18,13 +18,13 @@ def pieces():
     return Stages(random_triangles(np.random.default_rng(3), 3000, size=12.0, spread=0.3), FRAME).pieces
 
 
-def test_three_normals_are_passed_on(pieces):
+def test_normals_are_passed_on(pieces):
     """Each under its own name, with coordinates and material."""
     spans, _ = EdgeNormals().compute(pieces)
     shaded = shading_spans(spans)
-    for name in ("x", "y", "length", "material", "normal_left", "normal_middle", "normal_right"):
+    for name in ("x", "y", "length", "material", "normal_left", "normal_right"):
         np.testing.assert_array_equal(getattr(shaded, name), getattr(spans, name))
-    assert (shaded.normal_middle != shaded.normal_left).any()
+    assert (shaded.normal_right != shaded.normal_left).any()
 
 
 def test_lines_are_in_proportion(pieces):
@@ -42,7 +42,6 @@ def test_lines_are_in_proportion(pieces):
     assert error[usual].max() <= LineAdapter.ERROR
     assert np.unique(scale[usual]).size > 3
     assert 0.1 < pieces.flip.mean() < 0.9
-    assert shading_spans(spans).normal_middle is None
 
 
 def test_ends_of_the_range():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from blysk.golden.cosines.angular_setup import AngularSetup
-from blysk.golden.cosines.chord_setup import largest_span_angle
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
@@ -17,7 +16,6 @@ from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import CURVES, interpolate
-from blysk.golden.reference.geometry import normalise
 from blysk.sim.units.operands import pairs_at
 
 STEP = 2.0**-17
@@ -51,8 +49,7 @@ def vectors(rng, lights):
 
 
 def compute(interpolator, left, right, length, direction, halfway):
-    middle = [normalise(left + right)] if interpolator.TAKES_MIDDLE else []
-    others = (Fixed(COMPONENT, quantise(v)) for v in (direction, halfway, *middle))
+    others = (Fixed(COMPONENT, quantise(v)) for v in (direction, halfway))
     return interpolator.compute(*end_words(interpolator, left, right), length, *others)
 
 
@@ -172,11 +169,8 @@ def test_widest_span():
     for name, method in METHODS.items():
         for exponent in (1, 10, 1000):
             widest = method.widest_span(exponent)
-            assert widest == (30 if name.startswith("chord") else method.MAX_ANGLE)
+            assert widest == (30 if name == "chord-local" else method.MAX_ANGLE)
     assert METHODS["renormalise"].widest_span(1000) == 180
-    assert largest_span_angle(1) == largest_span_angle(5) == 15.0
-    assert abs(largest_span_angle(64) - 10.0) < 1e-12
-    assert abs(largest_span_angle(1000) - 20 / 1000 ** (1 / 6)) < 1e-12
 
 
 @pytest.mark.parametrize(

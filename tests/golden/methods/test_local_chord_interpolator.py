@@ -12,6 +12,7 @@ from blysk.golden.number.unit_vector import ONE, ONE_SQUARED
 from blysk.golden.presets import MODELS
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.sim.units.methods.local_chord_interpolator import mixed_lengths
 
 ONE_VALUE = float(ONE_SQUARED.values)
 METHOD = LocalChordInterpolator()
@@ -87,6 +88,21 @@ def test_operands():
         error = np.abs(operand.values - ONE_VALUE * curve)[kept]
         assert error.max() <= bound(0.5, 0.125) + step
         assert error.max() > step / 2
+
+
+def test_mixed_lengths_do_not_touch_each_other():
+    """The pixels of each span are those of the span alone, in the order of the spans."""
+    rng, count = np.random.default_rng(4), 120
+    values, length = Surface(rng, count, 1, 0.3, 0.3, 20).values(), mixed_lengths(rng, count)
+    together = METHOD.compute_values(values, length)
+    alone = [
+        METHOD.compute_values(SpanValues(*(codes[k : k + 1] for codes in values)), length[k : k + 1])
+        for k in range(count)
+    ]
+    for name in ("cosine", "highlight"):
+        expected = np.concatenate([getattr(one, name).codes for one in alone])
+        np.testing.assert_array_equal(getattr(together, name).codes, expected)
+    np.testing.assert_array_equal(together.out_of_range, [one.out_of_range[0] for one in alone])
 
 
 def test_exact_operands():

@@ -126,7 +126,7 @@ def test_frame_in_strong_perspective(exponent):
     design = preset("renormalise", "cosquad")
     frame = model_frame(scene, design)
     assert frame.prepared.spans_cut == frame.prepared.missed_spans == 0
-    assert frame.out_of_range_spans == frame.wide_spans == 0
+    assert frame.out_of_range_spans == 0
     raster = frame.raster
     ends = np.stack([raster.magnitude_left, raster.magnitude_right])[:, raster.length > 1]
     assert (ends.max(axis=0) / ends.min(axis=0)).max() > 1.5

@@ -12,7 +12,6 @@ import pytest
 
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
@@ -28,7 +27,7 @@ ONE_VALUE = float(ONE_SQUARED.values)
 NAMES = [
     name
     for name, method in METHODS.items()
-    if not (isinstance(method, ChordInterpolator) or method.TAKES_VECTORS)
+    if not (method.TAKES_VALUES or method.TAKES_VECTORS)
     and not (method.uses_chord and method.CURVE != "normalised")
 ]
 NORMALS = [name for name in NAMES if name not in ("angular", "recurrence")]

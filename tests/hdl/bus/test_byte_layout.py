@@ -18,7 +18,7 @@ from blysk.hdl.pixel_assembler import pixel_shape
 
 SHAPES = {
     "triangle": triangle_shape(),
-    "span": span_shape(preset("chord", "cosquad")),
+    "span": span_shape(preset("linear", "cosquad")),
     "values": span_shape(preset("chord-local", "cosquad", lights=2)),
     "true span": true_spans_shape(),
     "pixel": pixel_shape(),

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::amaranth.hdl._ir.UnusedElaborat
 CORES = {
     "shader": preset("quotient", "blinn", 2, materials=3),
     "render": Renderer(preset()),
-    "geometry": Renderer(preset("chord", "cosquad")),
+    "geometry": Renderer(preset("linear", "cosquad")),
 }
 
 

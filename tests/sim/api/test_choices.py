@@ -63,7 +63,7 @@ def test_no_choice_of_a_rendering_is_always_refused():
     assert not missing
 
 
-@pytest.mark.parametrize("method", ["chord", "linear"])
+@pytest.mark.parametrize("method", ["renormalise", "linear"])
 def test_phong_is_refused_with_the_model_that_is_near_it(method):
     with pytest.raises(
         InputError,

@@ -30,10 +30,14 @@ def many(count):
 
 @pytest.mark.parametrize(("roughness", "sharp"), [(0.05, 1), (0.1, 0), (1.0, 0)])
 def test_lobes_that_are_too_sharp_are_counted(roughness, sharp):
-    """By the error of the lines between entries; `chord` has finer tables at the peak."""
+    """By the error of the lines between entries; other methods have finer tables at the peak."""
     scene = blysk.scene("teapot", roughness=roughness, **SMALL)
     assert sharp_lobes(scene, preset(model="ggx")) == sharp
-    assert sharp_lobes(scene, preset("chord", "ggx")) == sharp_lobes(scene, preset("chord", "cosquad")) == 0
+    assert (
+        sharp_lobes(scene, preset("chord-local", "ggx"))
+        == sharp_lobes(scene, preset("linear", "cosquad"))
+        == 0
+    )
 
 
 def test_render_by_roughness():
@@ -113,6 +117,6 @@ def test_bad_csv(tmp_path, monkeypatch, text, reason):
 
 @pytest.mark.long
 def test_verilog_tells_the_addresses_of_tables():
-    text = verilog(blysk.design(model="ggx", method="chord", gate=True))
+    text = verilog(blysk.design(model="ggx", method="chord-local", gate=True))
     assert "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins" in text
     assert "of the table: where its highlight ends; UQ(3, 15)" in text

@@ -222,7 +222,7 @@ def test_a_turntable(tmp_path):
 
 
 def test_a_design_has_its_cost():
-    design, same = blysk.design(method="chord"), preset("chord")
+    design, same = blysk.design(method="renormalise"), preset("renormalise")
     assert design == same
     assert same == design
     assert (hash(design), repr(design)) == (hash(same), repr(same))
@@ -230,12 +230,12 @@ def test_a_design_has_its_cost():
     cost = design.cost()
     unit = ShadingPipelineUnit(same)
     assert (cost.latency, cost.cycles_per_pixel) == (unit.latency, unit.cycles_per_pixel)
-    (entry,) = (e for e in read_store() if e["design"] == "pipeline chord, blinn, 1 light")
+    (entry,) = (e for e in read_store() if e["design"] == "pipeline renormalise, blinn, 1 light")
     assert (cost.luts, cost.flip_flops, cost.device) == (entry["luts"], entry["flip_flops"], entry["device"])
     # The mapper makes each of these one multiplier of 18x18 bits.
     assert cost.multipliers == sum(cost.multiplier_widths.values()) == entry["multipliers"]
     assert f"{entry['luts']:,} LUT" in str(cost)
     # No figure of another design: neither more lights nor another build is that which was placed.
-    for other in (replace(design, lights=2), design.built(setup_interval=3), replace(design, gate=True)):
+    for other in (replace(design, lights=2), design.built(setup_interval=3), replace(design, grey=True)):
         assert isinstance(other, blysk.Design)
         assert other.placed() == {}

@@ -23,7 +23,7 @@ def writes_in(lines):
 @pytest.mark.parametrize("materials", [1, 3])
 def test_values_follow_from_the_text(materials):
     """Colours are 255 times the coefficient in UQ(11, 6); a table's words follow from u."""
-    lines = example_of(preset("chord", "blinn", 2, materials=materials))
+    lines = example_of(preset("renormalise", "blinn", 2, materials=materials))
     found = writes_in(line for line in lines if line.startswith("  ") and "entry" not in line)
     assert found[0] == EXPONENT
     assert [found[k] for k in (1, 22, 41)] == [round(255 * 64 * c) for c in (0.05, 0.4, 0.55)]
@@ -57,7 +57,7 @@ def test_table_of_quotients_follows_from_the_text(model):
 def test_vectors_are_said_to_be_what_is_read():
     """The half-way vector is read by no method of vectors or values, and L is in its own frame."""
     for method, direction, halfway in (
-        ("chord", "unit vector to the light", "unit half-way vector"),
+        ("linear", "unit vector to the light", "unit half-way vector"),
         ("quotient", "sin a, 0, cos a of the light's frame", "not read"),
         ("chord-local", "not read", "not read"),
     ):
@@ -73,16 +73,16 @@ def test_vectors_are_said_to_be_what_is_read():
 
 
 def test_no_example_of_a_table_that_is_fixed_for_another_exponent():
-    assert example_of(preset("chord", "blinn", exponent=20)) == []
+    assert example_of(preset("renormalise", "blinn", exponent=20)) == []
 
 
-@pytest.mark.parametrize("method", ["chord", "linear", "renormalise"])
+@pytest.mark.parametrize("method", ["linear", "renormalise"])
 def test_normals_are_described_as_they_are(method):
     """The ends of a true line are no unit vectors, and no port of theirs is said to have one."""
     unit = ShadingPipelineUnit(preset(method, "cosquad"))
     (line,) = (line for line in header_of(unit) if line.startswith("i_normal_*"))
     texts = [text for port, text in descriptions_of(unit, 1).items() if port.startswith("i_normal")]
-    assert len(texts) == (3 if method == "chord" else 2)
+    assert len(texts) == 2
     if method == "renormalise":
         assert "N/W" in line
         assert not any("unit" in text or "2^17" in text for text in (line, *texts))

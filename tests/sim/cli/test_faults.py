@@ -237,7 +237,7 @@ def test_killed_worker_of_a_sweep(cache, tmp_path):
     assert all(path.read_bytes() == entry for path, entry in kept.items())
 
 
-SWEEP = ["explore", "--size", "24x18", "--methods", "linear,renormalise,chord", "--models", "cosquad"]
+SWEEP = ["explore", "--size", "24x18", "--methods", "linear,renormalise,quadratic", "--models", "cosquad"]
 SWEEP += ["--degrees", "3", "--fraction-bits", "46", "--operands", "one_minus_cosine"]
 SWEEP += ["--largest-error", "255"]
 

@@ -100,11 +100,11 @@ def test_turntable():
 @pytest.mark.long
 def test_verilog():
     """Triangles in, pixels and a memory of depths out."""
-    assert main(["verilog", *HARDWARE, "-o", "a.v"]) == 0
+    assert main(["verilog", *HARDWARE, "--method", "linear", "-o", "a.v"]) == 0
     text = Path("a.v").read_text()
     header, body = text.split("module blysk (", 1)
     assert "triangles to pixels" in header
-    assert "spans with three unit normals" in header
+    assert "spans with two unit normals" in header
     for port in ("i_normal_2_2", "memory_read_data", "status_hidden", "constants_limit", "o_depth"):
         assert f"// {port} " in header
     assert "_geometry_normals_normaliser" in body

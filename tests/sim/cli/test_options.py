@@ -89,11 +89,11 @@ def test_bad_option(refused, options, thing, says):
 @pytest.mark.parametrize("command", [["render", "teapot"], ["verilog", "-o", "core.v"]])
 def test_design_that_cannot_be(refused, command):
     says = "finds N.H, not R.V; use method quotient; or phong_coplanar, "
-    refused(*command, "--method", "chord", "--model", "phong", thing="--model phong", says=says)
+    refused(*command, "--method", "linear", "--model", "phong", thing="--model phong", says=says)
     says = "quotient has no error bound for one; leave it out"
     refused(*command, "--gate", "--model", "phong", thing="--gate", says=says)
-    says = "method chord finds no normals"
-    refused(*command, "--method", "chord", "--operand", "cosine", thing="--operand cosine", says=says)
+    says = "method angular finds no normals"
+    refused(*command, "--method", "angular", "--operand", "cosine", thing="--operand cosine", says=says)
     says = "method linear is not built for it; "
     refused(*command, "--method", "linear", "--setup-interval", "26", thing="--setup-interval 26", says=says)
     if command[0] == "verilog":

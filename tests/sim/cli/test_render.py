@@ -26,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("folder")
 
 @pytest.mark.long
 def test_specialised_pipeline_says_what_it_leaves_out(folder, capsys):
-    options = ["--method", "chord", "--gate", "--specialise", "--size", "64x48", "--specular", "0"]
+    options = ["--method", "quadratic", "--gate", "--specialise", "--size", "64x48", "--specular", "0"]
     options += ["--engine", "pysim", "--triangles", "64"]
     assert main(["render", "teapot", *options, "-o", "a.png", "--json", "a.json"]) == 0
     output = capsys.readouterr().out

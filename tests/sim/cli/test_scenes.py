@@ -158,7 +158,7 @@ OVER_THE_CENTRE = "camera.position = [0, 9, 0]\ncamera.target = [0, 0, 0]"
         ("mesh.file = '.'", [], "mesh.file", "is no file's name"),
         ("mesh.file = 'empty.obj'", [], "mesh.file", "empty.obj, the file is empty"),
         ("mesh.file = 'teapot'\nexponent = 3", [], "exponent", "unknown key"),
-        ("pipeline = {method = 'chord', operand = 'cosine'}", [], "pipeline.operand", "leave it out"),
+        ("pipeline = {method = 'angular', operand = 'cosine'}", [], "pipeline.operand", "leave it out"),
         ("pipeline.setup_interval = 26", ["--method", "linear"], "pipeline.setup_interval", "linear"),
         ("lights = [{direction = [1, 1, 1], color = 30}]", [], "lights", "make the light darker"),
         (OVER_THE_CENTRE.replace("9", "0"), [], "camera.position", "its target"),
@@ -201,7 +201,7 @@ def test_point_lights(folder, refused, capsys):
     capsys.readouterr()
     what = "need the values of a span; use method chord-local"
     refused("render", "teapot", "--point-light", "3,4,5", thing="--method quotient", says=what)
-    refused("render", "a.toml", "--method", "chord", thing="--method chord", says=what)
+    refused("render", "a.toml", "--method", "linear", thing="--method linear", says=what)
     spot = ["--spot-light", "3,4,5,-3,-3,-5,8,14,1,1,1,0.5,0.1,0", "--method", "chord-local"]
     assert main(["render", "teapot", *spot, "--size", "48x36", "-o", "c.png", "--json", "a.json"]) == 0
     assert json.loads(Path("a.json").read_text())["method_error"]["max_lsb"] < 1

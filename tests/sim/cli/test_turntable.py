@@ -122,7 +122,7 @@ def test_end_of_a_turntable(way):
 
 @pytest.mark.long
 def test_specialised_turntable(folder, capsys):
-    options = ["--method", "chord", "--specialise", "--size", "32x24", "--frames", "2", "--jobs", "1"]
+    options = ["--method", "renormalise", "--specialise", "--size", "32x24", "--frames", "2", "--jobs", "1"]
     assert main(["render", "teapot", *options, "-o", "a.gif"]) == 0
     assert main(["render", "teapot", *[o for o in options if o != "--specialise"], "-o", "b.gif"]) == 0
     for number in (1, 2):

@@ -66,8 +66,8 @@ _OF_TYPE = {
     "Number": [*split("|x|nan|inf|-1|1,2|ż|1e999"), _LONG],
     "Vector": [*_BAD_VECTORS, "," * 5000, _LONG],
     "Color": [*_BAD_COLORS, _LONG],
-    "Choice": [*_ODD, "1", "LINEAR", "linear,chord"],
-    "_Some": [*_ODD, ",", "linear,,chord", "1.5", "17,x"],
+    "Choice": [*_ODD, "1", "LINEAR", "linear,angular"],
+    "_Some": [*_ODD, ",", "linear,,angular", "1.5", "17,x"],
     "Path": _BAD_FOLDERS,
     "BoolParamType": ["x", ""],
 }

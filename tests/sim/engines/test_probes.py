@@ -8,6 +8,7 @@ from amaranth.sim import Simulator
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.lighting.specular import Specular
+from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import Spans
@@ -20,7 +21,7 @@ from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
 
-DESIGN = preset("chord", "cosquad", gate=True)
+DESIGN = preset("quadratic", "cosquad", operand="one_minus_cosine", gate=True)
 
 
 def spans_near(rng, count):
@@ -94,13 +95,13 @@ def test_beats_are_those_without_probes(observed):
 
 def test_needs_one_light():
     with pytest.raises(ValueError, match="one light"):
-        ObservedPipeline(preset("chord", "cosquad", lights=2, gate=True))
+        ObservedPipeline(preset("linear", "cosquad", lights=2, gate=True))
 
 
 @pytest.mark.parametrize(
     ("method", "model"),
     [
-        *(("chord", "cosquad"), ("chord", "lyon3_refitted"), ("linear", "exp")),
+        *(("linear", "cosquad"), ("linear", "lyon3_refitted"), ("linear", "exp")),
         *(("quadratic", "coscos4"), ("quadratic", "blinn_product")),
     ],
 )
@@ -109,8 +110,7 @@ def test_formats_fit(method, model):
     probes = {probe.name: probe for probe in probes_of(unit)}
     assert {"cosine", "highlight", "gated", "diffuse", "specular", "red", "r", "x", "last"} <= set(probes)
     assert isinstance(probes["specular"].shape, FixedShape)
-    assert ("highlight_0_sum" in probes) == (method == "chord")
-    assert ("normal_2_sum" in probes) == (method != "chord")
+    assert "normal_2_sum" in probes
     assert ("argument" in probes) == (model != "blinn_product")
     assert ("base" in probes) == (model in ("cosquad", "lyon3_refitted"))
     assert ("square_3" in probes) == (model == "lyon3_refitted")
@@ -127,7 +127,8 @@ def test_words_are_those_of_the_model(observed):
 
     vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
     ends = [Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right)]
-    operands = DESIGN.interpolator.compute(*ends, spans.length, *vectors, Fixed(COMPONENT, spans.middle))
+    operands = DESIGN.interpolator.compute(*ends, spans.length, *vectors)
+    normals, _ = DESIGN.interpolator.normals(*ends, spans.length)
     lit = np.repeat(DESIGN.lit_spans(spans, constants)[:, 0], spans.length)
     cosine, u = operands.cosine.codes[:, 0], operands.highlight.codes[:, 0]
     dark = (cosine <= 0) | ~lit
@@ -143,8 +144,7 @@ def test_words_are_those_of_the_model(observed):
         "b": pixels.color[:, 2],
         "x": pixels.x,
         "last": pixels.last,
-        "diffuse_0_sum": cosine,
-        "highlight_0_sum": u,
+        **{f"normal_{c}_sum": normals.codes[:, c] for c in range(3)},
     }
     for probe in probes_of(observed.unit):
         if probe.name not in expected:
@@ -152,9 +152,8 @@ def test_words_are_those_of_the_model(observed):
         for clock, n in numbers.items():
             code = int(rows[clock + probe.age][probe.name])
             if probe.name.endswith("_sum"):
-                # That of N·L has the half step that makes a cut of the rounding, that of u gets it behind.
-                half = 1 << 46 - 25 - 1 if probe.name.startswith("highlight") else 0
-                code = (code + half) >> 46 - 25
+                # It has the half step that makes a cut of the rounding.
+                code >>= DifferenceAccumulator().format.fraction_bits - COMPONENT.fraction_bits
             assert code == int(expected[probe.name][n]), (probe.name, clock, n)
 
     # What follows one word from another.

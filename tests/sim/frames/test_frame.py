@@ -313,7 +313,7 @@ def test_point_light_and_near_viewer(exponent):
     far = dataclasses.replace(scene, viewer="distant", lights=[Light((-2, 4, 3)), scene.lights[1]])
     assert np.abs(simulator.render(far).image.astype(int) - frame.image).max() > 20
     with pytest.raises(ValueError, match=r"^point lights and a near viewer need the method chord-local$"):
-        prepare(scene, preset("chord", "cosquad", lights=2))
+        prepare(scene, preset("renormalise", "cosquad", lights=2))
 
 
 @pytest.mark.parametrize("model", ["blinn", "cosquad"])

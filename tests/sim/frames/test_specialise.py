@@ -38,7 +38,7 @@ def scene_of(material=CLAY, lights=(KEY,), size=(600, 500), mesh=None, **options
 def full_of(scene, **options):
     options = {"gate": True, **options}
     counts = {"lights": max(len(scene.lights), 1), "materials": len(scene.materials)}
-    return preset(**{"method": "chord", "model": "cosquad"} | counts | options)
+    return preset(**{"method": "quadratic", "model": "cosquad"} | counts | options)
 
 
 def pixels_of(scene, design):
@@ -172,7 +172,7 @@ def test_factors_of_lights():
 
 def test_a_light_that_is_off_costs_nothing():
     """No span more, and in the compact style no cycle, in a pipeline that has it: its terms are 0."""
-    design, found = preset("chord", "blinn", lights=2, style="compact"), []
+    design, found = preset("quadratic", "blinn", lights=2, style="compact"), []
     for lights in ((KEY,), (KEY, BLACK), (KEY, FILL)):
         scene = scene_of(lights=lights, size=(60, 50))
         spans, (constants,) = prepare(scene, design).spans, constants_of(scene, design)

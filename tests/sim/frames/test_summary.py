@@ -40,7 +40,7 @@ def figures(model, target, bound=0.92, border=3):
     return {
         **errors,
         **{"mesh": "teapot", "triangles": 9, "width": 16, "height": 12, "lights": 1, "materials": 1},
-        **{"method": "chord", "model": model, "exponent": 50, "roughness": None, "engine": "cxxrtl"},
+        **{"method": "quadratic", "model": model, "exponent": 50, "roughness": None, "engine": "cxxrtl"},
         **{"cycles": 9, "pixels": 9, "cycles_per_pixel": 1.0, "visible_pixels": 9, "spans": 3},
         **{"target": target, "bound_lsb": bound, "border": "|N.L| at most 0.002", "border_pixels": border},
         "step_lsb": 0.0,

@@ -101,7 +101,7 @@ def test_columns_are_the_ports(design):
 
 def test_frame_shows_every_light_and_material():
     """Pixels change with each; one span is empty."""
-    design = preset("chord", "cosquad", lights=3, materials=4)
+    design = preset("quadratic", "cosquad", lights=3, materials=4)
     spans, constants, pixels = teapot_frame(design)
     assert np.flatnonzero(spans.length == 0).tolist() == [0]
     assert set(spans.material) == set(range(4))
@@ -129,7 +129,7 @@ def test_what_is_in_the_folder(made):
     ):
         assert f"| `{table}.csv` | {len(rows(made / 'vectors' / f'{table}.csv'))} {counted}" in readme
     status = rows(made / "vectors" / "status.csv")
-    expected = {"out_of_range_spans": 0, "wide_spans": 0, "empty_spans": 1, "overrun": 0}
+    expected = {"out_of_range_spans": 0, "empty_spans": 1, "overrun": 0}
     assert status == [{f"status_{name}": count for name, count in expected.items()}]
 
 

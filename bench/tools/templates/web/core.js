@@ -265,9 +265,8 @@ const blyskCore = () => {
     };
   }
 
-  // Normals along a span, from the codes of its ends: a function of t that fills `normal`. "three" goes through the true
-  // normal in the middle, as the values of the chord method do; "exact" ones are those of the surface. Written out a
-  // component at a time, as it is called for every span of every frame.
+  // Normals along a span, from the codes of its ends: a function of t that fills `normal`. "exact" ones are those of the
+  // surface. Written out a component at a time, as it is called for every span of every frame.
   function curveOf(kind, spans, span, one, normal) {
     const { codes } = spans;
     const lx = codes["normal_left.0"][span] / one;
@@ -278,12 +277,9 @@ const blyskCore = () => {
     const rz = codes["normal_right.2"][span] / one;
     const cosine = lx * rx + ly * ry + lz * rz;
     const opposite = 1 + cosine <= 1e-12;
-    if (kind === "quadratic" || kind === "three") {
+    if (kind === "quadratic") {
       const share = opposite ? 0 : 1 / Math.sqrt(2 * (1 + cosine));
-      const [mx, my, mz] =
-        kind === "three"
-          ? [0, 1, 2].map((c) => codes[`normal_middle.${c}`][span] / one)
-          : [(lx + rx) * share, (ly + ry) * share, (lz + rz) * share];
+      const [mx, my, mz] = [(lx + rx) * share, (ly + ry) * share, (lz + rz) * share];
       const [gx, gy, gz] = [2 * (lx + rx - 2 * mx), 2 * (ly + ry - 2 * my), 2 * (lz + rz - 2 * mz)];
       const [px, py, pz] = [4 * mx - 3 * lx - rx, 4 * my - 3 * ly - ry, 4 * mz - 3 * lz - rz];
       return (t) => {

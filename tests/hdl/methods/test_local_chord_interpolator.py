@@ -1,7 +1,7 @@
 # amaranth: UnusedElaboratable=no
-"""The chord method: multipliers, latencies, a pixel in every cycle for spans of any length, resets.
+"""The local chord method: multipliers, latencies, a pixel in every cycle for spans of any length, resets.
 
-`tests.test_units` holds both units against their models under stalls.
+`tests.test_units` holds the unit against its model under stalls.
 """
 
 from functools import cache
@@ -9,40 +9,31 @@ from functools import cache
 import numpy as np
 import pytest
 
-from blysk.golden.methods.chord_interpolator import ChordInterpolator
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.methods.chord_interpolator import ChordInterpolatorUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.methods.chord_interpolator import RECORD as CHORD
-from blysk.sim.units.methods.chord_interpolator import gated
-from blysk.sim.units.methods.local_chord_interpolator import RECORD as LOCAL
+from blysk.sim.units.methods.local_chord_interpolator import RECORD, gated
 
 from ...checks import assert_beats_equal, resets, words_of
 
 
-def chord(lights=1, **options):
-    return ChordInterpolatorUnit(ChordInterpolator(), lights, **options)
-
-
-def local(lights=1, **options):
+def make(lights=1, **options):
     return LocalChordInterpolatorUnit(LocalChordInterpolator(), lights, **options)
 
 
 CI = [pytest.mark.long, pytest.mark.ci]
-RECORDS = {chord: CHORD, local: LOCAL}
 
 
 @cache
-def unit_of(make, with_gate=False):
+def unit_of(with_gate=False):
     """One light, by the default options, the same for all tests: it is compiled once."""
     return make(gate=gated(1)) if with_gate else make()
 
 
-def case_of(make, unit, length, seed=1):
+def case_of(unit, length, seed=1):
     """Spans of these lengths, most of which fit."""
-    case = RECORDS[make].stimuli["last bits"].make(unit, np.random.default_rng(seed), len(length))
+    case = RECORD.stimuli["last bits"].make(unit, np.random.default_rng(seed), len(length))
     case.beats["length"][:] = length
     return case
 
@@ -50,28 +41,24 @@ def case_of(make, unit, length, seed=1):
 # Multipliers, latency and cycles.
 
 FIGURES = {
-    (chord, 1, 3): (9, 36),
-    (chord, 1, 9): (4, None),
-    (chord, 1, 18): (3, None),
-    (chord, 2, 3): (18, None),
-    (local, 1, 1): (6, None),
-    (local, 1, 3): (2, 25),
-    (local, 1, 6): (2, None),
-    (local, 2, 3): (5, None),
+    (1, 1): (6, None),
+    (1, 3): (2, 25),
+    (1, 6): (2, None),
+    (2, 3): (5, None),
 }
 """Multipliers and latency, of numbers of lights and setup intervals."""
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("make", "lights", "interval"), FIGURES)
-def test_multipliers_and_latency(make, lights, interval):
+@pytest.mark.parametrize(("lights", "interval"), FIGURES)
+def test_multipliers_and_latency(lights, interval):
     """All of 18 bits; none of them a pixel's. The first pixel of a long span comes after the latency."""
     unit = make(lights, setup_interval=interval)
-    multipliers, latency = FIGURES[make, lights, interval]
+    multipliers, latency = FIGURES[lights, interval]
     assert unit.multipliers == multipliers
     assert cost_of(unit).multipliers == {(18, 18): multipliers}
     assert latency in (unit.latency, None)
-    case = case_of(make, unit, [3, 1])
+    case = case_of(unit, [3, 1])
     run = simulate(unit, case.beats, count=4, constants=case.constants, engine="auto")
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
 
@@ -96,29 +83,27 @@ LENGTHS = {
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("make", [chord, local])
 @pytest.mark.parametrize("length", runs_of(LENGTHS))
 @pytest.mark.parametrize("with_gate", [pytest.param(True, marks=pytest.mark.ci), False])
-def test_a_pixel_in_every_cycle(make, length, with_gate):
+def test_a_pixel_in_every_cycle(length, with_gate):
     """Spans of any length, mixed: from the first pixel of a long span on one in every cycle."""
-    unit = unit_of(make, with_gate)
+    unit = unit_of(with_gate)
     # A span of three pixels comes first: short ones then wait for it, and none comes before its turn.
     length = np.array([3, *length])
-    case = case_of(make, unit, length)
+    case = case_of(unit, length)
     run = simulate(unit, case.beats, count=int(length.sum()), constants=case.constants, engine="auto")
-    assert_beats_equal(run.beats, RECORDS[make].expect(unit, case))
+    assert_beats_equal(run.beats, RECORD.expect(unit, case))
     np.testing.assert_array_equal(run.cycles, run.cycles[0] + np.arange(length.sum()))
     assert run.cycles[0] == run.input_cycles[0] + unit.latency
 
 
 @pytest.mark.ci
 @pytest.mark.long
-@pytest.mark.parametrize("make", [chord, local])
 @pytest.mark.parametrize("length", [1, 2])
-def test_short_spans_come_sooner(make, length):
+def test_short_spans_come_sooner(length):
     """By the cycles of the setup: nothing of them goes through it."""
-    unit = unit_of(make)
-    case = case_of(make, unit, np.full(50, length))
+    unit = unit_of()
+    case = case_of(unit, np.full(50, length))
     run = simulate(unit, case.beats, count=50 * length, constants=case.constants, engine="auto")
     np.testing.assert_array_equal(run.cycles, run.cycles[0] + np.arange(50 * length))
     setup = unit._spans
@@ -127,28 +112,11 @@ def test_short_spans_come_sooner(make, length):
 
 @pytest.mark.ci
 @pytest.mark.long
-@pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (9, 18))])
-def test_cycles_of_a_span(interval):
-    """A span of k pixels takes ``min(k, 3)`` turns of the values, or its pixels, whichever is more."""
-    unit = chord(setup_interval=interval)
-    for length in (1, 2, 3, 4, 9, 20, 40):
-        count = 30
-        case = case_of(chord, unit, np.full(count, length))
-        run = simulate(unit, case.beats, count=count * length, constants=case.constants, engine="auto")
-        ends = run.cycles[length - 1 :: length]
-        cycles = max(min(length, 3) * interval // 3, length)
-        # Values, setup and accumulators take spans side by side, so that the slowest counts.
-        np.testing.assert_array_equal(np.diff(ends)[5:], cycles)
-
-
-@pytest.mark.ci
-@pytest.mark.long
-@pytest.mark.parametrize("make", [chord, local])
-def test_waiting_output_holds_the_input(make):
+def test_waiting_output_holds_the_input():
     """While no pixel is taken as many spans enter as fit, then none; afterwards all leave in a row."""
-    unit = unit_of(make)
+    unit = unit_of()
     length = np.tile([4, 1, 3, 2], 40)
-    case = case_of(make, unit, length)
+    case = case_of(unit, length)
     stalls = np.zeros(2000, dtype=bool)
     stalls[30:530] = True
     run = simulate(
@@ -159,7 +127,7 @@ def test_waiting_output_holds_the_input(make):
         engine="auto",
         output_stalls=stalls,
     )
-    assert_beats_equal(run.beats, RECORDS[make].expect(unit, case))
+    assert_beats_equal(run.beats, RECORD.expect(unit, case))
     entered = np.count_nonzero((run.input_cycles >= 200) & (run.input_cycles < 530))
     assert entered == 0
     after = run.cycles[run.cycles >= 530]
@@ -168,11 +136,10 @@ def test_waiting_output_holds_the_input(make):
 
 @pytest.mark.ci
 @pytest.mark.long
-@pytest.mark.parametrize("make", [chord, local])
-def test_reset_in_mid_span_leaves_nothing(make):
-    """Resets at every stage of a span, also between its three normals: the spans then come as at first."""
+def test_reset_in_mid_span_leaves_nothing():
+    """Resets at every stage of a span: the spans then come as at first."""
     unit, count = make(), 12
-    case = case_of(make, unit, np.tile([5, 1, 2, 3], 4))
+    case = case_of(unit, np.tile([5, 1, 2, 3], 4))
     befores = (1, 2, 3, 4, 5, 14, 17, 28, 30, 42, 47, 52)
     found = resets(unit, case, befores, cycles=110, count=count)
-    assert [word for _, word in found] == words_of(unit.o, RECORDS[make].expect(unit, case.first(count)))
+    assert [word for _, word in found] == words_of(unit.o, RECORD.expect(unit, case.first(count)))
