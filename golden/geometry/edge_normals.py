@@ -1,4 +1,4 @@
-"""Edge normals ([T] figure 4.10): unit normals at both ends and in the middle of every piece of a span."""
+"""Edge normals ([T] figure 4.10): unit normals at both ends of every piece of a span."""
 
 from dataclasses import dataclass, field
 from typing import Self
@@ -57,7 +57,7 @@ class PlacedSpans:
 
 @dataclass(frozen=True)
 class TrueSpans(PlacedSpans):
-    """Spans with three unit normals each.
+    """Spans with two unit normals each.
 
     Parameters
     ----------
@@ -65,9 +65,8 @@ class TrueSpans(PlacedSpans):
         As in `PlacedSpans`.
     depth_last : int64 array, shape (S,)
         Depth at the last pixel, UQ(24, 9).
-    normal_left, normal_middle, normal_right : int64 arrays, shape (S, 3)
-        Unit normals, SQ(1, 17), at the first pixel's centre, half-way to the last one's, and at the last
-        one's. In a span of 1 pixel all three are the left one; in a span of 2 the middle is the right one.
+    normal_left, normal_right : int64 arrays, shape (S, 3)
+        Unit normals, SQ(1, 17), at the first pixel's centre and at the last one's.
     line_left, line_right : int64 arrays, shape (S, 3)
         N/W at the first and at the last pixel, `SPAN_NORMAL`: the normals with their magnitudes. The straight
         line between them is perspective-correct. Where ``flip`` is set they point against the unit normals.
@@ -77,7 +76,6 @@ class TrueSpans(PlacedSpans):
 
     depth_last: np.ndarray
     normal_left: np.ndarray
-    normal_middle: np.ndarray
     normal_right: np.ndarray
     line_left: np.ndarray
     line_right: np.ndarray
@@ -86,15 +84,13 @@ class TrueSpans(PlacedSpans):
 
 @dataclass(frozen=True)
 class EdgeNormals:
-    """Unit normals of pieces by `VectorNormaliser`: left, right from 2 pixels on, middle from 3 pixels on.
+    """Unit normals of pieces by `VectorNormaliser`: left, and right from 2 pixels on.
 
-    N/W is linear along a scanline, and normalising takes 1/W away: all three are the perspective-correct
-    normals. The middle one is that of ``(left + right) / 2``, cut to 26 fraction bits, at half the way
-    between the first and the last pixel's centre.
+    N/W is linear along a scanline, and normalising takes 1/W away: both are the perspective-correct normals.
 
     A normal is lost where opposite normals cancel, or where a corner has none. It is repaired: the normal
-    before it takes its place, in the order of the pieces and within a piece of left, right, middle. Before
-    the first of all stands (0, 0, `ONE`), `FIRST`. Repaired normals are counted.
+    before it takes its place, in the order of the pieces and within a piece of left, right. Before the first
+    of all stands (0, 0, `ONE`), `FIRST`. Repaired normals are counted.
 
     Parameters
     ----------
@@ -116,21 +112,19 @@ class EdgeNormals:
         pieces : Pieces
             From `SpanAttributes`.
         """
-        middle = (pieces.left + pieces.right).scale(-1).truncate(SPAN_NORMAL.fraction_bits)
-        vectors = np.stack([pieces.left.codes, pieces.right.codes, middle.codes], axis=1)
+        vectors = np.stack([pieces.left.codes, pieces.right.codes], axis=1)
         flip = np.broadcast_to(pieces.flip[:, np.newaxis], vectors.shape[:2])
         normals, lost = self.normaliser.compute(Fixed(SPAN_NORMAL, vectors), flip)
-        made = pieces.length[:, np.newaxis] > np.arange(3)
+        made = pieces.length[:, np.newaxis] > np.arange(2)
         repaired = int((lost & made).sum())
         # A normal that is lost, or that the piece is too short for, is replaced by the last good one.
         good = np.r_[True, (made & ~lost).ravel()]
         codes = np.vstack([self.FIRST, normals.codes.reshape(-1, 3)])
-        codes = codes[np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))][1:].reshape(-1, 3, 3)
+        codes = codes[np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))][1:].reshape(-1, 2, 3)
         spans = TrueSpans.of(
             pieces,
             depth_last=pieces.depth_last.codes,
             normal_left=codes[:, 0],
-            normal_middle=codes[:, 2],
             normal_right=codes[:, 1],
             line_left=pieces.left.codes,
             line_right=pieces.right.codes,

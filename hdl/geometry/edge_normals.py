@@ -1,4 +1,4 @@
-"""Edge normals ([T] figure 4.10): unit normals at both ends and in the middle of every piece of a span."""
+"""Edge normals ([T] figure 4.10): unit normals at both ends of every piece of a span."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, fifo, stream, wiring
@@ -17,18 +17,18 @@ __all__ = ["EdgeNormalsUnit", "true_spans_shape"]
 
 
 def true_spans_shape() -> data.StructLayout:
-    """Shape of `TrueSpans.beats`: a span with its three unit normals, and N/W at both ends."""
+    """Shape of `TrueSpans.beats`: a span with its two unit normals, and N/W at both ends."""
     line = data.ArrayLayout(FixedShape(SPAN_NORMAL), 3)
-    normals = {name: normal_shape() for name in ("normal_left", "normal_middle", "normal_right")}
+    normals = {name: normal_shape() for name in ("normal_left", "normal_right")}
     return data.StructLayout(normals | {"line_left": line, "line_right": line} | span_words_shape())
 
 
 class EdgeNormalsUnit(wiring.Component):
-    """Normalises the ends and the middle of a piece one after the other: `EdgeNormals` is the model.
+    """Normalises the ends of a piece one after the other: `EdgeNormals` is the model.
 
-    A piece of one pixel takes one cycle, of two pixels two, of more three: one for each normal. The span of
-    one pixel is offered `latency` cycles, 20, after its piece is taken in, and one cycle later for each
-    further normal. Six multipliers, those of `VectorNormaliserUnit`.
+    A piece of one pixel takes one cycle, of more two: one for each normal. The span of one pixel is offered
+    `latency` cycles, 20, after its piece is taken in, and others one cycle later. Six multipliers, those of
+    `VectorNormaliserUnit`.
 
     In the *compact* style a normal takes `COMPACT_INTERVAL` cycles and the latency is 32; three multipliers,
     those of `SharedVectorNormaliserUnit`. The other words of a span stay in a FIFO until the span is taken.
@@ -88,13 +88,12 @@ class EdgeNormalsUnit(wiring.Component):
         return m
 
     def _send(self, m: Module, normaliser, rest) -> None:
-        """Send the left, right and middle vector of the piece in the register, as many as it needs."""
-        busy, turn, last = Signal(name="busy"), Signal(2, name="turn"), Signal(name="last_turn")
+        """Send the left vector of the piece in the register, and the right one of more than one pixel."""
+        busy, turn, last = Signal(name="busy"), Signal(name="turn"), Signal(name="last_turn")
         piece, moves = Signal(self.i.payload.shape(), name="piece"), Signal(name="moves")
-        middle = Signal(data.ArrayLayout(FixedShape(SPAN_NORMAL), 3), name="middle")
         m.d.comb += [
-            last.eq(turn == Mux(piece.length > 2, 2, piece.length - 1)),
-            normaliser.i.valid.eq(busy & ((turn != 0) | rest.w_rdy)),
+            last.eq(turn | (piece.length == 1)),
+            normaliser.i.valid.eq(busy & (turn | rest.w_rdy)),
             moves.eq(normaliser.i.valid & normaliser.i.ready),
             self.i.ready.eq(~busy if self.compact else ~busy | (moves & last)),
             rest.w_data.eq(
@@ -102,7 +101,7 @@ class EdgeNormalsUnit(wiring.Component):
             ),
             normaliser.i.payload.flip.eq(piece.flip),
         ]
-        begins = moves & (turn == 0)
+        begins = moves & ~turn
         if self.compact:
             # A cycle later: the piece stays for another cycle at least, and the next one begins later still.
             begun = Signal(name="begun")
@@ -110,14 +109,12 @@ class EdgeNormalsUnit(wiring.Component):
             begins = begun
         m.d.comb += rest.w_en.eq(begins)
         for k in range(3):
-            ends = Value.cast(piece.left[k]).as_signed(), Value.cast(piece.right[k]).as_signed()
-            m.d.sync += Value.cast(middle[k]).eq((ends[0] + ends[1]) >> 1)
-            chosen = Mux(turn[1], Value.cast(middle[k]), Mux(turn[0], ends[1], ends[0]))
+            chosen = Mux(turn, Value.cast(piece.right[k]), Value.cast(piece.left[k]))
             m.d.comb += Value.cast(normaliser.i.payload.vector[k]).eq(chosen)
         with m.If(self.i.ready):
             m.d.sync += [busy.eq(self.i.valid), turn.eq(0), piece.eq(self.i.payload)]
         with m.Elif(moves):
-            m.d.sync += turn.eq(turn + 1)
+            m.d.sync += turn.eq(1)
             if self.compact:
                 m.d.sync += busy.eq(~last)
 
@@ -125,28 +122,27 @@ class EdgeNormalsUnit(wiring.Component):
         """Collect normals, with lost ones replaced; whether one is replaced on this cycle."""
         valid, result = Signal(name="valid"), Signal(self.o.payload.shape(), name="result")
         good = Signal(normal_shape(), name="good", init=_init())
-        left, right = (Signal(normal_shape(), name=name) for name in ("left_normal", "right_normal"))
-        turn, last, moves, advance = Signal(2), Signal(), Signal(name="takes"), Signal(name="advance")
+        left = Signal(normal_shape(), name="left_normal")
+        turn, last, moves, advance = Signal(), Signal(), Signal(name="takes"), Signal(name="advance")
         lost = normaliser.o.payload.lost
         normal = Signal(normal_shape(), name="normal")
         m.d.comb += [
             advance.eq(skid_buffer(m, self.o, valid, result)),
-            last.eq(turn == Mux(words.length > 2, 2, words.length - 1)),
+            last.eq(turn | (words.length == 1)),
             normaliser.o.ready.eq(advance & rest.r_rdy),
             moves.eq(normaliser.o.valid & normaliser.o.ready),
             rest.r_en.eq(moves & last),
             Value.cast(normal).eq(Mux(lost, Value.cast(good), Value.cast(normaliser.o.payload.normal))),
         ]
         with m.If(moves):
-            m.d.sync += [good.eq(normal), turn.eq(Mux(last, 0, turn + 1)), right.eq(normal)]
-            with m.If(turn == 0):
+            m.d.sync += [good.eq(normal), turn.eq(~last)]
+            with m.If(~turn):
                 m.d.sync += left.eq(normal)
         with m.If(advance):
             m.d.sync += [
                 valid.eq(moves & last),
-                Value.cast(result.normal_left).eq(Mux(turn == 0, Value.cast(normal), Value.cast(left))),
-                Value.cast(result.normal_right).eq(Mux(turn[1], Value.cast(right), Value.cast(normal))),
-                result.normal_middle.eq(normal),
+                Value.cast(result.normal_left).eq(Mux(turn, Value.cast(left), Value.cast(normal))),
+                result.normal_right.eq(normal),
                 result.line_left.eq(words.left),
                 result.line_right.eq(words.right),
                 *(result[name].eq(words[name]) for name in span_words_shape()),
@@ -157,30 +153,28 @@ class EdgeNormalsUnit(wiring.Component):
         """The same without a register for the result: the other words of a span come from the FIFO itself."""
         valid, result = Signal(name="valid"), self.o.payload
         good = Signal(normal_shape(), name="good", init=_init())
-        left, right = (Signal(normal_shape(), name=name) for name in ("left_normal", "right_normal"))
-        turn, last, moves = Signal(2, name="turn"), Signal(name="last_normal"), Signal(name="takes")
+        left = Signal(normal_shape(), name="left_normal")
+        turn, last, moves = Signal(name="turn"), Signal(name="last_normal"), Signal(name="takes")
         # The FIFO moves on in the cycle after the span is taken.
         gone = Signal(name="gone")
         m.d.sync += gone.eq(self.o.valid & self.o.ready)
         lost = normaliser.o.payload.lost
         normal = Signal(normal_shape(), name="normal")
         m.d.comb += [
-            last.eq(turn == Mux(words.length > 2, 2, words.length - 1)),
+            last.eq(turn | (words.length == 1)),
             normaliser.o.ready.eq(~valid & ~gone & rest.r_rdy),
             moves.eq(normaliser.o.valid & normaliser.o.ready),
             rest.r_en.eq(gone),
             Value.cast(normal).eq(Mux(lost, Value.cast(good), Value.cast(normaliser.o.payload.normal))),
             self.o.valid.eq(valid),
-            *(result.normal_left.eq(left), result.normal_middle.eq(good), result.normal_right.eq(right)),
+            *(result.normal_left.eq(left), result.normal_right.eq(good)),
             *(result.line_left.eq(words.left), result.line_right.eq(words.right)),
             *(result[name].eq(words[name]) for name in span_words_shape()),
         ]
         with m.If(moves):
-            m.d.sync += [good.eq(normal), turn.eq(Mux(last, 0, turn + 1)), valid.eq(last)]
-            with m.If(turn == 0):
+            m.d.sync += [good.eq(normal), turn.eq(~last), valid.eq(last)]
+            with m.If(~turn):
                 m.d.sync += left.eq(normal)
-            with m.If(~turn[1]):
-                m.d.sync += right.eq(normal)
         with m.Elif(self.o.ready):
             m.d.sync += valid.eq(0)
         return moves & lost

@@ -30,7 +30,6 @@ __all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
 
 PORT_DESCRIPTIONS = {
     "normal_left": "unit normal at the first pixel; of a true line its end, N/W",
-    "normal_middle": "unit normal in the middle",
     "normal_right": "unit normal at the last pixel; of a true line its end, N/W",
     "start": "N/W at the first pixel, in the frame of the light",
     "step": "its step to the next pixel, times 2^exponent",

@@ -17,7 +17,7 @@ FRAME = Frame(-200, -200, 200, 200)
 
 
 def test_normals_within_the_bound():
-    """Left, right and middle: the error of N/W over its length, and that of the normaliser."""
+    """Left and right: the error of N/W over its length, and that of the normaliser."""
     stages = Stages(random_triangles(np.random.default_rng(1), 2000, size=20.0, spread=0.3), FRAME)
     pieces, (spans, repaired) = stages.pieces, EdgeNormals().compute(stages.pieces)
     source = stages.drawn.source[pieces.triangle]
@@ -29,9 +29,6 @@ def test_normals_within_the_bound():
     for at, name in ((0, "normal_left"), (pieces.length - 1, "normal_right")):
         line = attribute_at(stages.triangles, source, pieces.x + at + FRAME.left, pieces.y + FRAME.top, GRID)
         assert_normals(getattr(spans, name), line[:, :3] * 2.0**-23, bound, pieces.flip, usual)
-    long = usual & (pieces.length > 2)
-    middle = (pieces.left.values + pieces.right.values) / 2
-    assert_normals(spans.normal_middle, middle, np.full(len(bound), 2.0**-26), pieces.flip, long)
     assert repaired < 20
 
 
@@ -72,7 +69,7 @@ def test_opposite_normals_are_repaired():
     spans, repaired = EdgeNormals().compute(stages.pieces)
     assert repaired > 100
     assert spans.length.sum() == stages.clipped.length.sum()
-    length = np.linalg.norm(np.stack([spans.normal_left, spans.normal_right, spans.normal_middle]), axis=-1)
+    length = np.linalg.norm(np.stack([spans.normal_left, spans.normal_right]), axis=-1)
     assert np.abs(length / ONE - 1).max() < VectorNormaliser.LENGTH_ERROR
 
 
