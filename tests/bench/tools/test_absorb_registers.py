@@ -185,12 +185,14 @@ READS = {
 """Tables, and how many of their words have a register inside."""
 
 
-def quick(names, some):
-    """Names, all but some of them for the long run."""
-    return [name if name in some else pytest.param(name, marks=pytest.mark.long) for name in names]
+def often(names, some):
+    """Names, for the long run; CI has some of them."""
+    return [
+        pytest.param(name, marks=[pytest.mark.long] + [pytest.mark.ci] * (name in some)) for name in names
+    ]
 
 
-@pytest.mark.parametrize("name", quick(READS, ("another enable",)))
+@pytest.mark.parametrize("name", often(READS, ("another enable",)))
 def test_registers_behind_a_memory(name, mapped, tmp_path):
     component, words = READS[name]
     before = mapped(f"read, {name}", component)
@@ -208,7 +210,7 @@ MEMORY_FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", quick(MEMORY_FAULTS, ("register always enabled",)))
+@pytest.mark.parametrize("fault", often(MEMORY_FAULTS, ("register always enabled",)))
 def test_faults_injected_in_a_memory_are_found(fault, mapped, tmp_path):
     name = "the same enable"
     before = mapped(f"read, {name}", READS[name][0])
@@ -263,7 +265,7 @@ def multipliers(netlist):
     return [cell for cell in netlist["modules"]["top"]["cells"].values() if cell["type"] == "MULT18X18D"]
 
 
-@pytest.mark.parametrize("name", quick(CASES, ("three enables",)))
+@pytest.mark.parametrize("name", often(CASES, ("three enables",)))
 def test_what_moves_and_that_nothing_else_changes(name, mapped, tmp_path):
     describe, expected = CASES[name]
     before = mapped(name, Beside(describe))
@@ -287,6 +289,8 @@ def test_a_register_between_two_multipliers_goes_into_one(mapped, tmp_path):
     assert same(before, after, tmp_path) == ""
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_registers_at_ports_stay(mapped, tmp_path):
     """They stand for those of other units."""
 
@@ -336,7 +340,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", quick(FAULTS, ("enable of another",)))
+@pytest.mark.parametrize("fault", often(FAULTS, ("enable of another",)))
 def test_injected_faults_are_found(fault, mapped, tmp_path):
     before = mapped("three enables", Beside(CASES["three enables"][0]))
     after, _ = absorb_registers(before)
@@ -346,6 +350,8 @@ def test_injected_faults_are_found(fault, mapped, tmp_path):
     assert "not shown to be equal" in same(before, after, tmp_path)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_a_register_of_another_reader_that_is_removed_is_found(mapped, tmp_path):
     name = "another reader of an operand"
     before = mapped(name, Beside(CASES[name][0]))
@@ -367,6 +373,8 @@ def test_an_inverter_that_does_not_invert_is_found(mapped, tmp_path):
     assert "not shown to be equal" in same(before, after, tmp_path)
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_a_power_up_value_that_is_lost_is_found(mapped, tmp_path):
     """The same netlist but for a register that starts at 1: what is absorbed would start at 0."""
     before = mapped("no enable", Beside(CASES["no enable"][0]))

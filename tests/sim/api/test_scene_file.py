@@ -282,6 +282,8 @@ ODD = [
 ]
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_mutated_files_are_read_or_refused_in_one_line(write, data):

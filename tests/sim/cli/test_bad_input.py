@@ -63,12 +63,6 @@ def check(rows):
     assert all(row["status"] == 0 for row in rows if row["name"].startswith("good "))
 
 
-def test_some_malformed_input(tmp_path):
-    rows = attempts(tmp_path, seed=1, files=15, every=200)
-    assert len(rows) > 30
-    check(rows)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("files", "every", "least"), [pytest.param(250, 4, 500, marks=pytest.mark.ci), (20, 1, 900)]

@@ -32,6 +32,7 @@ NOBODY = 65534
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals, users and permissions"),
     pytest.mark.usefixtures("cache"),
+    *(pytest.mark.ci, pytest.mark.long),
 ]
 
 

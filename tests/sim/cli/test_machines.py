@@ -28,6 +28,8 @@ def blysk(*arguments, folder, launcher=(), **places):
     return done.returncode, done.stdout, done.stderr.splitlines()
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("places", "command"),
     [
@@ -65,6 +67,8 @@ def test_compiled_engine_without_a_cache(tmp_path):
     assert os.listdir(temporary) == []
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="needs another user")
 def test_user_of_no_name(tmp_path):
     """Neither HOME nor an entry among the users; `--help` of a command makes the caches, too."""
@@ -76,6 +80,8 @@ def test_user_of_no_name(tmp_path):
     assert "there is no home folder" in errors[0]
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_folder_that_cannot_be_written(tmp_path):
     """Found out before the mesh is read, and to the superuser as well."""
     status, _, errors = blysk(*RENDER, folder="/proc", HOME=str(tmp_path))
@@ -85,6 +91,8 @@ def test_folder_that_cannot_be_written(tmp_path):
     assert "; choose a" in errors[0]
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_folder_that_is_gone(tmp_path):
     gone = tmp_path / "gone"
     gone.mkdir()

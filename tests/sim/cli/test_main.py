@@ -106,6 +106,8 @@ def test_verilog(capsys):
     assert (again.stdout, again.stderr) == (text, "")
 
 
+@pytest.mark.ci
+@pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_interrupt():
     """Ctrl-C in a long run: one line, status 130, nothing left behind."""

@@ -183,7 +183,13 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("name", BROKEN)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name == "failing" else pytest.param(name, marks=[pytest.mark.ci, pytest.mark.long])
+        for name in BROKEN
+    ],
+)
 def test_broken_compiler(monkeypatch, tmp_path, cache, temporary, name):
     """One line, and nothing is left of what it wrote; the next compiler finds all as it was."""
     text, reason = BROKEN[name]

@@ -88,6 +88,8 @@ def generated(component, monkeypatch):
         return cxxrtl._generate(rtlil.convert(component, name="top", emit_src=False))
 
 
+@pytest.mark.ci
+@pytest.mark.long
 def test_the_machine_is_the_same(monkeypatch):
     """Against pysim, over four times the cycles that a new model is checked with, with stalls."""
     rng = np.random.default_rng(4)

@@ -149,8 +149,18 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    ("fault", "engine"),
+    [
+        pytest.param(
+            *(fault, engine),
+            # Each is a model of its own.
+            marks=[pytest.mark.ci, pytest.mark.long] * (engine == "cxxrtl" and fault != "drops"),
+        )
+        for fault in FAULTS
+        for engine in ("pysim", "cxxrtl")
+    ],
+)
 def test_faults_are_caught(fault, engine):
     with pytest.raises(SimulationError) as caught:
         simulate(Faulty(fault), pairs(20), count=20, engine=engine, output_stalls=ONE_STALL, idle_timeout=100)
