@@ -38,6 +38,9 @@ LONGEST = (
     *(f"tests/sim/engines/test_{name}.py" for name in ("cache", "compilers")),
     *("tests/sim/frames/test_animation.py", "tests/sim/frames/test_frame.py", "tests/sim/api/test_api.py"),
     *(f"tests/simulators/test_{name}.py" for name in ("mapped", "pipelines", "units")),
+    *(f"tests/bench/report/test_{name}.py" for name in ("report", "pairs", "points")),
+    *(f"tests/bench/tools/test_{name}.py" for name in ("web_browser", "place_and_route")),
+    "tests/bench/quality/test_mutants.py",
 )
 """Beginnings of the groups that take the longest: workers begin with them."""
 

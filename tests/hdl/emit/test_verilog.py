@@ -20,7 +20,7 @@ from .components import Alike, Awkward, Combinational, Everything, Stages, TwoCl
 PROJECT = Path(__file__).parents[3]
 APART = (
     *("dot_product", "difference_accumulator", "coarse_depth", "halfway_vector", "mirror_adapter"),
-    *("span_halver", "vector_adapter", "bisection_chain", "arccos", "chord", "half_chord"),
+    *("span_halver", "vector_adapter", "light_adapter", "bisection_chain", "arccos", "chord", "half_chord"),
 )
 """Two small units, and parts of other structures than those of the cores."""
 
