@@ -13,6 +13,9 @@ unexport PYTHONDONTWRITEBYTECODE
 # The tests compile their models; without a C++ compiler one comes from PyPI.
 TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang++),[test],[test$(COMMA)native])
 
+LINT := import tomllib; of = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+	print(*of["optional-dependencies"]["lint"], *(one for one in of["dependencies"] if one.startswith(("click", "numpy"))), sep="\n")
+
 .PHONY: demo test test-all test-long test-ci prove prove-ci decided mutants soak coverage bench pages site lint clean
 
 demo: $(VENV)/.installed
@@ -77,13 +80,24 @@ pages: $(VENV)/.installed
 site: pages $(VENV)/.installed-web
 	$(BIN)/blysk web -o site --pages build/pages
 
-lint: $(VENV)/.installed-test
+# Types are checked under the import name, which the folders have by links.
+lint: $(VENV)/.installed-lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	@mkdir -p build/types/blysk
+	@ln -sf ../../../golden ../../../hdl ../../../sim ../../../blysk/__init__.py build/types/blysk
+	MYPYPATH=build/types $(BIN)/mypy -p blysk.golden -p blysk.sim.api
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+# The tools, and the two libraries whose types the checked files use.
+$(VENV)/.installed-lint: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -c '$(LINT)' > $@.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $@.txt
 	touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed

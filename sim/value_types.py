@@ -145,11 +145,11 @@ class Whole(Value):
         self.least, self.most = least, most
         self.remedy = f"give a whole number from {least} to {most}"
 
-    def parse(self, text):
+    def parse(self, text: str) -> Any:
         """Number of a text of up to 18 digits, with a sign or without; other texts unchanged."""
         return int(text) if re.fullmatch(r"[+-]?[0-9]{1,18}", text) else text
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """An `int` in the range."""
         if isinstance(value, bool) or not isinstance(value, int):
             raise ValueError("not a whole number")
@@ -166,11 +166,11 @@ class Few(Whole):
         self.numbers = numbers
         self.remedy = f"give one of {', '.join(map(str, numbers))}"
 
-    def get_metavar(self, param, ctx=None):
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """Placeholder in the help text: the numbers."""
         return f"[{'|'.join(map(str, self.numbers))}]"
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """An `int` among them."""
         if super().check(value) not in self.numbers:
             raise ValueError("no such number")
@@ -186,11 +186,11 @@ class Number(Value):
         self.least, self.most = least, most
         self.remedy = f"give {least:g} to {most:g}{unit and f' {unit}'}"
 
-    def parse(self, text):
+    def parse(self, text: str) -> Any:
         """Number of a text, by the rules of Python's `float`."""
         return _floats(text, "not a number")[0] if "," not in text else text
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """A `float` in the range."""
         return _finite(value, self.least, self.most)
 
@@ -205,15 +205,15 @@ class Vector(Value):
         self.remedy = f"give {metavar}" + (", a vector other than 0" if direction else "")
 
     @property
-    def in_python(self):
+    def in_python(self) -> str:
         """Numbers, or the text."""
         return self.remedy.replace(f"give {self.name}", f'give {self.kind} or "{self.name}"', 1)
 
-    def parse(self, text):
+    def parse(self, text: str) -> Any:
         """Numbers with commas between them."""
         return _floats(text, f"not {self.kind}")
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """A tuple of `float`."""
         if not isinstance(value, list | tuple) or len(value) not in self.counts:
             raise ValueError(f"not {self.kind}")
@@ -234,18 +234,18 @@ class Color(Value):
         self.remedy = f"give #rrggbb, red, green and blue, or one number, each {limits}"
 
     @property
-    def in_python(self):
+    def in_python(self) -> str:
         """A text in quotes, or numbers."""
         return self.remedy.replace("#rrggbb", '"#rrggbb"')
 
-    def parse(self, text):
+    def parse(self, text: str) -> Any:
         """The channels, see `color_of_text`."""
         try:
             return color_of_text(text)
         except ValueError:
             raise ValueError("not a colour") from None
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """Three numbers of type `float`."""
         channels = value if isinstance(value, list | tuple) else [value] * 3
         if len(channels) != 3:
@@ -261,12 +261,12 @@ class Size(Value):
     in_python = f'give (width, height) or "WIDTHxHEIGHT", 1 to {LARGEST_SIDE} each'
     in_file = f'give [width, height] or "WIDTHxHEIGHT", 1 to {LARGEST_SIDE} each'
 
-    def parse(self, text):
+    def parse(self, text: str) -> Any:
         """Two numbers with an x between them."""
         match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
         return [int(match[1]), int(match[2])] if match else text
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """Two numbers of type `int`."""
         if not isinstance(value, list | tuple) or len(value) != 2:
             raise ValueError("not a size")
@@ -281,7 +281,7 @@ class Truth(Value):
     remedy = in_file = "give true or false"
     in_python = "give True or False"
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """A `bool`."""
         if not isinstance(value, bool):
             raise ValueError("neither true nor false")
@@ -304,11 +304,11 @@ class Choice(Value):
         self.names = tuple(names)
         self.remedy = f"use one of {', '.join(self.names)}"
 
-    def get_metavar(self, param, ctx=None):
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """The names."""
         return f"[{'|'.join(self.names)}]"
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """The name."""
         if not isinstance(value, str) or value not in self.names:
             raise ValueError("unknown")
@@ -318,7 +318,7 @@ class Choice(Value):
 class OutputFile(click.Path):
     """Name of a file to write; an empty name, as from a shell variable that is not set, is refused."""
 
-    def convert(self, value, param, ctx):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name."""
         if not value:
             raise InputError(f"{param.opts[-1]} ''", "is no file's name", "give one, or leave it out")

@@ -41,7 +41,7 @@ class Field:
     format: str = ""
     below: int | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 1 <= self.width <= 64:
             raise ValueError(f"a field of a layout must have 1 to 64 bits, not {self.width}")
 
@@ -101,7 +101,9 @@ class ByteLayout:
     @property
     def offsets(self) -> tuple[int, ...]:
         """Offset of each field in bytes."""
-        return tuple(self.dtype.fields[field.name][1] for field in self.fields)
+        places = self.dtype.fields
+        assert places is not None
+        return tuple(places[field.name][1] for field in self.fields)
 
     def pack(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Bytes of payloads, uint8 of shape (N, size).
@@ -146,7 +148,8 @@ class ByteLayout:
             (held[name] == codes).reshape(len(codes), -1).all(axis=1)
             for name, (_, codes) in self._numbers(data).items()
         ]
-        return np.logical_and.reduce(fit)
+        found: np.ndarray = np.logical_and.reduce(fit)
+        return found
 
     def _numbers(self, data: np.ndarray) -> dict[str, tuple[Field, np.ndarray]]:
         """Each field with its numbers as on the bus, not cut to the field's width."""

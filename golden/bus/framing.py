@@ -41,7 +41,7 @@ class Framing:
     made: ByteLayout
     packets: str = "span"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.packets not in PACKETS.values():
             raise ValueError(f"packets must be one of {', '.join(PACKETS.values())}, not {self.packets!r}")
 

@@ -173,7 +173,7 @@ def constant_registers(design: Design, axes: Sequence[str] = ()) -> list[Registe
     formats |= dict.fromkeys(("direction", "halfway"), (component.width, True, str(component)))
     rows = []
 
-    def add(prefix: str, base: int, fields: Mapping, texts: Mapping) -> None:
+    def add(prefix: str, base: int, fields: Mapping[str, tuple[int, int]], texts: Mapping[str, str]) -> None:
         for name, (first, count) in fields.items():
             for k in range(count):
                 part = "" if count == 1 else f"_{('xyz' if formats[name][1] else 'rgb')[k]}"
@@ -319,7 +319,7 @@ class RegisterFile:
         register = self.map.by_address.get(address & ~3)
         whole = data is not None and strobe == 15
         cause = self._refusal(None if whole and address % 4 else register, data, strobe, busy)
-        if cause:
+        if cause or register is None:
             self.values["errors"] = self.values.get("errors", 0) | 1 << list(ERRORS).index(cause)
             self.values["refused"] = address
             return 0, cause

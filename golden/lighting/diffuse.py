@@ -50,4 +50,5 @@ class Diffuse:
     @staticmethod
     def dark(cosine: Fixed) -> np.ndarray:
         """Whether ``N . L <= 0``: a light behind the surface gives no diffuse and no specular term."""
-        return cosine.codes <= 0
+        found: np.ndarray = cosine.codes <= 0
+        return found

@@ -109,7 +109,7 @@ class HighlightGate:
     fraction_bits: int = 17
     interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 5 <= self.fraction_bits <= 17:
             raise ValueError(f"fraction_bits must be 5 to 17, not {self.fraction_bits}")
 
@@ -160,9 +160,9 @@ class HighlightGate:
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25
         level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.interpolator.shortest_normal
         # In steps of 2^-34; one less, as the quotient is not exact.
-        level = np.floor(level * 2.0**34).astype(np.int64) - 1
+        steps = np.floor(level * 2.0**34).astype(np.int64) - 1
         # Squares of 34 bits outgrow an int64.
-        codes = [max(code, 0) ** 2 >> (68 - self.fraction_bits) for code in level.tolist()]
+        codes = [max(code, 0) ** 2 >> (68 - self.fraction_bits) for code in steps.tolist()]
         return Fixed(self.level_format, codes)
 
     def decide(self, a: Fixed, b: Fixed, u: Fixed, threshold: Fixed) -> np.ndarray:
@@ -188,7 +188,8 @@ class HighlightGate:
         slack = (threshold.codes << (f + 2)) - threshold.codes * u.codes - (a.codes * b.codes << 2)
         slack = slack >> (f + 2)
         reached = (slack <= 0) | (difference * difference >= u.codes * slack)
-        return (large * large >= threshold.codes << f) | (inside & reached)
+        found: np.ndarray = (large * large >= threshold.codes << f) | (inside & reached)
+        return found
 
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, exponent: int | np.ndarray
@@ -223,8 +224,9 @@ class HighlightGate:
         self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, threshold: Fixed
     ) -> np.ndarray:
         """Decisions as by `compute`, from thresholds T in place of exponents, of shape () or (spans,)."""
-        pairs = (normal_left, normal_right), (normal_left, halfway), (normal_right, halfway)
-        return self.decide_by(*(self.dot_product.compute(*pair) for pair in pairs), threshold)
+        dot = self.dot_product.compute
+        cosine = dot(normal_left, normal_right)
+        return self.decide_by(cosine, dot(normal_left, halfway), dot(normal_right, halfway), threshold)
 
     def decide_by(self, cosine: Fixed, left: Fixed, right: Fixed, threshold: Fixed) -> np.ndarray:
         """Decisions from dot products: of the normals, and of the left and the right one with H.
@@ -243,7 +245,10 @@ class HighlightGate:
         angle = self.angle_format
         cut = (self.one_squared - cosine).truncate(angle.fraction_bits).saturate(angle)
         u = Fixed(angle, np.minimum(cut.codes + 3, angle.max_code))
-        return (cut > self.widest) | self.decide(self._level(left), self._level(right), u, threshold)
+        found: np.ndarray = (cut > self.widest) | self.decide(
+            self._level(left), self._level(right), u, threshold
+        )
+        return found
 
     def _level(self, cosine: Fixed) -> Fixed:
         step = Fixed(self.level_format, 1)

@@ -49,7 +49,7 @@ class Intensity:
     TERM_FORMAT = UQ(0, 17)
     RESULT_FORMAT = UQ(8, 0)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 0 <= self.lights <= MAX_LIGHTS:
             raise ValueError(f"lights must be 0 to {MAX_LIGHTS}, not {self.lights}")
         if self.channels not in (1, 3):
@@ -67,7 +67,8 @@ class Intensity:
         intensity = np.asarray(intensity, dtype=np.float64)
         if not np.all((intensity >= 0) & (intensity <= MAX_INTENSITY)):
             raise ValueError(f"the intensity of a term must be 0 to {MAX_INTENSITY}")
-        return Fixed.round(cls.COLOR_FORMAT, intensity * 255).codes
+        found: np.ndarray = Fixed.round(cls.COLOR_FORMAT, intensity * 255).codes
+        return found
 
     def compute(
         self, ambient: Fixed, diffuse_color: Fixed, specular_color: Fixed, diffuse: Fixed, specular: Fixed
@@ -102,9 +103,9 @@ class Intensity:
         fraction_bits = self.COLOR_FORMAT.fraction_bits + self.TERM_FORMAT.fraction_bits
         total = diffuse.codes @ diffuse_color.codes + specular.codes @ specular_color.codes
         total = total + (ambient.codes << self.TERM_FORMAT.fraction_bits)
-        total = Fixed(UQ(17, fraction_bits), total).round_half_up(0).saturate(self.RESULT_FORMAT)
-        color = total.codes.astype(np.uint8)
-        return color if self.channels == 3 else np.repeat(color[:, :1], 3, axis=-1)
+        rounded = Fixed(UQ(17, fraction_bits), total).round_half_up(0).saturate(self.RESULT_FORMAT)
+        channels = rounded.codes.astype(np.uint8)
+        return channels if self.channels == 3 else np.repeat(channels[:, :1], 3, axis=-1)
 
     def cycles(self, diffuse: Fixed, specular: Fixed) -> np.ndarray:
         """Cycles that each pixel takes in the compact unit: ``channels max(1, T)``, T terms not 0.
@@ -119,4 +120,5 @@ class Intensity:
         int64 array, shape (pixels,)
         """
         terms = np.concatenate([diffuse.codes, specular.codes], axis=-1)
-        return self.channels * np.maximum(np.count_nonzero(terms, axis=-1), 1)
+        found: np.ndarray = self.channels * np.maximum(np.count_nonzero(terms, axis=-1), 1)
+        return found

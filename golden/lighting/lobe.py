@@ -1,8 +1,8 @@
 """Bit-accurate model of the lobe unit: any curve of 1 - N·H by one small table and one multiplier."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -145,7 +145,7 @@ class Lobe(HighlightOperand):
     FINER: ClassVar[tuple[int, int]] = (14, 32)
     ERROR: ClassVar[float] = 3 * 2.0**-17
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if self.model.MIRROR and not self.SERVES_MIRROR:
             raise ValueError(
@@ -224,7 +224,8 @@ class Lobe(HighlightOperand):
         row, step = np.divmod(np.arange(self.entries + 1), self.steps)
         # A row from 1 on begins at 2^(row-1-E); row 0 goes on with the steps of row 1.
         start = np.where(row > 0, self.steps, 0)
-        return np.ldexp((start + step) / self.steps, np.maximum(row, 1) - 1 - self.octaves)
+        found: np.ndarray = np.ldexp((start + step) / self.steps, np.maximum(row, 1) - 1 - self.octaves)
+        return found
 
     @property
     def cosines(self) -> tuple[np.ndarray, np.ndarray]:
@@ -232,8 +233,7 @@ class Lobe(HighlightOperand):
         knots = np.ldexp(np.minimum(self.knots, 1 - 2.0**-40), -self.scale)
         return 1 - knots, 1 - (knots[1:] + knots[:-1]) / 2
 
-    @staticmethod
-    def _beside(high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _beside(self, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Errors of the lines on the left and the right of each entry."""
         return np.r_[high[0], high], np.r_[high, high[-1]]
 
@@ -256,8 +256,7 @@ class Lobe(HighlightOperand):
         """
         if parameter is None and self.model.PARAMETER is not None:
             raise ValueError(f"a table of {self.name} needs its {self.model.PARAMETER}")
-        reflect: Callable[[np.ndarray], np.ndarray] = partial(self.model.reflect, parameter=parameter)
-        value, middle = map(reflect, self.cosines)
+        value, middle = (self.model.reflect(cosine, parameter) for cosine in self.cosines)
         high = (value[1:] + value[:-1]) / 2 - middle
         left, right = self._beside(high)
         larger, smaller = np.maximum(np.abs(left), np.abs(right)), np.minimum(np.abs(left), np.abs(right))
@@ -300,7 +299,8 @@ class Lobe(HighlightOperand):
         """
         if (self.octaves, self.steps) != (Lobe.octaves, Lobe.steps):
             return self
-        finer = replace(self, **dict(zip(("octaves", "steps"), self.FINER, strict=True)))
+        octaves, steps = self.FINER
+        finer = replace(self, octaves=octaves, steps=steps)
         errors = [max(of._line_error(one) for one in dict.fromkeys(parameters)) for of in (self, finer)]
         return finer if errors[0] > 1 / 1020 and errors[1] < errors[0] else self
 
@@ -313,7 +313,7 @@ class Lobe(HighlightOperand):
         return float(np.abs(np.interp(u, knots, values) - exact).max())
 
     @property
-    def last_lit_arguments(self):
+    def last_lit_arguments(self) -> np.ndarray:
         """`LobeTable.last_lit_argument` of the model's table at each exponent; exponent 0 counts as 1.
 
         Raises
@@ -436,7 +436,7 @@ class LobeTable:
     values: Fixed
     parameter: float | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         format, shape = Lobe.VALUE_FORMAT, (self.lobe.entries + 1,)
         if (self.values.format, self.values.shape) != (format, shape):
             raise ValueError(
@@ -453,7 +453,8 @@ class LobeTable:
         """Words of the memory, v in the low 17 bits and D in the 18 above: int64 array, shape (entries,)."""
         difference, value = Lobe.DIFFERENCE_FORMAT, Lobe.VALUE_FORMAT
         low = self.differences.codes & ((1 << difference.width) - 1)
-        return self.values.codes[:-1] | low << value.width
+        found: np.ndarray = self.values.codes[:-1] | low << value.width
+        return found
 
     def writes(self, bank: int = 0) -> dict[str, np.ndarray]:
         """Beats that load the table: the bank with ``begins`` set, then every value in order.
@@ -497,4 +498,5 @@ class LobeTable:
             f = ((last - 1) << fraction.width) // last
             argument = start + (((f + 1) * (end - start) - 1) >> fraction.width)
         shift = 25 - lobe.fraction_bits
-        return ((argument + 1) << shift) - 1 if shift > 0 else argument >> -shift
+        found: int = ((argument + 1) << shift) - 1 if shift > 0 else argument >> -shift
+        return found

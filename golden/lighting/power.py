@@ -64,7 +64,7 @@ class Power(HighlightOperand):
         return f"{self.model.name}_product"
 
     @property
-    def last_lit_arguments(self):
+    def last_lit_arguments(self) -> np.ndarray:
         """Argument of ``c^n = 2^-17``, as the result is never too large; one step more for float64."""
         exponent = np.arange(1 << self.EXPONENT_BITS)
         argument = -np.expm1(-17 * np.log(2) / np.maximum(exponent, 1)) / self.ARGUMENT_FORMAT.step

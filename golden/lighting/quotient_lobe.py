@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from blysk.golden.cosines.quotient import OCTAVES, STEPS, place_format
-from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.number.fixed import UQ, Fixed
+from blysk.golden.lighting.lobe import Lobe, LobeTable
+from blysk.golden.number.fixed import UQ, Fixed, Format
 
 __all__ = ["QuotientLobe"]
 
@@ -59,17 +59,17 @@ class QuotientLobe(Lobe):
         return self.parts * (self.octaves + 1)
 
     @property
-    def argument_format(self):
+    def argument_format(self) -> Format:
         """Format of a place."""
         return place_format(self.parts)
 
     @property
-    def operand_format(self):
+    def operand_format(self) -> Format:
         """Format of a place."""
         return self.argument_format
 
     @property
-    def fraction_format(self):
+    def fraction_format(self) -> Format:
         """Format of the position within a step."""
         return UQ(0, self.argument_format.fraction_bits)
 
@@ -79,7 +79,7 @@ class QuotientLobe(Lobe):
         return Lobe(octaves=self.octaves, steps=self.steps).knots
 
     @property
-    def cosines(self):
+    def cosines(self) -> tuple[np.ndarray, np.ndarray]:
         """Cosines at the entries and the end, and in the middles; the end of a part is the next one's begin.
 
         ``sqrt(1 - s)`` and ``sqrt(1 - (1 - s))``; ``1 - 2 s`` for a lobe of R·V.
@@ -87,11 +87,11 @@ class QuotientLobe(Lobe):
         knots = np.minimum(self.knots, 1 - 2.0**-40)
         pair = knots, (knots[1:] + knots[:-1]) / 2
         if self.model.MIRROR:
-            return tuple(1 - 2 * s for s in pair)
+            return 1 - 2 * pair[0], 1 - 2 * pair[1]
         entries, middles = (np.concatenate([np.sqrt(1 - s), np.sqrt(s)]) for s in pair)
         return np.delete(entries, len(knots)), middles
 
-    def _beside(self, high):
+    def _beside(self, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         left, right = super()._beside(high)
         if self.parts == 2:
             # Before the border of the parts only the step behind 1/2 is used.
@@ -99,7 +99,7 @@ class QuotientLobe(Lobe):
             left[border] = right[border]
         return left, right
 
-    def table(self, parameter=None):
+    def table(self, parameter: float | None = None) -> LobeTable:
         """Table of the model for one parameter, as of `Lobe`.
 
         Raises
@@ -133,7 +133,7 @@ class QuotientLobe(Lobe):
             largest = max(largest, float(np.abs(line - self.model.reflect(cosine, parameter)).max()))
         return largest
 
-    def address(self, argument):
+    def address(self, argument: Fixed) -> tuple[np.ndarray, Fixed]:
         """Word of a table, and position within its step: integer and fraction of a place."""
         format = self.fraction_format
         return argument.codes >> format.width, Fixed(format, argument.codes & format.max_code)

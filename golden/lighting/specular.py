@@ -1,6 +1,7 @@
 """Bit-accurate model of the specular unit: the cosine-quadratic model with its cutoff, and related models."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal
@@ -39,7 +40,7 @@ class HighlightOperand:
     RESULT_FORMAT = UQ(0, 17)
     EXPONENT_BITS = 10
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.operand not in self.OPERANDS:
             known = " or ".join(map(repr, self.OPERANDS))
             raise ValueError(f"operand must be {known}, not {self.operand!r}")
@@ -110,17 +111,18 @@ class Chords:
         """Bit-accurate values: the low 11 bits of the code interpolate, the bits above are the address."""
         format = self.INTERPOLATION_FORMAT
         address = code >> format.width
-        way = self.step[address] * Fixed(format, code & format.max_code)
-        way = way.truncate(self.start.format.fraction_bits).codes
+        product = self.step[address] * Fixed(format, code & format.max_code)
+        way = product.truncate(self.start.format.fraction_bits).codes
         start = self.start.codes[address]
         return Fixed(self.start.format, start + way if self.rising else start - way)
 
 
-def _lowered(function, entries: int) -> np.ndarray:
+def _lowered(function: Callable[[np.ndarray], np.ndarray], entries: int) -> np.ndarray:
     """Values at the ends of chords of a convex function on [0, 1], lowered by half of the largest error."""
     ends = function(np.arange(entries + 1) / entries)
     high = (ends[1:] + ends[:-1]) / 2 - function((np.arange(entries) + 0.5) / entries)
-    return np.maximum(ends - (np.r_[high[0], high] + np.r_[high, high[-1]]) / 4, 0)
+    found: np.ndarray = np.maximum(ends - (np.r_[high[0], high] + np.r_[high, high[-1]]) / 4, 0)
+    return found
 
 
 @dataclass(frozen=True)
@@ -221,28 +223,28 @@ class Specular(HighlightOperand):
     CUTOFF = 1 / 128
     ERROR = 2.0**-13
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not isinstance(self.model, self.SERVED):
             raise ValueError(f"the specular unit does not serve {self.model.name}")
-        squared_once = isinstance(self.model, PolynomialModel) and self.model.squarings == 1
-        if self.as_published and not (squared_once and self.model.curve is None):
+        line = isinstance(self.model, PolynomialModel) and self.model.curve is None
+        if self.as_published and not (line and self.squarings == 1):
             raise ValueError(
                 f"as_published is of polynomials that are squared once, not of {self.model.name}"
             )
         if isinstance(self.model, PolynomialModel):
-            self._check_slope()
+            self._check_slope(self.model)
         super().__post_init__()
 
-    def _check_slope(self) -> None:
+    def _check_slope(self, model: PolynomialModel) -> None:
         last = (1 << self.EXPONENT_BITS) - 1
         for name, value, format in (
-            ("a", self.model.a, self.A_FORMAT),
-            ("b", self.model.b, self.B_FORMAT),
-            (f"slope at exponent {last}", self.model.slope(last), self.SLOPE_FORMAT),
+            ("a", model.a, self.A_FORMAT),
+            ("b", model.b, self.B_FORMAT),
+            (f"slope at exponent {last}", model.slope(last), self.SLOPE_FORMAT),
         ):
             most = format.max_code * format.step
             if not 0 <= value <= most:
-                raise ValueError(f"{self.model.name}: {name} must be from 0 to {most:.6f}, not {value}")
+                raise ValueError(f"{model.name}: {name} must be from 0 to {most:.6f}, not {value}")
 
     @property
     def name(self) -> str:
@@ -262,9 +264,9 @@ class Specular(HighlightOperand):
     @property
     def squarings(self) -> int:
         """How often the base is squared: 1 to 3, 0 for ``exp``."""
-        if self.is_coscos:
+        if isinstance(self.model, AngleCosine):
             return self.model.power.bit_length() - 1
-        return 0 if self.is_exponential else self.model.squarings
+        return self.model.squarings if isinstance(self.model, PolynomialModel) else 0
 
     @property
     def error(self) -> float:
@@ -281,16 +283,16 @@ class Specular(HighlightOperand):
     @property
     def slope_terms(self) -> tuple[Fixed, Fixed] | None:
         """``a`` and ``b`` of the slope ``k = a n + b``, in words of the hardware; None: a table holds k."""
-        if self.is_exponential:
-            a, b = math.log2(math.e) / 16, 0.0
-        elif self.is_coscos:
+        if isinstance(self.model, AngleCosine):
             if self.model.rule != "taylor":
                 return None
             a, b = 8 / (self.model.power * math.pi**2), 0.0
-        elif self.model.curve is not None:
-            return None
-        else:
+        elif isinstance(self.model, PolynomialModel):
+            if self.model.curve is not None:
+                return None
             a, b = self.model.a, self.model.b
+        else:
+            a, b = math.log2(math.e) / 16, 0.0
         return Fixed.round(self.A_FORMAT, a), Fixed.round(self.B_FORMAT, b)
 
     @cached_property
@@ -304,8 +306,9 @@ class Specular(HighlightOperand):
         return total.wrap(self.SLOPE_FORMAT)
 
     def _slope(self, exponent: int) -> float:
-        if self.is_coscos:
+        if isinstance(self.model, AngleCosine):
             return 8 * (self.model.scale(exponent) / math.pi) ** 2
+        assert isinstance(self.model, PolynomialModel)
         return self.model.slope(exponent)
 
     def scale(self, exponent: np.ndarray) -> tuple[Fixed, np.ndarray]:
@@ -362,11 +365,11 @@ class Specular(HighlightOperand):
         return Fixed(format, boundary)
 
     @property
-    def last_lit_arguments(self):
+    def last_lit_arguments(self) -> np.ndarray:
         """Last lit arguments, computed from the PROM in integers."""
         _, shift = self.scale(np.arange(1 << self.EXPONENT_BITS))
         boundary = self.boundaries.codes
-        arguments = (((boundary + 1) << 10) - 1) >> (shift + 1)
+        arguments: np.ndarray = (((boundary + 1) << 10) - 1) >> (shift + 1)
         arguments[boundary == self.SHIFTED_FORMAT.max_code] = 1 << 27
         return arguments
 
@@ -392,7 +395,7 @@ class Specular(HighlightOperand):
             If the operand has another format or the exponent is out of range.
         """
         argument = self.one_minus(operand, exponent).truncate(25).saturate(self.ARGUMENT_FORMAT)
-        scale, shift = self.scale(np.int64(exponent))
+        scale, shift = self.scale(np.asarray(exponent))
         shifted = Fixed(UQ(10, 26), argument.codes << (shift + 1)).truncate(16)
         lit = ~np.asarray(dark, dtype=bool)
         if self.as_published:
@@ -403,10 +406,10 @@ class Specular(HighlightOperand):
         if self.is_exponential:
             return self._exponential(product.truncate(21).scale(4), lit)
         if self.is_coscos:
-            base = self._cosine(argument, product)
+            codes = self._cosine(argument, product)
         else:
-            base = self.BASE_FORMAT.max_code - product.truncate(17).codes
-        base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
+            codes = self.BASE_FORMAT.max_code - product.truncate(17).codes
+        base = Fixed(self.BASE_FORMAT, np.where(lit, codes, 0))
         for _ in range(self.squarings):
             base = (base * base).truncate(17)
         return base
@@ -414,8 +417,8 @@ class Specular(HighlightOperand):
     def _as_published(self, product: Fixed, lit: np.ndarray) -> Fixed:
         """Square of a base of either sign; 0 if it is less than the square of `CUTOFF`."""
         p, largest = product.truncate(17).codes, self.BASE_FORMAT.max_code
-        base = np.where(p <= largest, largest - p, np.minimum(p - largest - 1, largest))
-        base = Fixed(self.BASE_FORMAT, np.where(lit, base, 0))
+        codes = np.where(p <= largest, largest - p, np.minimum(p - largest - 1, largest))
+        base = Fixed(self.BASE_FORMAT, np.where(lit, codes, 0))
         square = (base * base).truncate(17)
         return Fixed(self.RESULT_FORMAT, np.where(square.values >= self.CUTOFF**2, square.codes, 0))
 
@@ -424,7 +427,8 @@ class Specular(HighlightOperand):
         p = product.truncate(17).saturate(self.BASE_FORMAT)
         e = self.excess.compute(argument.codes >> 8).truncate(16)
         w = (p + p * e).truncate(17).saturate(self.BASE_FORMAT)
-        return self.chords.compute(w.codes).truncate(17).codes
+        found: np.ndarray = self.chords.compute(w.codes).truncate(17).codes
+        return found
 
     def _exponential(self, power: Fixed, lit: np.ndarray) -> Fixed:
         """``2^-power`` where lit, else 0."""

@@ -51,7 +51,7 @@ class ValueGate:
     @cached_property
     def margin(self) -> float:
         """Largest distance of a pixel's u from the quadratic through the values."""
-        return float(2.0**-23 + ChordSetup().walk_error(3 / 16, 1 / 16) + 2.0**-26)
+        return float(2.0**-23 + ChordSetup().walk_error(np.asarray(3 / 16), np.asarray(1 / 16)) + 2.0**-26)
 
     @cached_property
     def thresholds(self) -> Fixed:

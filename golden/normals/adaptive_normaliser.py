@@ -93,7 +93,7 @@ class AdaptiveNormaliser:
     RESULT_FORMAT = COMPONENT
     LENGTH_BITS = LENGTH_BITS
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 2.0**-14 <= self.threshold <= 1 / 8:
             raise ValueError(f"threshold must be 2^-14 to 1/8, not {self.threshold!r}")
 
@@ -131,7 +131,8 @@ class AdaptiveNormaliser:
     def error(self, levels: int, first_step: bool) -> float:
         """Bound on the error of a component of a normal against straight lines between the exact ends."""
         difference = min(0.77, np.sqrt(8.1 * self.threshold))
-        return self.end_error(levels, first_step) + difference * 2.0**-16 + 4096 * 2.0**-32 + 2.0**-18
+        found: float = self.end_error(levels, first_step) + difference * 2.0**-16 + 4096 * 2.0**-32 + 2.0**-18
+        return found
 
     def levels(self, one_minus_cosine: Fixed, out_of_range: np.ndarray) -> np.ndarray:
         """Number of levels k of spans, from results of the bisection unit.
@@ -151,8 +152,8 @@ class AdaptiveNormaliser:
         operand = one_minus_cosine.saturate(COMPONENT)
         square = (operand * operand).scale(-4).truncate(20)
         sagitta = one_minus_cosine.scale(-2).extend(SQ(1, 20)) + square
-        sagitta = sagitta.saturate(self.SAGITTA_FORMAT).codes[..., np.newaxis]
-        return np.where(out_of_range, 0, (sagitta > self.limits.codes).sum(axis=-1))
+        codes = sagitta.saturate(self.SAGITTA_FORMAT).codes[..., np.newaxis]
+        return np.where(out_of_range, 0, (codes > self.limits.codes).sum(axis=-1))
 
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
@@ -253,8 +254,8 @@ class AdaptiveNormaliser:
         reciprocal, shift = (x[span] for x in self.reciprocal(np.maximum(length - 1, 1)))
         phi = Fixed(COMPONENT, ((offset * reciprocal) << 1 >> shift)[:, np.newaxis])
         start = left + (difference * phi).truncate(32) + self.half_step
-        slope = (difference * Fixed(COMPONENT, reciprocal[:, np.newaxis])).codes
-        slope = Fixed(SQ(2, 34), slope >> np.maximum(shift - 1 - levels[span], 0)[:, np.newaxis]).truncate(32)
+        steep = (difference * Fixed(COMPONENT, reciprocal[:, np.newaxis])).codes
+        slope = Fixed(SQ(2, 34), steep >> np.maximum(shift - 1 - levels[span], 0)[:, np.newaxis]).truncate(32)
         walked = start.codes + index[:, np.newaxis] * slope.wrap(self.STEP_FORMAT).codes
         return Fixed(self.ACCUMULATOR_FORMAT, self.ACCUMULATOR_FORMAT.wrap(walked))
 

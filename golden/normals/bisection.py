@@ -101,7 +101,7 @@ class Bisection:
     ONE = ONE_SQUARED.round_half_up(17).wrap(OPERAND_FORMAT)
     """Dot product of a unit vector with itself, in the word of r."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.degree not in (1, 2):
             raise ValueError(f"degree must be 1 or 2, not {self.degree!r}")
         if self.max_angle not in (45, 90):
@@ -201,8 +201,8 @@ class Bisection:
         first_step = (u > self.widest_narrow) & (self.max_angle == 90)
         cosine = (self.ONE - u).saturate(self.OPERAND_FORMAT)
         (constant, rest), (first_constant, first_rest) = map(self.polynomial, (False, True))
-        x = np.where(first_step | self.as_published, cosine.codes, u.saturate(self.OPERAND_FORMAT).codes)
-        x = Fixed(self.OPERAND_FORMAT, x)
+        codes = np.where(first_step | self.as_published, cosine.codes, u.saturate(self.OPERAND_FORMAT).codes)
+        x = Fixed(self.OPERAND_FORMAT, codes)
 
         def coefficient(power: int) -> Fixed:
             codes = np.where(first_step, first_rest.codes[power - 1], rest.codes[power - 1])
@@ -250,11 +250,11 @@ class Bisection:
 def _polynomials(bisection: Bisection) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
     """Results of `Bisection.polynomial` for narrow spans and for the first step."""
     # The words of u and r hold u and r times `ONE_SQUARED`.
-    one = ONE_SQUARED.values
-    narrow, widest = bisection.widest_narrow.values, bisection._limit(90).values
+    one = float(ONE_SQUARED.values)
+    narrow, widest = float(bisection.widest_narrow.values), float(bisection._limit(90).values)
     if bisection.as_published:
         of_cosine = [c * 2.0**power for power, c in enumerate(_PUBLISHED[bisection.degree])]
-        fits = [
+        fits: list[tuple[float, list[float]]] = [
             (c[0] - 0.5, [c[power] / one**power for power in range(1, len(c))])
             for c in (of_cosine, _PUBLISHED_FIRST_STEP)
         ]
@@ -273,11 +273,15 @@ def _polynomials(bisection: Bisection) -> tuple[tuple[Fixed, Fixed], tuple[Fixed
             {0: UQ(0, 19), 1: bisection.SUM_FORMAT, 2: bisection.SUM_FORMAT, 3: bisection.SUM_FORMAT},
         )
         step = bisection.SUM_FORMAT.step
-        fits = [(0.0, codes * step), (first[0] * bisection.FACTOR_FORMAT.step - 0.5, first[1:] * step)]
-    return tuple(
+        fits = [
+            (0.0, (codes * step).tolist()),
+            (first[0] * bisection.FACTOR_FORMAT.step - 0.5, (first[1:] * step).tolist()),
+        ]
+    narrow_spans, first_step = (
         (
             Fixed.round(bisection.FACTOR_FORMAT, constant),
             Fixed.round(bisection.SUM_FORMAT, [*rest, *[0.0] * (3 - len(rest))]),
         )
         for constant, rest in fits
     )
+    return narrow_spans, first_step

@@ -155,7 +155,7 @@ class BisectionChain:
             cosine = (p.ONE - angle).saturate(p.OPERAND_FORMAT)
             going = k <= level
 
-            def kept(new: Fixed, old: Fixed, going=going) -> Fixed:
+            def kept(new: Fixed, old: Fixed, going: np.ndarray = going) -> Fixed:
                 return Fixed(old.format, np.where(going, new.codes, old.codes))
 
             narrower = u.scale(-1) - e - (cosine * e).truncate(21)

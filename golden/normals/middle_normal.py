@@ -93,7 +93,7 @@ class MiddleNormal:
     ERROR = 2 * 8.3e-7 + ARITHMETIC_ERROR
     """Bound on the error of a component with the fit that is exact at angle 0."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.fit not in MIDDLE_NORMAL_FITS:
             raise ValueError(f"fit must be one of {', '.join(MIDDLE_NORMAL_FITS)}, not {self.fit!r}")
 

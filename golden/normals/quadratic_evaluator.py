@@ -70,7 +70,7 @@ class QuadraticEvaluator:
     PARAMETER_FORMAT = COMPONENT
     RESULT_FORMAT = COMPONENT
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.form not in QUADRATIC_FORMS:
             raise ValueError(f"form must be one of {', '.join(QUADRATIC_FORMS)}, not {self.form!r}")
 

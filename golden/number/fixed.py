@@ -13,8 +13,10 @@ operations, with the same names and result formats, for signals.
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 __all__ = ["SQ", "UQ", "Fixed", "Format", "require_same_point"]
 
@@ -46,14 +48,14 @@ class Format:
     integer_bits: int
     fraction_bits: int
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("integer_bits", "fraction_bits"):
             if isinstance(getattr(self, name), bool) or not isinstance(getattr(self, name), int):
                 raise TypeError(f"{name} must be an integer, not {getattr(self, name)!r}")
         if not 1 <= self.width <= 63:
             raise ValueError(f"{self} is {self.width} bits wide; a width must be 1 to 63 bits")
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"{'SQ' if self.signed else 'UQ'}({self.integer_bits}, {self.fraction_bits})"
 
     @property
@@ -179,7 +181,7 @@ class Fixed:
         If a code is outside the format's range.
     """
 
-    def __init__(self, format: Format, codes):
+    def __init__(self, format: Format, codes: npt.ArrayLike) -> None:
         codes = np.asarray(codes)
         if codes.dtype.kind not in "iu":
             raise TypeError(f"codes must be integers, not {codes.dtype}")
@@ -197,7 +199,7 @@ class Fixed:
         return fixed
 
     @classmethod
-    def round(cls, format: Format, values) -> "Fixed":
+    def round(cls, format: Format, values: npt.ArrayLike) -> "Fixed":
         """Numbers nearest to float64 values, halves rounded up.
 
         Raises
@@ -209,20 +211,22 @@ class Fixed:
             format, np.floor(np.ldexp(np.asarray(values, float), format.fraction_bits) + 0.5).astype(np.int64)
         )
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"Fixed({self.format}, {self.codes!r})"
 
     @property
     def values(self) -> np.ndarray:
         """Values in float64 (exact up to 53 significant bits)."""
-        return np.ldexp(self.codes.astype(np.float64), -self.format.fraction_bits)
+        found: np.ndarray = np.ldexp(self.codes.astype(np.float64), -self.format.fraction_bits)
+        return found
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the array."""
-        return self.codes.shape
+        found: tuple[int, ...] = self.codes.shape
+        return found
 
-    def __getitem__(self, key) -> "Fixed":
+    def __getitem__(self, key: Any) -> "Fixed":
         """Numbers picked by a NumPy index."""
         return Fixed._exact(self.format, self.codes[key])
 
@@ -254,7 +258,9 @@ class Fixed:
         """Exact negative."""
         return Fixed._exact(-self.format, -self.codes)
 
-    def _compare(self, other: "Fixed", comparison: Callable) -> np.ndarray:
+    def _compare(
+        self, other: "Fixed", comparison: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    ) -> np.ndarray:
         self.format - other.format  # Refuses operands that cannot be aligned in 63 bits.
         a, b, _ = self._aligned(other)
         return comparison(a, b)
@@ -275,19 +281,19 @@ class Fixed:
         """Elementwise comparison of the values."""
         return self._compare(other, np.greater_equal)
 
-    def __eq__(self, other: object) -> np.ndarray:
+    def __eq__(self, other: object) -> np.ndarray:  # type: ignore[override]
         """Elementwise comparison of the values."""
         if not isinstance(other, Fixed):
             return NotImplemented
         return self._compare(other, np.equal)
 
-    def __ne__(self, other: object) -> np.ndarray:
+    def __ne__(self, other: object) -> np.ndarray:  # type: ignore[override]
         """Elementwise comparison of the values."""
         if not isinstance(other, Fixed):
             return NotImplemented
         return self._compare(other, np.not_equal)
 
-    __hash__ = None
+    __hash__ = None  # type: ignore[assignment]
 
     def scale(self, exponent: int) -> "Fixed":
         """Product with ``2**exponent``, exact: the binary point moves, the code stays."""

@@ -74,7 +74,8 @@ def quantise(vectors: np.ndarray) -> np.ndarray:
         best[miss < smallest] = corner
         np.minimum(smallest, miss, out=smallest)
     upper = (best[..., np.newaxis] >> np.arange(3, dtype=np.uint8) & 1).astype(bool)
-    return np.clip(np.where(upper, high, low), -ONE, ONE)
+    found: np.ndarray = np.clip(np.where(upper, high, low), -ONE, ONE)
+    return found
 
 
 def values(codes: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ class Camera:
     field_of_view: float = 30.0
     near: float = 1e-3
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("position", "target", "up"):
             object.__setattr__(self, name, triple(f"a camera's {name}", getattr(self, name)))
         if self.position == self.target:

@@ -66,8 +66,10 @@ def interpolate(curve: str, normal_left: np.ndarray, normal_right: np.ndarray, t
             unit = np.where(opposite, normalise(np.cross(left, axis)), unit)
         # The two-argument form keeps the digits that arccos r loses near r = 1.
         angle = np.where(opposite, np.pi, np.arctan2(sine, r))
-        return np.cos(t * angle) * left + np.sin(t * angle) * unit
+        found: np.ndarray = np.cos(t * angle) * left + np.sin(t * angle) * unit
+        return found
     total = left + right
     length = np.sqrt(np.where(opposite, 1.0, 2 * (1 + r)))
     middle = np.where(opposite, 0.0, total / length)
-    return (2 * (total - 2 * middle) * t + (4 * middle - 3 * left - right)) * t + left
+    normals: np.ndarray = (2 * (total - 2 * middle) * t + (4 * middle - 3 * left - right)) * t + left
+    return normals

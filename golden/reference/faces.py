@@ -44,4 +44,5 @@ def seen_from_behind(scene: Scene, plane: np.ndarray) -> np.ndarray:
     if scene.camera.projection == "perspective":
         towards = scene.camera.position - scene.mesh.vertices[scene.mesh.faces[:, 0]]
         return sum_of_components(plane * towards) < 0
-    return plane @ scene.camera.viewer < 0
+    found: np.ndarray = plane @ scene.camera.viewer < 0
+    return found

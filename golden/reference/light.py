@@ -115,12 +115,12 @@ class Light:
     spot: Triple | None = None
     cone: tuple[float, float] | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if (self.direction is None) == (self.position is None):
             raise ValueError("a light must have either a direction or a position")
         if self.position is not None:
             object.__setattr__(self, "position", triple("a light's position", self.position))
-        else:
+        if self.direction is not None:
             direction = triple("a light's direction", self.direction)
             if not any(direction):
                 raise ValueError("a light's direction must not be 0")
@@ -191,7 +191,8 @@ class Light:
             inner, outer = np.cos(np.radians(self.cone))
             share = np.clip((-(towards @ np.asarray(self.spot)) - outer) / (inner - outer), 0, 1)
             result = result * share**2 * (3 - 2 * share)
-        return result
+        found: np.ndarray | np.float64 = result
+        return found
 
     @property
     def is_on(self) -> bool:

@@ -84,4 +84,5 @@ def squared_sine(vector: np.ndarray, frame: LightFrame, mirror: bool = False) ->
     Source: docs/theory/quotient.md#identities.
     """
     x, y, z = (np.square(component) for component in np.moveaxis(np.asarray(vector, np.float64), -1, 0))
-    return (x + (frame.cosine**2 * y if mirror else y)) / (x + y + z)
+    found: np.ndarray = (x + (frame.cosine**2 * y if mirror else y)) / (x + y + z)
+    return found

@@ -89,7 +89,7 @@ class Material:
     fresnel: Triple | None = None
     two_sided: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("ambient", "diffuse", "specular"):
             object.__setattr__(self, name, color_triple(f"a material's {name}", getattr(self, name)))
         object.__setattr__(self, "exponent", operator.index(self.exponent))
@@ -156,7 +156,8 @@ class Material:
         """
         if self.fresnel is None:
             return np.array(self.specular)
-        return np.array(self.specular) * schlick(self.fresnel, 1.0 if cosine is None else cosine)
+        found: np.ndarray = np.array(self.specular) * schlick(self.fresnel, 1.0 if cosine is None else cosine)
+        return found
 
     def parameter(self, model: ReflectionModel) -> float | None:
         """Exponent or roughness, by `ReflectionModel.PARAMETER` of a model; ``None`` without a parameter."""
@@ -215,7 +216,8 @@ def gram_determinant(normal: np.ndarray, light_direction: np.ndarray, viewer: np
     nv = (np.asarray(normal) * viewer).sum(axis=-1)
     ln = (np.asarray(light_direction) * normal).sum(axis=-1)
     lv = (np.asarray(light_direction) * viewer).sum(axis=-1)
-    return 1 - nv**2 - ln**2 - lv**2 + 2 * ln * nv * lv
+    found: np.ndarray = 1 - nv**2 - ln**2 - lv**2 + 2 * ln * nv * lv
+    return found
 
 
 def intensity(
@@ -286,7 +288,7 @@ def intensity(
         specular = light.color * material.reflection(constant)
         factor = light.factor(points)
         given = cosine * factor, highlight_cosine, factor
-        _add_light(total, material, light, specular, *given, has_highlight, model)
+        _add_light(total, material, light, np.asarray(specular), *given, has_highlight, model)
     return total
 
 
@@ -323,16 +325,25 @@ def intensity_of_cosines(
         given = cosine[..., index], highlight_cosine[..., index]
         specular = light.color * material.reflection(distant_cosine(light, viewer))
         own = np.float64(1) if factor is None else factor[..., index]
-        _add_light(total, material, light, specular, *given, own, np.True_, model)
+        _add_light(total, material, light, np.asarray(specular), *given, own, np.True_, model)
     return total
 
 
 def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-    return vectors @ others if others.ndim == 1 else np.einsum("...i,...i->...", vectors, others)
+    found: np.ndarray = vectors @ others if others.ndim == 1 else np.einsum("...i,...i->...", vectors, others)
+    return found
 
 
 def _add_light(
-    total, material, light, specular, cosine, highlight_cosine, factor, has_highlight, model
+    total: np.ndarray,
+    material: Material,
+    light: Light,
+    specular: np.ndarray,
+    cosine: np.ndarray,
+    highlight_cosine: np.ndarray | None,
+    factor: np.ndarray | np.float64,
+    has_highlight: np.ndarray | np.bool_,
+    model: ReflectionModel,
 ) -> None:
     """Add both terms of a light in place; without a cosine of the highlight, the diffuse term alone.
 

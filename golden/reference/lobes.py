@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.text import plain_text
@@ -56,12 +57,12 @@ class CoplanarPhong(ReflectionModel):
     Source: docs/theory/models.md#reflection-models; [P].
     """
 
-    def _lobe(self, cosine, exponent):
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
         # 2 c^2 - 1 = 1 - 2 (1 - c)(1 + c), in which a small 1 - c keeps its digits.
         base = 1 - 2 * (1 - cosine) * (1 + cosine)
         return np.where(cosine > 0, np.maximum(base, 0.0), 0.0) ** exponent
 
-    def steepness(self, parameter):
+    def steepness(self, parameter: float | None) -> float:
         """Four times the exponent, at the peak."""
         return 4 * self._checked(parameter)
 
@@ -84,10 +85,12 @@ class MicrofacetModel(ReflectionModel):
 
     PARAMETER: ClassVar = "roughness"
 
-    def _checked(self, parameter):
+    def _checked(self, parameter: float | None) -> float:
+        if parameter is None:
+            raise ValueError("roughness must be given")
         return checked_roughness(parameter)
 
-    def steepness(self, parameter):
+    def steepness(self, parameter: float | None) -> float:
         """Of the curve itself, see `ReflectionModel.steepness`."""
         return _steepness(self, parameter)
 
@@ -116,8 +119,8 @@ class TrowbridgeReitz(MicrofacetModel):
     representation of a rough surface for ray reflection*, 1975.
     """
 
-    def _lobe(self, cosine, roughness):
-        alpha = _alpha(roughness)
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
+        alpha = _alpha(exponent)
         spread = (1 - cosine) * (1 + cosine) * ((1 - alpha) * (1 + alpha) / alpha**2)
         return np.where(cosine > 0, (1 + np.maximum(spread, 0.0)) ** -2.0, 0.0)
 
@@ -135,15 +138,15 @@ class Beckmann(MicrofacetModel):
     computer graphics*, 1982.
     """
 
-    def _lobe(self, cosine, roughness):
-        alpha = _alpha(roughness)
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
+        alpha = _alpha(exponent)
         # Below the limit the exponential is 0: tan^2 / alpha^2 is nearly 800.
         square = np.maximum(cosine * cosine, 1 / (1 + 800 * alpha**2))
         tangent = (1 - cosine) * (1 + cosine) / square
         density = np.exp(-tangent / alpha**2) / (math.pi * (alpha * square) ** 2)
         return np.where(cosine > 0, density / self._peak(alpha), 0.0)
 
-    def _peak(self, alpha):
+    def _peak(self, alpha: float) -> float:
         if 2 * alpha * alpha <= 1:
             return super()._peak(alpha)
         return 4 * alpha * alpha * math.exp(alpha**-2 - 2) / math.pi
@@ -211,7 +214,8 @@ class TabulatedModel(ReflectionModel):
             raise ValueError(
                 f"the cosines of {name} must go from 0 to 1, not from {cosines[0]:.6g} to {cosines[-1]:.6g}"
             )
-        return cls(name, source, function=partial(np.interp, xp=cosines, fp=values))
+        lines = partial(np.interp, xp=cosines, fp=values)
+        return cls(name, source, function=lines)  # type: ignore[arg-type]
 
     @classmethod
     def of_csv(cls, path: str | Path) -> "TabulatedModel":
@@ -254,19 +258,20 @@ class TabulatedModel(ReflectionModel):
         points = np.array([fields for _, fields in lines], dtype=np.float64).reshape(-1, 2)
         return cls.of_points(path.stem, points[:, 0], points[:, 1], path.name)
 
-    def _checked(self, parameter):
-        return None
+    def _checked(self, parameter: float | None) -> float:
+        return 0.0
 
-    def steepness(self, parameter=None):
+    def steepness(self, parameter: float | None = None) -> float:
         """Of the curve itself, see `ReflectionModel.steepness`."""
         return _steepness(self, parameter)
 
-    def reflect(self, cosine, parameter=None):
+    def reflect(self, cosine: npt.ArrayLike, parameter: float | None = None) -> np.ndarray:
         """Brightness S, see `ReflectionModel.reflect`; any parameter is passed over."""
         return super().reflect(cosine, parameter)
 
-    def _lobe(self, cosine, parameter):
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
         lit = cosine > 0
+        assert self.function is not None
         given = np.asarray(self.function(cosine[lit]), dtype=np.float64)
         if given.shape != cosine[lit].shape:
             raise ValueError(f"{self.name} must give one value for each cosine")
@@ -405,4 +410,5 @@ def roughness_of_exponent(exponent: float) -> float:
     """
     if not (math.isfinite(exponent) and exponent > 0):
         raise ValueError(f"exponent must be finite and greater than 0, not {exponent}")
-    return (2 / (exponent + 2)) ** 0.25
+    found: float = (2 / (exponent + 2)) ** 0.25
+    return found

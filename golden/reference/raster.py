@@ -152,8 +152,9 @@ def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tupl
         d_first, d_second, d_third = distance[chosen[:, np.newaxis], order].T
 
         # Always from the inside to the outside, so that two triangles cut their shared edge in the same bits.
-        def cut(near, far, d_near, d_far):
-            return near + (d_near / (d_near - d_far))[:, np.newaxis] * (far - near)
+        def cut(near: np.ndarray, far: np.ndarray, d_near: np.ndarray, d_far: np.ndarray) -> np.ndarray:
+            place: np.ndarray = near + (d_near / (d_near - d_far))[:, np.newaxis] * (far - near)
+            return place
 
         if corners_inside == 1:
             pieces = [(first, cut(first, second, d_first, d_second), cut(first, third, d_first, d_third))]
@@ -221,7 +222,8 @@ def _assemble(
 def _counting(counts: np.ndarray) -> np.ndarray:
     """0, 1, ... counts[0] - 1, 0, 1, ... counts[1] - 1, ..."""
     ends = np.cumsum(counts)
-    return np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - counts, counts)
+    found: np.ndarray = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - counts, counts)
+    return found
 
 
 def _spans(
@@ -430,7 +432,8 @@ def fragment_barycentrics(raster: Raster, which: np.ndarray) -> np.ndarray:
     """
     span, t = _position(raster, which)
     weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
-    return weights / sum_of_components(weights)[:, np.newaxis]
+    found: np.ndarray = weights / sum_of_components(weights)[:, np.newaxis]
+    return found
 
 
 def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:
@@ -467,4 +470,5 @@ def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndar
         flip = raster.back[span[lost]] & scene.flips[triangle]
         normal[lost] = np.where(flip[:, np.newaxis], -face, face)
         length[lost] = 1.0
-    return normal / length
+    found: np.ndarray = normal / length
+    return found

@@ -4,9 +4,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 __all__ = [
     "BLINN",
@@ -23,7 +24,9 @@ __all__ = [
 ]
 
 
-def _check_exponent(exponent: float) -> float:
+def _check_exponent(exponent: float | None) -> float:
+    if exponent is None:
+        raise ValueError("exponent must be given")
     exponent = float(exponent)
     if not (math.isfinite(exponent) and exponent > 0):
         raise ValueError(f"exponent must be finite and greater than 0, not {exponent}")
@@ -64,10 +67,10 @@ class ReflectionModel:
     MIRROR: ClassVar[bool] = False
     PARAMETER: ClassVar[str | None] = "exponent"
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}>"
 
-    def __reduce__(self):
+    def __reduce__(self) -> str | tuple[Any, ...]:
         # A function without a name of its own cannot be sent to another process; its model's name can.
         if REFLECTION_MODELS.get(self.name) is self:
             return _registered, (self.name,)
@@ -76,10 +79,10 @@ class ReflectionModel:
     def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
         raise NotImplementedError
 
-    def _checked(self, parameter: float) -> float:
+    def _checked(self, parameter: float | None) -> float:
         return _check_exponent(parameter)
 
-    def reflect(self, cosine: np.ndarray, parameter: float) -> np.ndarray:
+    def reflect(self, cosine: npt.ArrayLike, parameter: float | None) -> np.ndarray:
         """Brightness S of a highlight, 0 to 1.
 
         Parameters
@@ -152,8 +155,9 @@ class ReflectionModel:
 class PowerModel(ReflectionModel):
     """``max(c, 0)^n``: with c = N·H Blinn's model ([B] 3), with c = R·V Phong's ([T] 6, [B] 2)."""
 
-    def _lobe(self, cosine, exponent):
-        return np.maximum(cosine, 0.0) ** exponent
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
+        powers: np.ndarray = np.maximum(cosine, 0.0) ** exponent
+        return powers
 
 
 @dataclass(frozen=True, repr=False)
@@ -189,7 +193,7 @@ class PolynomialModel(ReflectionModel):
     squarings: int = 1
     curve: Callable[[float], float] | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.squarings not in (1, 2, 3):
             raise ValueError(f"{self.name}: squarings must be 1, 2 or 3, not {self.squarings!r}")
 
@@ -204,7 +208,7 @@ class PolynomialModel(ReflectionModel):
         exponent = _check_exponent(exponent)
         return self.curve(exponent) if self.curve else self.a * exponent + self.b
 
-    def _lobe(self, cosine, exponent):
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
         base = np.maximum(self.slope(exponent) * (cosine - 1.0) + 1.0, 0.0)
         for _ in range(self.squarings):
             base = base * base
@@ -230,16 +234,17 @@ class AngleCosine(ReflectionModel):
         """Scale a at an exponent; see `coscos_scale`."""
         return coscos_scale(exponent, self.power, self.rule)
 
-    def _lobe(self, cosine, exponent):
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
         angle = self.scale(exponent) * np.arccos(np.maximum(cosine, -1.0))
-        return np.cos(np.minimum(angle, math.pi / 2)) ** self.power * (angle < math.pi / 2)
+        powers: np.ndarray = np.cos(np.minimum(angle, math.pi / 2)) ** self.power * (angle < math.pi / 2)
+        return powers
 
 
 @dataclass(frozen=True, repr=False)
 class Exponential(ReflectionModel):
     """``exp(n (c - 1))``, the limit of Blinn's power for large n."""
 
-    def _lobe(self, cosine, exponent):
+    def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:
         return np.exp(exponent * (cosine - 1.0))
 
 

@@ -9,7 +9,13 @@ import numpy as np
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.faces import face_normals
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.lighting import halfway_vector, intensity, intensity_of_cosines, saturate
+from blysk.golden.reference.lighting import (
+    Material,
+    halfway_vector,
+    intensity,
+    intensity_of_cosines,
+    saturate,
+)
 from blysk.golden.reference.raster import Raster, fragment_barycentrics, fragment_normals, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.scene import Scene
@@ -90,7 +96,7 @@ class Thresholds:
     highlight: float = HIGHLIGHT_THRESHOLD
     diffuse: float = DIFFUSE_THRESHOLD
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("normal", "highlight", "diffuse"):
             value = float(getattr(self, name))
             if math.isnan(value) or value < 0:
@@ -133,8 +139,8 @@ def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.
             ((normals * halfway).sum(axis=1), thresholds.highlight),
             ((normals * direction).sum(axis=1), thresholds.diffuse),
         ]
-    for first, second in ((0, 1), (1, 2), (2, 0)):
-        first, second = faces[:, first], faces[:, second]
+    for side in ((0, 1), (1, 2), (2, 0)):
+        first, second = (faces[:, corner] for corner in side)
         result &= np.linalg.norm(normals[first] - normals[second], axis=1) < thresholds.normal
         for cosine, threshold in cosines:
             result &= np.abs(cosine[first] - cosine[second]) < threshold
@@ -257,7 +263,8 @@ class _NodeColors:
         """Colors of fragments, shape (count, 3)."""
         colors = self.colors[self.place[self.raster.span[which]]]
         if self.shading == "flat":
-            return colors[:, 0]
+            found: np.ndarray = colors[:, 0]
+            return found
         share = fragment_barycentrics(self.raster, which)
         if self.shading == "quadratic_gouraud":
             across = 4 * share[:, [1, 2, 0]] * share[:, [2, 0, 1]]
@@ -384,7 +391,8 @@ def fragment_positions(scene: Scene, raster: Raster, which: np.ndarray) -> np.nd
     if len(raster.weights_left) != len(raster.length):
         raise ValueError("point lights and a near viewer need the weights of the spans")
     corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[raster.span[which]]]]
-    return np.einsum("fn,fnk->fk", fragment_barycentrics(raster, which), corners)
+    found: np.ndarray = np.einsum("fn,fnk->fk", fragment_barycentrics(raster, which), corners)
+    return found
 
 
 def _points(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray | None:
@@ -417,7 +425,7 @@ def _shade(
 ) -> np.ndarray:
     """Intensities of normals; the first axis is that of their triangles, ``triangles[which]``."""
 
-    def shade(normals, material, points):
+    def shade(normals: np.ndarray, material: Material, points: np.ndarray | None) -> np.ndarray:
         viewer = scene.view_vectors(points)
         return intensity(normals, material, scene.lights, scene.ambient_light, viewer, model, chord, points)
 

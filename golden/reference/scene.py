@@ -70,7 +70,7 @@ class Scene:
     back_faces: str = "flip"
     viewer: str = "distant"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("width", "height"):
             size = operator.index(getattr(self, name))
             if not 1 <= size <= LARGEST_SIDE:
@@ -121,7 +121,8 @@ class Scene:
     @property
     def two_sided(self) -> np.ndarray:
         """Whether each triangle's material is two-sided: bool array, shape (faces,)."""
-        return np.array([material.two_sided for material in self.materials])[self.mesh.material]
+        found: np.ndarray = np.array([material.two_sided for material in self.materials])[self.mesh.material]
+        return found
 
     @property
     def distant_viewer(self) -> np.ndarray | None:

@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from blysk.golden.video.display_timing import VGA, DisplayMode
 
@@ -51,7 +52,7 @@ class BandBuffer:
     colour_bits: tuple[int, int, int] = RGB888
     background: tuple[int, int, int] = (0, 0, 0)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         height = self.mode.vertical.visible
         if self.lines < 2 or self.lines & (self.lines - 1) or height % self.lines or height < 4 * self.lines:
             raise ValueError(
@@ -77,14 +78,16 @@ class BandBuffer:
         """Largest difference of a channel between a colour drawn and shown."""
         return (1 << 8 - min(self.colour_bits)) - 1
 
-    def kept(self, colour: np.ndarray) -> np.ndarray:
+    def kept(self, colour: npt.ArrayLike) -> np.ndarray:
         """Codes of channels in the buffer, shape (..., 3)."""
-        return np.asarray(colour) >> 8 - np.array(self.colour_bits)
+        found: np.ndarray = np.asarray(colour) >> 8 - np.array(self.colour_bits)
+        return found
 
     def shown(self, code: np.ndarray) -> np.ndarray:
         """Channels of 8 bits, shape (..., 3), from codes in the buffer."""
         bits = np.array(self.colour_bits)
-        return np.asarray(code) << 8 - bits | np.asarray(code) >> 2 * bits - 8
+        found: np.ndarray = np.asarray(code) << 8 - bits | np.asarray(code) >> 2 * bits - 8
+        return found
 
     def compute(self, picture: np.ndarray, late: Collection[int] = ()) -> np.ndarray:
         """The shown frame for a drawn picture.

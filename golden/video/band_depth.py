@@ -37,7 +37,7 @@ class BandDepth:
     size: tuple[int, int]
     tag_bits: int = 3
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.tag_bits not in range(2, 9):
             raise ValueError(f"tag_bits must be 2 to 8, not {self.tag_bits!r}")
 

@@ -64,7 +64,7 @@ class Controls:
     first: int = 0
     debounce_bits: int = 19
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, low, high in (
             ("materials", 1, 64),
             ("lights", 1, 64),

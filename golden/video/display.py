@@ -120,7 +120,7 @@ class Display:
                 -1, BITS, bits.shape[1]
             )
             words = np.einsum("nbl,b->nl", whole, weights)
-            is_control = np.isin(words[:, :3], CONTROL_WORDS).all(1)
+            is_control = np.logical_and.reduce(np.isin(words[:, :3], CONTROL_WORDS), axis=1)
             # Two in a row: no run of colour looks like that at any cut.
             counts.append((int((is_control[1:] & is_control[:-1]).sum()), offset, words))
         count, _, words = max(counts, key=lambda count: count[0])
@@ -131,7 +131,8 @@ class Display:
         words = words[started:]
         if (words[:, 3] != CLOCK_WORD).any():
             raise LaneError(f"word {np.argmax(words[:, 3] != CLOCK_WORD)}: the clock's lane breaks off")
-        return words
+        found: np.ndarray = words
+        return found
 
     def _check_sync(self, control: np.ndarray, active: np.ndarray, tops: np.ndarray) -> None:
         """Check both sync signals where lines are blank, from the first frame's top to the last one's."""

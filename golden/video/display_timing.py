@@ -30,7 +30,7 @@ class Axis:
     back: int
     positive: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if min(self.visible, self.front, self.sync, self.back) < 1:
             raise ValueError("every part of a line or of a frame has at least one pixel or line")
 
@@ -126,4 +126,5 @@ class DisplayTiming:
     @staticmethod
     def _sync(position: np.ndarray, axis: Axis) -> np.ndarray:
         begin, end = axis.pulse
-        return ((position >= begin) & (position < end)) == axis.positive
+        found: np.ndarray = ((position >= begin) & (position < end)) == axis.positive
+        return found

@@ -54,7 +54,7 @@ class DrawCommands:
     words: np.ndarray
     starts: tuple[int, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for column, (name, bits) in enumerate(_FIELDS.items()):
             values = self.words[:, column]
             if values.min() < 0 or values.max() >= 1 << bits:
@@ -105,7 +105,8 @@ class DrawCommands:
         sets : sequence of int, optional
             For each preset, the index of its set of slots, see `Motion.of`; by default all have the first.
         """
-        rows, starts = [], []
+        rows: list[list[int]] = []
+        starts = []
         for constants, of_preset in zip(presets, sets or [0] * len(presets), strict=True):
             first_slot = of_preset * len(mesh.parts)
             starts.append(len(rows))
@@ -129,7 +130,8 @@ class DrawCommands:
     def codes(self) -> list[int]:
         """Words of the memory."""
         shift = np.cumsum([0, *_FIELDS.values()])[:-1]
-        return (self.words << shift).sum(axis=1).tolist()
+        found: list[int] = (self.words << shift).sum(axis=1).tolist()
+        return found
 
     def compute(self, start: int, first_band: bool) -> np.ndarray:
         """Commands of a band from a list's start to its end, shape (C, 4)."""

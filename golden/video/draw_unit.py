@@ -101,7 +101,7 @@ class Drawing:
     lines: int = 16
     transform: VertexTransform = field(default_factory=VertexTransform)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         design, bits = self.renderer.design, self.place_bits(self.size, self.lines)
         if (design.x_bits, design.y_bits) != bits:
             raise ValueError(
@@ -177,7 +177,7 @@ class Drawing:
         widest = Frame.limit_of(SPAN_ANGLE if angle is None else angle)
         return cls(
             mesh=mesh,
-            motion=Motion.of(mesh, scene.camera, size, axis, transform, axes),
+            motion=Motion.of(mesh, scene.camera, size, axis, transform, list(axes)),
             commands=DrawCommands.of(mesh, presets, sets=sets.ravel().tolist()),
             presets=presets,
             renderer=renderer,

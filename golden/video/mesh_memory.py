@@ -83,7 +83,7 @@ class MeshMemory:
     VERTEX_BITS = 6 * COMPONENT.width
     LARGEST = 4096
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, count in (("vertices", len(self.position)), ("triangles", len(self.faces))):
             if not 1 <= count < self.LARGEST:
                 raise ValueError(f"a mesh memory holds 1 to {self.LARGEST - 1} {name}, not {count}")

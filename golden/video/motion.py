@@ -26,7 +26,8 @@ ENTRIES = 21
 def rotation(axis: Sequence[float], angle: float) -> np.ndarray:
     """Matrix of a rotation in radians, anticlockwise if the axis points to the viewer; float64."""
     constant, cosine, sine = _turns(axis)
-    return constant + np.cos(angle) * cosine + np.sin(angle) * sine
+    found: np.ndarray = constant + np.cos(angle) * cosine + np.sin(angle) * sine
+    return found
 
 
 def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -116,7 +117,7 @@ class Motion:
         rows = rows / camera.near / [pixels, pixels, 1]
         offset, linear = rows[0], (rows[1:] - rows[0]).T
         turns = _turns(axis)
-        made = [[], [], []]
+        made: list[list[np.ndarray]] = [[], [], []]
         for axes, part in product(normal_axes, mesh.parts):
             for k, turn in enumerate(turns):
                 position = (linear @ turn * part.scale).ravel()
@@ -151,7 +152,7 @@ class Motion:
         """Bit-accurate cosine and sine of angles."""
         quarter = 1 << self.TABLE_BITS
 
-        def sine(code):
+        def sine(code: np.ndarray) -> np.ndarray:
             code = code % (4 * quarter)
             low = code % quarter
             value = self.table.codes[np.where(code // quarter % 2, quarter - 1 - low, low)]
@@ -181,9 +182,10 @@ class Motion:
         fine = total.round_half_up(OFFSET.fraction_bits).saturate(SQ(5, 20)).codes
         coarse = total.round_half_up(ENTRY.fraction_bits).saturate(ENTRY).codes
         is_offset = np.isin(np.arange(ENTRIES), (9, 10, 11))
-        return np.where(is_offset, fine, coarse)
+        found: np.ndarray = np.where(is_offset, fine, coarse)
+        return found
 
     def matrix(self, slot: int, angle: int) -> Matrix:
         """The matrix of a slot at an angle."""
-        entries = self.compute(np.int64(slot), np.int64(angle))
+        entries = self.compute(np.asarray(slot), np.asarray(angle))
         return Matrix(entries[:9].reshape(3, 3), entries[9:12], entries[12:].reshape(3, 3))

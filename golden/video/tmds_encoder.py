@@ -48,7 +48,8 @@ class TmdsEncoder:
         use_xnor = (ones > 4) | ((ones == 4) & (bits[..., 0] == 0))
         # XNOR inverts at every step: after k of them a parity is inverted k times.
         parity = np.bitwise_xor.accumulate(bits, axis=-1) ^ (use_xnor[..., np.newaxis] & np.arange(8) & 1)
-        return (parity << np.arange(8)).sum(-1) | (~use_xnor).astype(np.int64) << 8
+        found: np.ndarray = (parity << np.arange(8)).sum(-1) | (~use_xnor).astype(np.int64) << 8
+        return found
 
     def step(self, chain: np.ndarray, disparity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Word of a chain, and the disparity after it; both broadcast.
@@ -105,4 +106,5 @@ class TmdsEncoder:
         chain = bits[..., :8] ^ bits[..., 9:]
         byte = chain.copy()
         byte[..., 1:] ^= chain[..., :-1] ^ 1 - bits[..., 8:9]
-        return (byte << np.arange(8)).sum(-1)
+        found: np.ndarray = (byte << np.arange(8)).sum(-1)
+        return found

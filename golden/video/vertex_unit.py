@@ -7,7 +7,7 @@ import numpy as np
 from blysk.golden.geometry.reciprocal import Reciprocal
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Grid
 from blysk.golden.geometry.wide_product import LOST, wide_product
-from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 
 __all__ = ["ENTRY", "OFFSET", "Matrix", "ScreenVertices", "VertexTransform"]
@@ -67,7 +67,7 @@ class ScreenVertices:
     outside: np.ndarray
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Output beats of the hardware, by field."""
         return dict(vars(self))
 
@@ -134,12 +134,12 @@ class VertexTransform:
     DEPTH_ERROR = 1 + (Reciprocal.ERROR + 2.0**-25 + 2.0**-26) * 2.0**24
     NORMAL_ERROR = 2.0**-18 + 2.0**-17 + 2.0**-27 + 2.0**-23
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.scale_bits not in range(4, 12):
             raise ValueError(f"scale_bits must be 4 to 11, not {self.scale_bits!r}")
 
     @property
-    def place(self):
+    def place(self) -> Format:
         """Number format of x and y, as X/W and Y/W, with the steps of the grid."""
         return self.grid.coordinate.scaled(-self.scale_bits)
 
@@ -167,7 +167,7 @@ class VertexTransform:
         one = 1 << self.SPACE.fraction_bits
         outside = (w < one) | (w >= self.FAR * one)
         w = np.where(outside, one, w)
-        shift = sum((w >= one << k).astype(np.int64) for k in range(1, self.SHIFTS + 1))
+        shift = (w >= one << np.arange(1, self.SHIFTS + 1)[:, np.newaxis]).sum(0)
         r = Reciprocal().compute(Fixed(Reciprocal.FORMAT, w >> shift))
         places = []
         for axis in (0, 1):

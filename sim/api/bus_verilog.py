@@ -1,8 +1,13 @@
 """Headers and port descriptions of cores on a bus, and of geometry alone."""
 
 from collections.abc import Sequence
+from typing import Any
+
+from amaranth.lib.wiring import Component
 
 from blysk.golden.bus.registers import CONSTANTS
+from blysk.golden.pipeline import Design
+from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import PORT_DESCRIPTIONS, BusUnit
 from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCRIPTIONS
@@ -26,7 +31,7 @@ _PATHS = {
 }
 
 
-def unit_of_top(top: str, bus: str, parameters, **options):
+def unit_of_top(top: str, bus: str, parameters: Design | Renderer, **options: Any) -> Component:
     """The unit of a core, on a bus or with its own ports.
 
     Parameters

@@ -42,14 +42,14 @@ class Lights(Value):
         self.numbers, self.fields, self.remedy = numbers, fields, remedy
 
     @property
-    def in_python(self):
+    def in_python(self) -> str:
         """A light or several, in any form."""
         return (
             f'give a Light, a dict with direction or position, numbers, or "{self.numbers.name}"; or a list '
             "of these"
         )
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """A tuple of `Light`."""
         entries = [value] if isinstance(value, Light | Mapping | str) or _is_numbers(value) else value
         if not isinstance(entries, list | tuple):

@@ -4,6 +4,8 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
 
+import click
+
 from blysk.golden.bus.framing import BUSES, PACKETS
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
@@ -14,7 +16,7 @@ from blysk.golden.pixel_pipelines import PIPES as PIPE_COUNTS
 from blysk.golden.presets import METHODS, MODEL_LINES, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
-from blysk.golden.reference.lighting import Triple
+from blysk.golden.reference.light import Triple
 from blysk.golden.reference.lobes import TabulatedModel
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
 from blysk.sim.api.lights import Lights, LightsLike
@@ -111,23 +113,23 @@ class Option(NamedTuple):
 class Model(Choice):
     """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__("reflection model", MODEL_LINES)
         self.points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
         self.remedy = f"{self.points}, or {self.remedy}"
 
-    def get_metavar(self, param, ctx=None):
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """Placeholder in the help text: the names, or a file."""
         return f"[{'|'.join(self.names)}|FILE.csv]"
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """The name; or the curve of a file."""
         if isinstance(value, TabulatedModel):
             return value
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
             return super().check(value)
         try:
-            return TabulatedModel.of_csv(reads(value))
+            return TabulatedModel.of_csv(os.fspath(reads(value)))
         except OSError as error:
             raise PartError("", f"{shown(value)} cannot be opened ({error.strerror})", self.points) from None
         except ValueError as error:
@@ -137,11 +139,11 @@ class Model(Choice):
 class Roughness(Number):
     """A number greater than 0 and at most 1."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__(0, 1)
         self.remedy = "give a number greater than 0 and at most 1"
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """A `float` in the range."""
         value = super().check(value)
         if not value:
@@ -165,19 +167,19 @@ class Direction(Vector):
         self.metavar = f"X,Y,Z|{'|'.join(words)}"
 
     @property
-    def in_python(self):
+    def in_python(self) -> str:
         """Numbers, the text, or a word."""
         return self.remedy.replace("X,Y,Z", 'three numbers or "X,Y,Z"', 1)
 
-    def get_metavar(self, param, ctx=None):
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """Placeholder in the help text: numbers, or a word."""
         return self.metavar
 
-    def parse(self, text):
+    def parse(self, text: str) -> Any:
         """A word as it is, or numbers with commas between them."""
         return text if text in self.words else super().parse(text)
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """A tuple of `float`, or a word whose vector depends on other options."""
         if isinstance(value, str) and value in self.words:
             return self.words[value]

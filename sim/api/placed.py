@@ -24,4 +24,5 @@ def design_of(name: str) -> tuple[str, ...] | None:
 
 def read_store(path: Path = STORE) -> list[dict[str, Any]]:
     """Entries of the store."""
-    return json.loads(path.read_text(encoding="utf-8"))
+    entries: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
+    return entries

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
-from blysk.golden.reference.lighting import Light, Material, Triple
+from blysk.golden.reference.light import Triple
+from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
 from blysk.sim.api.settings import Settings, read_settings

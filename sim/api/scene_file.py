@@ -2,7 +2,7 @@
 
 import os
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ class SceneFile:
     keys: dict[str, str]
 
 
-def read_scene_file(path: str | os.PathLike) -> SceneFile:
+def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
     """Read a scene file.
 
     These are the keys; only ``mesh.file`` is required::
@@ -126,7 +126,7 @@ def read_scene_file(path: str | os.PathLike) -> SceneFile:
     return SceneFile(os.fspath(path), values, keys)
 
 
-def _parse(path: Path) -> dict:
+def _parse(path: Path) -> dict[str, Any]:
     try:
         if not path.exists():
             raise PartError("", "there is no such file", "check the path")
@@ -164,7 +164,13 @@ def _parse(path: Path) -> dict:
         raise PartError("", f"is no TOML ({text})", "mend it there; text stands in quotes") from error
 
 
-def _read_table(table: dict, schema: dict, prefix: str, values: dict, keys: dict) -> None:
+def _read_table(
+    table: Mapping[str, Any],
+    schema: Mapping[str, Any],
+    prefix: str,
+    values: dict[str, Any],
+    keys: dict[str, str],
+) -> None:
     for name, value in table.items():
         key = prefix + shown_key(name)
         if name not in schema:
@@ -193,7 +199,7 @@ class _MeshFile(Value):
     name = "mesh"
     remedy = "give a mesh file's name, or teapot"
 
-    def check(self, value):
+    def check(self, value: Any) -> Any:
         """The name."""
         if not isinstance(value, str):
             raise ValueError("not text")

@@ -12,7 +12,7 @@ import numpy as np
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import default_method
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.lighting import Light, Triple
+from blysk.golden.reference.light import Light, Triple
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import DESIGN, LIGHTS, RENDERING, SCENE, SLOW_SIZE, Engine, Option, Source
 from blysk.sim.api.scene_file import read_scene_file
@@ -145,8 +145,9 @@ def read_settings(
     if "view" in merged:
         _turn_view(merged, {*given, *values})
     if "method" in merged and merged["method"] is None:
-        lacked = ("model", "gate", "operand", "setup_interval")
-        merged["method"] = default_method(**{name: merged[name] for name in lacked})
+        merged["method"] = default_method(
+            merged["model"], bool(merged["gate"]), merged["operand"], merged["setup_interval"]
+        )
     settings = Settings(source, merged, frozenset(given) | frozenset(values), origins)
     with settings.located():
         _check_pairs(settings)

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Unpack
+from typing import Unpack, overload
 
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
@@ -50,7 +50,13 @@ class Turntable(Sequence[RenderedFrame]):
     def __len__(self) -> int:
         return len(self.ready.scenes)
 
-    def __getitem__(self, index):
+    @overload
+    def __getitem__(self, index: int) -> RenderedFrame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[RenderedFrame]: ...
+
+    def __getitem__(self, index: int | slice) -> RenderedFrame | list[RenderedFrame]:
         """A frame, or the frames of a slice in a list."""
         if isinstance(index, slice):
             return [self[number] for number in range(len(self))[index]]

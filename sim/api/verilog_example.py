@@ -34,8 +34,9 @@ def example_of(design: Design, renderer: Renderer | None = None) -> list[str]:
     renderer : Renderer, optional
         What sends triangles to the pipeline: the axes of its further lights are written, too.
     """
-    colours = ((value,) * 3 for value in (AMBIENT, DIFFUSE, SPECULAR))
-    material = Material(*colours, design.build.exponent or EXPONENT)
+    material = Material(
+        (AMBIENT,) * 3, (DIFFUSE,) * 3, (SPECULAR,) * 3, exponent=design.build.exponent or EXPONENT
+    )
     triangle = Mesh(np.eye(3), np.array([[0, 1, 2]]), np.eye(3), material=np.zeros(1, np.int64))
     lights = (Light((0, 0, 1)),) * design.lights
     scene = Scene(triangle, Camera((0, 0, 5), (0, 0, 0)), 8, 8, (material,) * design.materials, lights)
