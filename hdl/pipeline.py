@@ -239,6 +239,11 @@ class ShadingPipelineUnit(wiring.Component):
         ]
 
     @property
+    def vectors(self) -> bool:
+        """Whether spans bring N/W in the frame of a light, as in `GeometryUnit`."""
+        return "step" in self.i.payload.shape().members
+
+    @property
     def _waiting_spans(self) -> int:
         """Depth of the FIFOs parallel to interpolator and lights: all spans that may be inside these."""
         interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval

@@ -1,6 +1,25 @@
 """What each port of a shading pipeline carries, for the table in its Verilog."""
 
-__all__ = ["PORT_DESCRIPTIONS"]
+__all__ = ["COUNTER_TEXTS", "PORT_DESCRIPTIONS"]
+
+COUNTER_TEXTS = {
+    "empty": "triangles that cover no pixel",
+    "zero_area": "triangles without area",
+    "culled": "back faces left out",
+    "sliver": "triangles at most 1/256 pixel wide",
+    "cut": "spans that were cut",
+    "repaired": "normals of length 0 in whose place the one before stands",
+    "spans": "spans shaded",
+    "pixels": "pixels shaded",
+    "hidden": "of them those behind what was drawn before",
+    "dropped": "pixels of spans that the coarse depth test dropped before shading",
+    "out_of_range_spans": "spans beyond what the method serves",
+    "empty_spans": "spans of length 0",
+    "overrun": "whether a span went past the largest column",
+    "frames": "frames that have ended",
+    "misfits": "beats of which a number did not fit its field; its low bits were taken, or the last material",
+}
+"""What each counter of a core counts, by its field in ``status``."""
 
 PORT_DESCRIPTIONS = {
     "i_x": "first pixel of the span, column",
@@ -22,8 +41,10 @@ PORT_DESCRIPTIONS = {
     "o_last": "last pixel of its span",
     "write_address": "frame constant to write, see above",
     "write_data": "its code; accepted when no span is inside",
-    "status_out_of_range_spans": "spans since reset beyond what the method serves, up to 65535",
-    "status_empty_spans": "spans of length 0 since reset, up to 65535",
-    "status_overrun": "a span went past the largest column",
+    **{
+        f"status_{name}": f"{COUNTER_TEXTS[name]}; since reset, up to 65535"
+        for name in ("out_of_range_spans", "empty_spans")
+    },
+    "status_overrun": COUNTER_TEXTS["overrun"],
 }
 """Ports of the pipeline, for the table in its Verilog."""

@@ -22,8 +22,12 @@ from blysk.hdl.geometry.mirror_adapter import MirrorAdapterUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
 from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_shape, triangle_shape
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.port_descriptions import COUNTER_TEXTS
 
 __all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RenderUnit"]
+
+STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans")
+"""Counters of `RenderUnit`."""
 
 PORT_DESCRIPTIONS = {
     "i_x": "columns of the three corners, in any order",
@@ -47,17 +51,7 @@ PORT_DESCRIPTIONS = {
     "constants_back_faces": "see above",
     "constants_limit": "chord of the widest span in 1/1024, see above",
     "constants_picture": "changes with each picture: depths begin anew",
-    "status_empty": "triangles that cover no pixel",
-    "status_zero_area": "triangles without area",
-    "status_culled": "back faces left out",
-    "status_sliver": "triangles at most 1/256 pixel wide",
-    "status_cut": "spans that were cut",
-    "status_repaired": "normals of length 0 in whose place the one before stands",
-    "status_spans": "spans shaded",
-    "status_pixels": "pixels shaded",
-    "status_hidden": "of them those behind what was drawn before",
-    "status_dropped": "pixels of spans that the coarse depth test dropped before shading",
-    "status_out_of_range_spans": "spans beyond what the method serves",
+    **{f"status_{name}": COUNTER_TEXTS[name] for name in STATUS},
     "memory_read_place": "pixel whose depth is read",
     "memory_read_enable": "reads; else the data stays",
     "memory_read_data": "its depth, on the next clock",
@@ -72,9 +66,6 @@ _DEEP = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
 
 _COMPONENTS = 3
 """Components of a vector of geometry."""
-
-STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans")
-"""Counters of `RenderUnit`."""
 
 WAITING_SPANS = 513
 """Spans between geometry and shading: a block RAM and a register behind it; not compact.

@@ -1,11 +1,11 @@
 """AXI4-Lite: a subordinate in front of registers."""
 
 from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import stream, wiring
+from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.bus.registers import ADDRESS_BITS, WORD_BITS
-from blysk.hdl.bus.registers import access_shape, answer_shape
+from blysk.hdl.bus.registers import front_members
 
 __all__ = ["AxiLite", "AxiLiteUnit"]
 
@@ -58,13 +58,7 @@ class AxiLiteUnit(wiring.Component):
     """
 
     def __init__(self):
-        super().__init__(
-            {
-                "bus": In(AxiLite()),
-                "i": Out(stream.Signature(access_shape())),
-                "o": In(stream.Signature(answer_shape())),
-            }
-        )
+        super().__init__(front_members(AxiLite()))
 
     def elaborate(self, platform):
         """Registers of the three input channels and of the two output channels."""

@@ -11,6 +11,7 @@ from blysk.hdl.bus.axi_lite import AxiLite, AxiLiteUnit
 from blysk.hdl.bus.framing import FramingUnit
 from blysk.hdl.bus.registers import RegistersUnit
 from blysk.hdl.bus.wishbone import Wishbone, WishboneUnit
+from blysk.hdl.port_descriptions import COUNTER_TEXTS
 
 __all__ = ["BUSES", "PORT_DESCRIPTIONS", "AxiStream", "BusUnit"]
 
@@ -87,7 +88,7 @@ class BusUnit(wiring.Component):
         member, signature, front = BUSES[bus]
         self._member, self._front = member, front()
         counters = [
-            (name, field.shape.width, _TEXTS.get(name, name.replace("_", " ")))
+            (name, field.shape.width, COUNTER_TEXTS[name])
             for name, field in self.framing.status.shape()
             if name != "busy"
         ]
@@ -153,21 +154,3 @@ class BusUnit(wiring.Component):
         if "memory" in self.signature.members:
             wiring.connect(m, framing.memory, wiring.flipped(self.memory))
         return m
-
-
-_TEXTS = {
-    "empty": "triangles that cover no pixel",
-    "zero_area": "triangles without area",
-    "culled": "back faces left out",
-    "sliver": "triangles at most 1/256 pixel wide",
-    "cut": "spans that were cut",
-    "repaired": "normals of length 0 in whose place the one before stands",
-    "spans": "spans shaded",
-    "pixels": "pixels shaded",
-    "hidden": "of them those behind others",
-    "out_of_range_spans": "spans beyond what the method serves",
-    "empty_spans": "spans of length 0",
-    "overrun": "whether a span went past the largest column",
-    "frames": "frames that have ended",
-    "misfits": "beats of which a number did not fit its field; its low bits were taken, or the last material",
-}

@@ -16,7 +16,7 @@ from blysk.golden.bus.registers import (
 )
 from blysk.hdl.frame_constants import write_shape
 
-__all__ = ["RegistersUnit", "access_shape", "answer_shape"]
+__all__ = ["RegistersUnit", "access_shape", "answer_shape", "front_members"]
 
 
 def access_shape() -> data.StructLayout:
@@ -29,6 +29,15 @@ def access_shape() -> data.StructLayout:
 def answer_shape() -> data.StructLayout:
     """Shape of an answer: the word read (0 for a write), and whether the access was refused."""
     return data.StructLayout({"data": WORD_BITS, "error": 1})
+
+
+def front_members(bus: wiring.Signature) -> dict[str, wiring.Member]:
+    """Members of an adapter from a bus: the bus, its accesses ``i``, and their answers ``o``."""
+    return {
+        "bus": In(bus),
+        "i": Out(stream.Signature(access_shape())),
+        "o": In(stream.Signature(answer_shape())),
+    }
 
 
 class RegistersUnit(wiring.Component):

@@ -1,11 +1,11 @@
 """Wishbone B4, classic and pipelined: a peripheral in front of registers."""
 
 from amaranth.hdl import Cat, Const, Module, Signal
-from amaranth.lib import stream, wiring
+from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.bus.registers import ADDRESS_BITS, WORD_BITS
-from blysk.hdl.bus.registers import access_shape, answer_shape
+from blysk.hdl.bus.registers import front_members
 
 __all__ = ["Wishbone", "WishboneUnit"]
 
@@ -54,13 +54,7 @@ class WishboneUnit(wiring.Component):
     """
 
     def __init__(self):
-        super().__init__(
-            {
-                "bus": In(Wishbone()),
-                "i": Out(stream.Signature(access_shape())),
-                "o": In(stream.Signature(answer_shape())),
-            }
-        )
+        super().__init__(front_members(Wishbone()))
 
     def elaborate(self, platform):
         """The request in a register; its answer in another."""

@@ -22,6 +22,7 @@ __all__ = [
     "require_same_shape",
     "skid_buffer",
     "stop_output",
+    "words_in_turn",
 ]
 
 FIFO_LATENCY = 2
@@ -127,6 +128,29 @@ def connect_fifo(
     return buffer
 
 
+def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: int) -> Memory:
+    """Memory whose words come one after the other, at rising addresses; the caller adds what reads it.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the memory as a submodule ``name``.
+    word : ValueLike
+        Word that comes.
+    written : Value
+        Whether it comes.
+    depth : int
+        Number of words inside at most, a power of two.
+    """
+    word = Value.cast(word)
+    m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])
+    write = memory.write_port()
+    m.d.comb += [write.data.eq(word), write.en.eq(written)]
+    with m.If(written):
+        m.d.sync += write.addr.eq(write.addr + 1)
+    return memory
+
+
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:
     """Words that pass beside a unit while its beats are inside, in their order, without handshakes.
 
@@ -150,18 +174,11 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
         Word of the beat that leaves next, while one is inside.
     """
     bits = (depth - 1).bit_length()
-    m.submodules[name] = words = Memory(shape=len(Value.cast(word)), depth=1 << bits, init=[])
-    write, first, second = words.write_port(), *(words.read_port(domain="comb") for _ in range(2))
+    words = words_in_turn(m, name, word, written, 1 << bits)
+    first, second = (words.read_port(domain="comb") for _ in range(2))
     address, following = Signal(bits, name=f"{name}_address"), Signal(bits, name=f"{name}_following", init=1)
     leaves = Signal(len(Value.cast(word)), name=f"{name}_leaves", reset_less=True)
-    m.d.comb += [
-        write.data.eq(word),
-        write.en.eq(written),
-        first.addr.eq(address),
-        second.addr.eq(following),
-    ]
-    with m.If(written):
-        m.d.sync += write.addr.eq(write.addr + 1)
+    m.d.comb += [first.addr.eq(address), second.addr.eq(following)]
     with m.If(taken):
         m.d.sync += [address.eq(following), following.eq(following + 1)]
     # Whether a beat leaves is known late: both words are read before.

@@ -9,6 +9,7 @@ from blysk.golden.geometry.edge_setup import EDGES, FRACTION_BITS, X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.geometry.edge_walk import walk_shape
 from blysk.hdl.geometry.triangles import first_centre, tag_shape
 
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
@@ -41,26 +42,8 @@ def plane_corners_shape(grid: Grid = GRID) -> dict:
 
 
 def edges_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of `Edges.beats`, with the tag and the members of `plane_corners_shape`."""
-
-    def three(shape):
-        return data.ArrayLayout(shape, 3)
-
-    return data.StructLayout(
-        {
-            "x": three(signed(X_BITS)),
-            "error": three(unsigned(grid.bits)),
-            "step": three(signed(X_BITS)),
-            "error_step": three(unsigned(grid.bits)),
-            "height": three(unsigned(grid.bits)),
-            "first": signed(X_BITS),
-            "upper": unsigned(X_BITS),
-            "lower": unsigned(X_BITS),
-            "flat": unsigned(1),
-        }
-        | tag_shape()
-        | plane_corners_shape(grid)
-    )
+    """Shape of `Edges.beats`: members of `walk_shape` and of `plane_corners_shape`."""
+    return data.StructLayout({**walk_shape(grid).members, **plane_corners_shape(grid)})
 
 
 @dataclass(frozen=True)

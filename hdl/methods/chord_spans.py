@@ -4,14 +4,13 @@ from collections.abc import Sequence
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, ValueLike, unsigned
 from amaranth.lib import data, fifo, stream, wiring
-from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import FIFO_LATENCY, connect
+from blysk.hdl.core.stream import FIFO_LATENCY, connect, words_in_turn
 from blysk.hdl.cosines.chord_setup import (
     ChordSetupUnit,
     chord_differences_shape,
@@ -372,12 +371,7 @@ def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, d
     depth : int
         Largest number of words inside, a power of two.
     """
-    word = Value.cast(word)
-    m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])
-    write, read = memory.write_port(), memory.read_port(domain="comb")
-    m.d.comb += [write.data.eq(word), write.en.eq(written)]
-    with m.If(written):
-        m.d.sync += write.addr.eq(write.addr + 1)
+    read = words_in_turn(m, name, word, written, depth).read_port(domain="comb")
     with m.If(taken):
         m.d.sync += read.addr.eq(read.addr + 1)
     return read.data

@@ -3,11 +3,12 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 
-from amaranth.lib.wiring import Component
-
 from blysk.golden.bus.byte_layout import ByteLayout, Field
 from blysk.golden.bus.registers import ADDRESS_BITS, ERRORS, WORD_BITS, Register
 from blysk.hdl.bus.bus import BusUnit
+from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.render import RenderUnit
 from blysk.sim.run_files import MARK
 
 __all__ = ["DOCUMENTS", "FRAME", "documents_of", "frame_text", "layout_lines"]
@@ -45,14 +46,12 @@ def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
     return dict(zip(DOCUMENTS, texts, strict=True))
 
 
-def frame_text(core: Component) -> str:
+def frame_text(core: ShadingPipelineUnit | RenderUnit | GeometryUnit) -> str:
     """Of which frame the vectors of a core's spans or corners are; empty where of none of a light."""
-    if "step" in core.i.payload.shape().members:
-        return FRAME
-    geometry = getattr(core, "geometry", core)
-    if not getattr(geometry, "vectors", False):
-        return ""
-    return FRAME.replace("the light's", "light 0's") if geometry.rotates else FRAME
+    unit = core.geometry if isinstance(core, RenderUnit) else core
+    if isinstance(unit, GeometryUnit) and unit.rotates:
+        return FRAME.replace("the light's", "light 0's")
+    return FRAME if unit.vectors else ""
 
 
 def _values(unit: BusUnit, field: Field) -> str:
