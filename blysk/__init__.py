@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     from blysk.golden.reference.lighting import Light, Material
     from blysk.golden.reference.scene import Scene
     from blysk.sim.api.costed_design import Design
-    from blysk.sim.api.design import design, verilog
+    from blysk.sim.api.design import design
     from blysk.sim.api.render import render
     from blysk.sim.api.rendered_frame import RenderedFrame
     from blysk.sim.api.scene import scene
     from blysk.sim.api.turntable import Turntable, turntable
+    from blysk.sim.api.verilog import verilog
     from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 
 __all__ = [
@@ -68,7 +69,7 @@ _MODULES = {
     "render": "sim.api.render",
     "scene": "sim.api.scene",
     "turntable": "sim.api.turntable",
-    "verilog": "sim.api.design",
+    "verilog": "sim.api.verilog",
 }
 
 _LINES = {"METHODS": "METHOD_LINES", "MODELS": "MODEL_LINES"}

@@ -8,6 +8,7 @@ import click
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F
 from blysk.golden.lighting.intensity import MAX_LIGHTS
+from blysk.sim.api.design import design, renderer_of
 from blysk.sim.api.options import DESIGN, PIPES, PORTS, SETUPS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
@@ -122,6 +123,10 @@ def command(
     unknown = [name for name in units if name.split(" ")[0] not in UNITS]
     if unknown:
         raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
+    if not units and not every_method:
+        made = design(lights=lights, **chosen)
+        if top != "shader":
+            renderer_of(made, "top", top)
     from blysk.bench.tools.fpga import about, count_by_unit, pipelines_of, place, units_of
 
     designs = list(

@@ -34,7 +34,8 @@ from blysk.bench.tools.place_and_route import Layout, lay_out, versions_of
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.tops import TOPS
-from blysk.sim.api.design import design, pixel_pipelines, renderer_of
+from blysk.sim.api.design import design, renderer_of
+from blysk.sim.api.verilog import pixel_pipelines
 from blysk.sim.errors import InputError
 from blysk.sim.output import write_json
 from blysk.sim.units.names import UNITS

@@ -299,8 +299,7 @@ class Lobe(HighlightOperand):
         """
         if (self.octaves, self.steps) != (Lobe.octaves, Lobe.steps):
             return self
-        octaves, steps = self.FINER
-        finer = replace(self, octaves=octaves, steps=steps)
+        finer = replace(self, octaves=self.FINER[0], steps=self.FINER[1])
         errors = [max(of._line_error(one) for one in dict.fromkeys(parameters)) for of in (self, finer)]
         return finer if errors[0] > 1 / 1020 and errors[1] < errors[0] else self
 

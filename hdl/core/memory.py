@@ -1,6 +1,6 @@
 """Memories read through the output register of an FPGA's memory blocks, and FIFOs made from memories."""
 
-from amaranth.hdl import Module, Mux, Shape, Signal, Value
+from amaranth.hdl import Module, Mux, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
 from amaranth.lib.memory import Memory, WritePort
 
@@ -14,8 +14,10 @@ __all__ = [
     "connect_late_fifo",
     "connect_wide_fifo",
     "delayed",
+    "pass_beside",
     "registered_read",
     "turn_of",
+    "words_in_turn",
 ]
 
 HEADED_FIFO_LATENCY = 2
@@ -26,6 +28,64 @@ LATE_FIFO_LATENCY = 4
 
 UNCOUNTED = 2
 """Payloads that `connect_late_fifo` has taken and its level does not count yet."""
+
+
+def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: int) -> Memory:
+    """Memory whose words come one after the other, at rising addresses; the caller adds what reads it.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the memory as a submodule ``name``.
+    word : ValueLike
+        Word that comes.
+    written : Value
+        Whether it comes.
+    depth : int
+        Number of words inside at most, a power of two.
+    """
+    word = Value.cast(word)
+    m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])
+    write = memory.write_port()
+    m.d.comb += [write.data.eq(word), write.en.eq(written)]
+    with m.If(written):
+        m.d.sync += write.addr.eq(write.addr + 1)
+    return memory
+
+
+def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:
+    """Words that pass beside a unit while its beats are inside, in their order, without handshakes.
+
+    The words are in a memory with a write and a read address. No level is counted: the unit's own handshakes
+    tell when a word is there.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the memory as a submodule ``name``.
+    word : ValueLike
+        Word of the beat that comes.
+    written, taken : Value
+        Whether a beat enters the unit, and leaves it; it is inside for two cycles or more.
+    depth : int
+        Beats inside at most.
+
+    Returns
+    -------
+    Signal
+        Word of the beat that leaves next, while one is inside.
+    """
+    bits = (depth - 1).bit_length()
+    words = words_in_turn(m, name, word, written, 1 << bits)
+    first, second = (words.read_port(domain="comb") for _ in range(2))
+    address, following = Signal(bits, name=f"{name}_address"), Signal(bits, name=f"{name}_following", init=1)
+    leaves = Signal(len(Value.cast(word)), name=f"{name}_leaves", reset_less=True)
+    m.d.comb += [first.addr.eq(address), second.addr.eq(following)]
+    with m.If(taken):
+        m.d.sync += [address.eq(following), following.eq(following + 1)]
+    # Whether a beat leaves is known late: both words are read before.
+    m.d.sync += leaves.eq(Mux(taken, second.data, first.data))
+    return leaves
 
 
 def registered_read(

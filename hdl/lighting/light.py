@@ -14,7 +14,8 @@ from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit, connect, connect_fifo, pass_beside
+from blysk.hdl.core.memory import pass_beside
+from blysk.hdl.core.stream import PipelinedUnit, connect, connect_fifo
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.lobe import LobeUnit

@@ -10,7 +10,8 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import FIFO_LATENCY, connect, words_in_turn
+from blysk.hdl.core.memory import words_in_turn
+from blysk.hdl.core.stream import FIFO_LATENCY, connect
 from blysk.hdl.cosines.chord_setup import (
     ChordSetupUnit,
     chord_differences_shape,

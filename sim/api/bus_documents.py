@@ -9,12 +9,10 @@ from blysk.hdl.bus.bus import BusUnit
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.render import RenderUnit
+from blysk.sim.api.options import DOCUMENTS
 from blysk.sim.run_files import MARK
 
-__all__ = ["DOCUMENTS", "FRAME", "documents_of", "frame_text", "layout_lines"]
-
-DOCUMENTS = (".md", ".h", ".svd")
-"""Suffixes of the documents."""
+__all__ = ["FRAME", "documents_of", "frame_text", "layout_lines"]
 
 FRAME = "in the light's frame: H along z, L and V in the xz plane"
 """Of which frame the vectors N/W of spans or corners are, for a method that takes them."""

@@ -6,8 +6,6 @@ from typing import Any
 
 from blysk.golden import pipeline
 from blysk.golden.presets import preset
-from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.api.placed import design_of, read_store
 
 __all__ = ["Design", "DesignCost"]
@@ -82,6 +80,10 @@ class Design(pipeline.Design):
 
         The netlist is written and counted each time: seconds.
         """
+        # The hardware's description takes a second to import.
+        from blysk.hdl.emit.cost import cost_of
+        from blysk.hdl.pipeline import ShadingPipelineUnit
+
         unit = ShadingPipelineUnit(self)
         cost = cost_of(unit)
         return DesignCost(

@@ -1,59 +1,21 @@
-"""Designs by the options of the command line, and their Verilog."""
+"""Designs by the options of the command line."""
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from importlib.metadata import version
-from typing import Any, Literal, Unpack, cast
+from typing import Any, Unpack
 
-from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.cosines.quotient_spans import MARGIN
-from blysk.golden.frame_constants import address_table
-from blysk.golden.geometry.coarse_depth import CoarseDepth
-from blysk.golden.geometry.triangles import ATTRIBUTE
-from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
-from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED, preset
-from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
-from blysk.hdl.bus.bus import BusUnit
-from blysk.hdl.bus.tops import TOPS
-from blysk.hdl.emit.verilog import check_name, emit
-from blysk.hdl.geometry.geometry import GeometryUnit
-from blysk.hdl.methods.interpolator import spelled
-from blysk.hdl.methods.registry import unit_of
-from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
-from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
-from blysk.hdl.render import RenderUnit
 from blysk.sim.api import costed_design
-from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions, unit_of_top
-from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS, DesignOptions
-from blysk.sim.api.settings import Settings, checked, read_settings
+from blysk.sim.api.options import COUNTS, DESIGN, DesignOptions
+from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.api.signature import with_options
-from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
 
-__all__ = [
-    "ShadingUnit",
-    "design",
-    "design_of",
-    "header_of",
-    "pixel_pipelines",
-    "refused_counts",
-    "renderer_of",
-    "verilog",
-    "verilog_and_unit",
-]
-
-_LIMIT = "2048 sin(a / 2), rounded down, for spans of at most the angle a"
-_FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
-
-ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
-"""A unit from spans to pixels: one pipeline or several."""
+__all__ = ["design", "design_of", "refused_counts", "renderer_of"]
 
 
 @with_options({**COUNTS, **DESIGN})
@@ -125,14 +87,24 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
         made = costed_design.Design.of(preset(method, settings["model"], lights, **options))
     except ValueError as error:
         raise settings.refuse("operand", str(error), "leave it out") from None
-    intervals = unit_of(made.interpolator).setup_intervals(made.interpolator)
-    if settings["setup_interval"] not in (None, *intervals):
-        remedy = f"give {spelled(intervals)}" if intervals else "leave it out"
-        raise settings.refuse("setup_interval", f"method {method} is not built for it", remedy)
+    if settings["setup_interval"] is not None:
+        _check_interval(settings, made)
     _check_parameter(settings, made)
     if isinstance(made.specular, Lobe):
         made = replace(made, specular=replace(made.specular, banks=min(materials, Lobe.MAX_BANKS)))
     return replace(made, materials=materials)
+
+
+def _check_interval(settings: Settings, design: Design) -> None:
+    """Refuse a setup interval that the method's hardware is not built for."""
+    # The hardware's description takes a second to import.
+    from blysk.hdl.methods.interpolator import spelled
+    from blysk.hdl.methods.registry import unit_of
+
+    intervals = unit_of(design.interpolator).setup_intervals(design.interpolator)
+    if settings["setup_interval"] not in intervals:
+        remedy = f"give {spelled(intervals)}" if intervals else "leave it out"
+        raise settings.refuse("setup_interval", f"method {design.method} is not built for it", remedy)
 
 
 def _check_parameter(settings: Settings, design: Design) -> None:
@@ -165,333 +137,6 @@ def renderer_of(design: Design, option: str = "geometry", value: str = "hardware
     except ValueError as error:
         reason, _, remedy = str(error).partition("; ")
         raise OptionError(option, value, reason, f"{remedy}, or spans from software") from None
-
-
-def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> ShadingUnit:
-    """One shading pipeline of a design, or several that take spans of different scanlines.
-
-    Parameters
-    ----------
-    design : Design
-        Design of each pipeline.
-    pipes : int
-        Number of pipelines: 1, 2, 4 or 8.
-    merged : bool
-        Whether several give one stream of pixels, in the order of one pipeline.
-
-    Raises
-    ------
-    OptionError
-        If the design cannot have that number of pipelines.
-    """
-    (chosen,) = checked({"pipes": pipes}, PIPES).values()
-    if chosen == 1:
-        return ShadingPipelineUnit(design)
-    try:
-        several = PixelPipelines(design, chosen)
-    except ValueError as error:
-        raise OptionError("pipes", str(pipes), str(error), "give fewer") from None
-    return MergedPipelinesUnit(several) if merged else PixelPipelinesUnit(several)
-
-
-def header_of(unit: ShadingUnit) -> list[str]:
-    """Description of a pipeline, in lines: version, design and cycles; of several, also their streams."""
-    parameters = unit.parameters
-    several = parameters if isinstance(parameters, PixelPipelines) else None
-    made = parameters.design if isinstance(parameters, PixelPipelines) else parameters
-    gate = ", highlight gate" if made.gate else ""
-    lines = [
-        f"blysk {version('blysk')} shading pipeline, MIT licence",
-        f"method {made.method}, model {made.model}, lights {made.lights}, materials {made.materials}, "
-        f"{made.build.style} style{gate}",
-        f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a pixel",
-        f"a span takes at most max({unit.cycles_per_pixel} length, {unit.setup_interval}) cycles",
-        *_several_lines(several, unit),
-        _FORMATS,
-    ]
-    if made.takes_values:
-        formats = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
-        lines += [
-            f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]},",
-            "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
-        ]
-        if scale := getattr(made.interpolator, "scale", 0):
-            lines.append(f"1 - N.H is times {1 << scale}, and 1 at most; so it is in the table")
-        if made.factors:
-            lines += [
-                f"i_factors: three codes of the factor a, 0 to 1, in {formats[0]}, times (1 - 2^-17)^2, of "
-                f"light{'s' * (len(made.factors) > 1)} {', '.join(map(str, made.factors))}, which "
-                f"fade{'s' * (len(made.factors) == 1)};",
-                "their N.L in i_values is times a",
-            ]
-    elif made.takes_vectors and made.lights:
-        lines += _vector_lines(made)
-    elif made.interpolator.takes_line:
-        lines.append(
-            "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
-            f"in {made.interpolator.END_FORMAT}; pixels under 1/256 of it are wrong, and their spans are "
-            "counted in status_out_of_range_spans"
-        )
-    elif made.lights:
-        lines.append("i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)")
-    lines += [
-        f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
-        "before the first span: rst high for a cycle, then write every frame constant in any order",
-    ]
-    return lines
-
-
-def _vector_lines(made: Design) -> list[str]:
-    """How the vectors of spans are made, for a method that takes them."""
-    model = made.vector_spans
-    mirrored = ["y_k is times cos a of light k; s0 is y of light 0 times its sin a."] if model.mirror else []
-    axes = (
-        [
-            "Frame of light k, L and V unit vectors to it and to the viewer: z = (L + V)/|L + V|,",
-            "x = (L - V)/|L - V|, y = cross product z x x. So L = (sin a, 0, cos a), V = (-sin a, 0, cos a).",
-            "L = V: any x across z, sin a = 0. L = -V: x = L, any z across x, cos a = 0"
-            + ("." if model.mirror else ", specular colour 0."),
-        ]
-        if model.highlights
-        else [
-            "Frame of light 0: z = L, x and y across it. Of a further light z = L alone. L, H are not read."
-        ]
-    )
-    constants = [
-        f"constants: of L write sin a, 0, cos a, times {model.ONE}; H is not read",
-    ]
-    return [
-        *axes,
-        "v = N/W, linear on the screen over a triangle: corner normals over their W, interpolated.",
-        f"i_start: components {', '.join(model.components)} of v at the first pixel centre.",
-        *mirrored,
-        f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one factor, so",
-        f"that the largest component at an end is 1/2 to 1 - {MARGIN} 2^-17. At 1 it would wrap.",
-        "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), times",
-        "2^i_exponent. i_exponent: the largest with which i_step fits, at most ceil(log2(length - 1)) + 3.",
-        "Halve a span where |v| at its ends differs by a factor over 2, or where they are over 90 degrees",
-        "apart. Give a span of two pixels as two of one, whose step is 0. A span with a pixel of |v| under",
-        "1/128, which these cuts exclude, is wrong, and counted in status_out_of_range_spans.",
-        *(constants if model.highlights else []),
-    ]
-
-
-def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[str]:
-    """Description of several pipelines, in lines."""
-    if several is None:
-        return []
-    streams = (
-        "o_k_*: its pixels" if isinstance(unit, PixelPipelinesUnit) else "o_*: pixels in the spans' order"
-    )
-    return [f"{several.pipes} pipelines; pipeline k takes spans with y mod {several.pipes} = k; {streams}"]
-
-
-def _render_header(unit: RenderUnit) -> list[str]:
-    """Description of a core from triangles to pixels: its pipeline without its input, and its geometry."""
-    first, *lines = (
-        line.replace("latency", "shading: latency") if line.startswith("latency") else line
-        for line in header_of(unit.pipeline)
-        if not line.startswith("i_")
-    )
-    return [
-        first.replace("shading pipeline", "triangles to pixels"),
-        *lines,
-        *_geometry_lines(unit.geometry),
-        *_axes_lines(unit.parameters),
-        *_coarse_lines(unit),
-        "memory_*: a depth for each pixel; read data a clock after the place; before a picture's first pixel "
-        "the core writes all ones to every pixel of the picture, one a clock",
-        "constants_picture changes with each picture: depths begin anew, as after rst; else it is added to",
-    ]
-
-
-def _axes_lines(renderer: Renderer) -> list[str]:
-    """How the axes of further lights are made, and how long a normal may be."""
-    if not renderer.axes:
-        return []
-    return [
-        "With several lights no vertex normal is longer than 1 before it is multiplied by 1/W.",
-        f"axes: of light k from 1 on {', '.join(renderer.axes)} of its frame, each as its dot products with",
-        "x, y and z of light 0's frame, times 2^17, rounded, at most 2^17 - 1; written before the first "
-        "triangle of a frame",
-    ]
-
-
-def _coarse_lines(unit: RenderUnit) -> list[str]:
-    if unit.coarse is None:
-        return []
-    given = unit.coarse.parameters
-    return [
-        f"coarse depth test: pictures of at most {given.width}x{given.height}, {given.blocks:,} words of "
-        f"{given.word_bits} bits; the first span of a picture waits for {given.swept:,} cycles"
-    ]
-
-
-def _geometry_lines(geometry: GeometryUnit) -> list[str]:
-    """Description of the input of a core from triangles to spans."""
-    grid = geometry.grid
-    spans = "their true lines, uncut" if geometry.lines else "two unit normals, wide ones cut"
-    normal, limit = "vertex normal", "is not read" if geometry.lines else _LIMIT
-    if geometry.vectors:
-        spans, limit = "N/W and its step, cut where N/W grows short", "is not read"
-        which = "light 0" if geometry.rotates else "the light"
-        normal = f"vertex normal in the frame of {which} (H along z, L and V in the xz plane)"
-    return [
-        f"geometry: at most a triangle in {geometry.interval} cycles; spans with {spans}; {grid.coordinate} "
-        "coordinates",
-        f"i_normal_*: {normal} times 1/W over the largest 1/W of the triangle, "
-        f"{ATTRIBUTE}; i_depth: linear on the screen",
-        f"constants_*: the picture's borders in pixels; back faces {', '.join(map(_numbered, BACK_FACES))}",
-        f"constants_limit: {limit}",
-        "constants_* change only while no triangle, span or pixel is inside; status_*: counters since reset",
-    ]
-
-
-def _numbered(name: str) -> str:
-    return f"{BACK_FACES.index(name)}: {name}"
-
-
-def _geometry_header(unit: GeometryUnit) -> list[str]:
-    """Description of a core from triangles to spans, in lines."""
-    return [f"blysk {version('blysk')} triangles to spans, MIT licence", _FORMATS, *_geometry_lines(unit)]
-
-
-def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, str]:
-    """Descriptions of the ports of a core with pixels as output."""
-    if isinstance(unit, RenderUnit):
-        return triangle_descriptions(unit)
-    fields = {f"i_{field}" for field in unit.i.payload.shape().members}
-    texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
-    return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
-
-
-def _top_and_bus(geometry: str, top: str | None, bus: str) -> tuple[str, str]:
-    """The core and the bus, checked.
-
-    Raises
-    ------
-    OptionError
-        If there is no such core or bus, or the core takes spans and geometry is hardware.
-    """
-    checked({"bus": bus} | ({} if top is None else {"top": top}), PORTS)
-    hardware = geometry == "hardware"
-    top = top or ("render" if hardware else "shader")
-    if hardware and not TOPS[top].takes_triangles:
-        remedy = "leave one of them out"
-        raise OptionError("top", top, "it takes spans, and hardware geometry triangles", remedy)
-    return top, bus
-
-
-def verilog(
-    design: Design | None = None,
-    name: str = "blysk",
-    geometry: Literal["software", "hardware"] = "software",
-    pipes: int = 1,
-    merged: bool = False,
-    top: str | None = None,
-    bus: str = "native",
-    setups: int = 1,
-    coarse: tuple[int, int] | None = None,
-) -> str:
-    """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
-
-    Parameters
-    ----------
-    design : Design, optional
-        The pipeline, as `design` makes it; by default that of the defaults.
-    name : str
-        Name of the top module.
-    geometry : {"software", "hardware"}
-        Whether the pipeline takes spans, or triangles, with a depth test and a port to a memory of depths.
-    pipes : int
-        Number of pipelines, 1, 2, 4 or 8, that take spans of different scanlines.
-    merged : bool
-        Whether several pipelines give one stream of pixels in place of one each.
-    top : str, optional
-        The core: ``"shader"`` (spans to pixels), ``"geometry"`` (triangles to spans) or ``"render"``
-        (triangles to pixels). By default ``"render"`` if geometry is hardware, else ``"shader"``.
-    bus : {"native", "axi", "wishbone"}
-        Its own ports, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
-    setups : int
-        Lanes of triangle setup, 1 or 2, of a core that takes triangles.
-    coarse : (int, int), optional
-        Largest width and height of a picture for the coarse depth test of a core from triangles to pixels;
-        by default it has none. See `CoarseDepth`.
-
-    Raises
-    ------
-    InputError
-        If the name is no Verilog identifier, the method takes values of a span and the core triangles, the
-        design cannot have that number of pipelines, or the bus does not serve the core.
-    """
-    design = Design() if design is None else design
-    return verilog_and_unit(design, name, geometry, pipes, merged, top, bus, setups, coarse)[0]
-
-
-def verilog_and_unit(
-    design: Design,
-    name: str,
-    geometry: str = "software",
-    pipes: int = 1,
-    merged: bool = False,
-    top: str | None = None,
-    bus: str = "native",
-    setups: int = 1,
-    coarse: tuple[int, int] | None = None,
-) -> tuple[str, ShadingUnit | RenderUnit | GeometryUnit | BusUnit]:
-    """The text of `verilog`, and the unit that it was made from."""
-    (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
-    top, bus = _top_and_bus(chosen, top, bus)
-    if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
-        raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
-    try:
-        check_name(name)
-    except ValueError as error:
-        raise OptionError("name", name, str(error), "choose another name") from None
-    hardware = TOPS[top].takes_triangles
-    counts = checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
-    pipes, setups = counts["pipes"], counts["setups"]
-    if setups > 1 and not hardware:
-        raise OptionError("setups", str(setups), "spans need no triangle setup", "use top geometry or render")
-    if hardware and pipes > 1:
-        raise OptionError("pipes", str(pipes), "triangles go to one pipeline", "leave it out, or use spans")
-    if merged and pipes == 1:
-        raise OptionError("merged", "", "one pipeline has one stream", "give pipes, too")
-    if pipes > 1 and bus != "native":
-        raise OptionError("pipes", str(pipes), f"a core on {bus} has one pipeline", "leave it out, or bus")
-    asked = ("geometry", chosen) if chosen == "hardware" else ("top", top)
-    parameters = renderer_of(design, *asked) if hardware else design
-    if coarse is not None:
-        if top != "render":
-            raise OptionError("coarse", "", "it is of triangles to pixels", "give --top render, too")
-        size = checked({"coarse": coarse}, COARSE)["coarse"]
-        parameters = replace(cast(Renderer, parameters), coarse=CoarseDepth(*size))
-    if hardware or bus != "native":
-        lanes = {"setups": setups} if hardware else {}
-        unit = unit_of_top(top, bus, parameters, **lanes)
-    else:
-        unit = pixel_pipelines(design, pipes, merged)
-    p = design
-    lobe = p.specular if isinstance(p.specular, Lobe) else None
-    loads = lobe is not None and lobe.fixed is None
-    core = unit.framing.core if isinstance(unit, BusUnit) else unit
-    renderer = core.parameters if isinstance(core, RenderUnit) else None
-    axes = [f"axis {axis}" for axis in renderer.axes] if renderer else []
-    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads, p.span_members, axes)
-    if isinstance(core, GeometryUnit):
-        lines = _geometry_header(core)
-    else:
-        lines = _render_header(core) if isinstance(core, RenderUnit) else header_of(core)
-    words = [*constants, *example_of(p, renderer)]
-    descriptions: Mapping[str, str]
-    if isinstance(unit, BusUnit):
-        header, descriptions = bus_header(unit, bus, lines, words), bus_descriptions(unit)
-    elif isinstance(unit, GeometryUnit):
-        header, descriptions = lines, triangle_descriptions(unit)
-    else:
-        header = [*lines, "", "Frame constants, through the write port:", *words]
-        descriptions = _descriptions(unit, pipes)
-    return emit(unit, name, header=header, descriptions=descriptions), unit
 
 
 @contextmanager

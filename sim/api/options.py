@@ -45,6 +45,7 @@ __all__ = [
     "COEFFICIENTS",
     "COUNTS",
     "DESIGN",
+    "DOCUMENTS",
     "GEOMETRIES",
     "GEOMETRY",
     "LIGHTS",
@@ -84,6 +85,9 @@ and perhaps normals."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """Names of engines; ``"auto"``: ``"cxxrtl"``, or ``"pysim"`` where no C++ compiler works."""
+
+DOCUMENTS = (".md", ".h", ".svd")
+"""Suffixes of the documents that are written beside the Verilog of a core on a bus."""
 
 GEOMETRIES = ("software", "hardware")
 """Choices of the part that turns triangles into spans."""

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from blysk.sim.api.options import COARSE, COUNTS, DESIGN, GEOMETRY, PIPES, PORTS, SETUPS
+from blysk.sim.api.design import design
+from blysk.sim.api.options import COARSE, COUNTS, DESIGN, DOCUMENTS, GEOMETRY, PIPES, PORTS, SETUPS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
@@ -64,15 +65,15 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
         raise InputError(
             "--testbench", "its bench sends spans, and hardware geometry takes triangles", "leave one out"
         )
-    # After the checks of options: the hardware's description takes a second to import.
-    from blysk.sim.api.bus_documents import DOCUMENTS, documents_of
-    from blysk.sim.api.design import design, header_of, verilog_and_unit
-    from blysk.sim.frames.testbench import check_folder, write_testbench
-
     made = design(**given_options(context, [*DESIGN, *COUNTS]))
     beside = [f"{output[:-2]}{suffix}" for suffix in DOCUMENTS] if output and bus != "native" else []
     check_outputs([], pictures=[], others=[output, *beside])
     check_beside(beside)
+    # After the checks of options: the hardware's description takes a second to import.
+    from blysk.sim.api.bus_documents import documents_of
+    from blysk.sim.api.verilog import header_of, verilog_and_unit
+    from blysk.sim.frames.testbench import check_folder, write_testbench
+
     if testbench is not None:
         if output and Path(os.path.realpath(output)).is_relative_to(os.path.realpath(testbench)):
             raise InputError(output, "lies in the folder of --testbench", "choose another file")

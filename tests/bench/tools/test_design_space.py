@@ -137,7 +137,7 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
     """Run as it stands, but for the Verilog; the unit that it would emit is the candidate's."""
     made = []
     monkeypatch.setattr("blysk.hdl.emit.verilog.emit", lambda unit, name, **_: made.append(unit) or "module")
-    monkeypatch.setattr("blysk.sim.api.design.emit", lambda unit, name, **_: made.append(unit) or "module")
+    monkeypatch.setattr("blysk.sim.api.verilog.emit", lambda unit, name, **_: made.append(unit) or "module")
     words = shlex.split(candidate.command)
     assert (words[0] == "blysk") == is_plain
     if is_plain:

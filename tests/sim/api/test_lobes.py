@@ -9,10 +9,11 @@ import pytest
 import blysk
 from blysk.golden.presets import preset
 from blysk.golden.reference.lobes import GGX
-from blysk.sim.api.design import design_of, verilog
+from blysk.sim.api.design import design_of
 from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.render import prepare_rendering
 from blysk.sim.api.settings import read_settings, rendering_settings
+from blysk.sim.api.verilog import verilog
 from blysk.sim.errors import InputError
 from blysk.sim.frames.figures import sharp_lobes
 

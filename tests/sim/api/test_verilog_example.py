@@ -11,8 +11,8 @@ from blysk.golden.frame_constants import LOBE_ADDRESS, address_table
 from blysk.golden.presets import preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.api.design import _descriptions as descriptions_of
-from blysk.sim.api.design import header_of
+from blysk.sim.api.verilog import _descriptions as descriptions_of
+from blysk.sim.api.verilog import header_of
 from blysk.sim.api.verilog_example import EXPONENT, example_of
 
 
