@@ -100,10 +100,12 @@ class ValueGate:
             np.abs(right - left) < self.LARGEST_RISE
         )
         level = threshold.extend(self.LEVEL_FORMAT).codes
-        return ~held | (self.least(highlight) < level)
+        found: np.ndarray = ~held | (self.least(highlight) < level)
+        return found
 
     @staticmethod
     def least(highlight: np.ndarray) -> np.ndarray:
         """``2 min(u_l, u_r) - max(u_l + u_r - 2 u_m, 0)``, from the three values along the last axis."""
         left, middle, right = np.moveaxis(highlight, -1, 0)
-        return 2 * np.minimum(left, right) - np.maximum(left + right - 2 * middle, 0)
+        found: np.ndarray = 2 * np.minimum(left, right) - np.maximum(left + right - 2 * middle, 0)
+        return found
