@@ -497,5 +497,4 @@ class LobeTable:
             f = ((last - 1) << fraction.width) // last
             argument = start + (((f + 1) * (end - start) - 1) >> fraction.width)
         shift = 25 - lobe.fraction_bits
-        found: int = ((argument + 1) << shift) - 1 if shift > 0 else argument >> -shift
-        return found
+        return int(((argument + 1) << shift) - 1 if shift > 0 else argument >> -shift)
