@@ -8,7 +8,6 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.frame_constants import LIGHT_STRIDE
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.vector_adapter import vector_spans_shape
 
@@ -32,8 +31,8 @@ class LightAdapterUnit(wiring.Component):
 
     Each component of start and step has a multiplier, which takes x, y and z in turns and adds the products:
     the initiation interval is 3. In the *serial* form one multiplier makes all components one after the
-    other, 6 cycles each. A span is offered 3 cycles after it was taken in, which is on the last cycle of its
-    interval.
+    other, 6 cycles each. A span is offered 4 cycles after it was taken in, which is on the last cycle of its
+    interval. If it waits there until the next is made, that waits a cycle longer.
 
     Axes are in memories, so that they take no registers; they are not cleared by reset.
 
@@ -62,7 +61,7 @@ class LightAdapterUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    latency = 3
+    latency = 4
 
     def __init__(
         self, lights: int = 1, rows: int = 3, serial: bool = False, shape: data.StructLayout | None = None
@@ -85,8 +84,20 @@ class LightAdapterUnit(wiring.Component):
         m = Module()
         given, made = self.i.payload, self.lights * self.rows
         result = Signal(self.o.payload.shape(), name="result")
-        valid = Signal(self.latency, name="valid")
-        advance = skid_buffer(m, self.o, valid[-1], result)
+        valid, advance = Signal(self.latency - 1, name="valid"), Signal(name="advance")
+        # The unit stands while a result has no place. Results are three cycles apart: a register is enough.
+        offered, waits = Signal(name="offered"), Signal(name="waits")
+        output = Signal.like(result, name="output", reset_less=True)
+        still = offered & ~self.o.ready
+        m.d.comb += [
+            advance.eq(~(valid[-1] & waits)),
+            self.o.valid.eq(offered),
+            self.o.payload.eq(output),
+        ]
+        moves = valid[-1] & ~waits
+        m.d.sync += [waits.eq(still), offered.eq(still | moves)]
+        with m.If(moves):
+            m.d.sync += output.eq(result)
         axis, last = Signal(range(_AXES), name="axis"), Signal(name="last_turn")
         ends_row = Signal(name="ends_row")
         m.d.comb += [

@@ -21,9 +21,8 @@ def _addresses(unit):
     return AXES_ADDRESS + LIGHT_STRIDE * light + AXIS_STRIDE * row + k
 
 
-def _write(unit, frames):
+def _write(unit, codes):
     """Writes of axes; those to lights that are not there, and to colours, change nothing."""
-    codes = LightAdapter.codes_of(frames[:, : unit.rows])
     beyond = AXES_ADDRESS + (unit.lights + 1) * LIGHT_STRIDE
     address = [*_addresses(unit).ravel(), beyond, AXES_ADDRESS, LIGHT_STRIDE, 2 * LIGHT_STRIDE]
     return {"address": np.array(address), "data": np.r_[codes.ravel(), 1:5] & 0x3FFFF}
@@ -36,13 +35,13 @@ def _expect(unit, case):
     return LightAdapter().compute(spans, LightAdapter.FORMAT.wrap(codes)).beats
 
 
-def _case(unit, rng, length, frames, **vectors):
+def _case(unit, rng, length, codes, **vectors):
     count = len(length)
     beats = vectors | {"exponent": rng.integers(0, 16, count), "length": length}
     beats |= {name: rng.integers(0, 4096, count) for name in ("x", "y")}
     for name, format in (("depth", SPAN_DEPTH), ("depth_step", DEPTH_STEP)):
         beats[name] = any_codes(rng, format, count)
-    return Case(beats | {"material": rng.integers(0, 1024, count)}, write=_write(unit, frames))
+    return Case(beats | {"material": rng.integers(0, 1024, count)}, write=_write(unit, codes))
 
 
 def _spans(unit, rng, count):
@@ -52,14 +51,17 @@ def _spans(unit, rng, count):
         for name in ("start", "step")
     }
     frames = np.linalg.qr(rng.normal(size=(unit.lights, 3, 3)))[0]
-    return _case(unit, rng, np.maximum(4095 >> rng.integers(0, 13, count), 1), frames, **vectors)
+    codes = LightAdapter.codes_of(frames[:, : unit.rows])
+    return _case(unit, rng, np.maximum(4095 >> rng.integers(0, 13, count), 1), codes, **vectors)
 
 
 def _any(unit, rng, count):
-    """Words of any codes, also longer than 1, on axes that are those of the first light, or against them."""
+    """Words of any codes, also longer than 1: sums modulo 2. Most spans have one pixel."""
     vectors = {name: any_codes(rng, LightAdapter.FORMAT, count, 3) for name in ("start", "step")}
-    frames = np.array([np.roll(np.eye(3), k, axis=0) * (-1) ** k for k in range(1, unit.lights + 1)])
-    return _case(unit, rng, 1 + (rng.random(count) < 0.3), frames, **vectors)
+    codes = any_codes(rng, LightAdapter.FORMAT, unit.lights, unit.rows, 3)
+    # Every bit of an axis's words changes.
+    codes[..., 1] = ~codes[..., 0]
+    return _case(unit, rng, 1 + (rng.random(count) < 0.3), codes, **vectors)
 
 
 RECORD = Record(
