@@ -28,8 +28,8 @@ def drawing_of(triangles, size, design, **options):
     faces = np.arange(len(mesh.faces)) % design.materials
     mesh = Mesh(mesh.vertices, mesh.faces, mesh.normals, faces)
     scenes = [
-        Scene(mesh, camera, *size, of, (lamp,), back_faces="cull")
-        for lamp in LAMPS
+        Scene(mesh, camera, *size, of, lamps[: design.lights], back_faces="cull")
+        for lamps in (LAMPS, LAMPS[::-1])
         for of in (material, material[::-1])
     ]
     controls = Controls(materials=2, lights=2, step=300, debounce_bits=2)
@@ -123,9 +123,10 @@ def test_buttons_count_from_the_next_frame_on(simulator):
 
 
 @pytest.mark.long
-def test_highlights_of_phong_follow_the_light():
-    """The light changes after the first frame: L of the new one counts before the first triangle."""
-    drawing = drawing_of(64, (48, 32), preset("quotient", "phong", materials=2))
+@pytest.mark.parametrize("lights", [1, 2])
+def test_highlights_of_phong_follow_the_light(lights):
+    """The light changes after the first frame: L and axes of the new one count before the first triangle."""
+    drawing = drawing_of(64, (48, 32), preset("quotient", "phong", lights=lights, materials=2))
     bands = [*range(drawing.bands)] * 3
     buttons = [0, 1 << BUTTONS.index("light"), *[0] * (len(bands) - 2)]
     found = DrawingSimulator(drawing).run(bands, buttons)
