@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.vector_axes import further_axes, triangle_axes
+from blysk.golden.frames.vector_axes import further_axes, light_frames, triangle_axes
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
 from blysk.golden.geometry.triangles import Frame
@@ -90,6 +91,12 @@ def triangle_constants(scene: Scene, renderer: Renderer) -> list[FrameConstants]
     constants = constants_of(scene, renderer.design)
     if not renderer.rows:
         return constants
+    if renderer.mirrors:
+        # A first light that is off has its part in q all the same: y cos a and y sin a.
+        direction = constants[0].direction.copy()
+        first = light_frames(scene, 1)[0]
+        direction[0] = np.rint(first.direction * QuotientSpans.ONE)
+        constants = [replace(of, direction=direction) for of in constants]
     axes = LightAdapter.codes_of(further_axes(scene, renderer.design))
     return [replace(constants[0], axes=axes), *constants[1:]]
 

@@ -85,6 +85,17 @@ def test_vectors_of_several_lights(model, lights, triangles, exponent):
         renderer.compute(frame.sent.triangles, frame.sent.frame, constants_of(drawn, renderer.design))
 
 
+@pytest.mark.parametrize("model", ["blinn", "phong"])
+def test_first_light_off(model):
+    """It shines on nothing; the others' squares are those of its frame all the same."""
+    drawn = scene("teapot", size=(96, 72), triangles=220, exponent=20, lights=LIGHTS[:3])
+    lights = (replace(drawn.lights[0], color=(0.0, 0.0, 0.0)), *drawn.lights[1:])
+    drawn = replace(drawn, lights=lights)
+    frame = triangle_frame(drawn, Renderer(preset("quotient", model, lights=3)))
+    exact = render(drawn, "phong", REFLECTION_MODELS[model])
+    assert np.abs(frame.image - exact.image * 255)[exact.mask].max() < 0.6
+
+
 def test_normals_that_are_longer_than_1():
     """As files may have them: those of a triangle are made shorter by one factor, so that nothing wraps."""
     drawn = scene("teapot", size=(64, 48), triangles=220, lights=LIGHTS[:2])
