@@ -59,10 +59,17 @@ class Groups(LoadScopeScheduling):
         return group_of(nodeid)
 
 
+SELDOM = (
+    *OF_DOCUMENTS,
+    *("highlight_cosine", "specular", "power", "stiff_interpolators", "highlight_gate_lengths"),
+)
+"""Units of the documents' methods and models, which change seldom."""
+
+
 def pytest_itemcollected(item):
-    """Units of the documents' methods change seldom: `make test` leaves their own tests to CI."""
+    """`make test` leaves the tests of the units in `SELDOM`, by the names of their files, to CI."""
     given = {mark.name for mark in item.iter_markers()}
-    if item.path.stem.removeprefix("test_") in OF_DOCUMENTS and not given & {"long", "prove"}:
+    if item.path.stem.removeprefix("test_") in SELDOM and not given & {"long", "prove"}:
         item.add_marker("long")
         item.add_marker("ci")
 
