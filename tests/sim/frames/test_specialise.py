@@ -233,7 +233,7 @@ def test_shorter_words():
     """Narrow and short spans; the pixels change by a step at most, and cost less."""
     for mesh in (teapot(2000), FLOOR):
         scene = scene_of(size=(100, 80), mesh=mesh)
-        full = full_of(scene)
+        full = full_of(scene, method="chord-local")
         assert "fraction_bits" not in reasons(specialise(scene, full))
         special = specialise(scene, full, exact=False)
         assert reasons(special)["fraction_bits"].startswith(
