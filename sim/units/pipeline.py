@@ -374,7 +374,7 @@ LONG_DESIGNS: dict[str, Design] = {
     "gate, values": preset("chord-local", "blinn_product", 2, gate=True),
     "gate, compact, power": preset("quadratic-horner", "blinn_product", gate=True, style="compact"),
     "gate, exponent": replace(_FULL, build=Build(exponent=20)),
-    "grey": preset("quadratic", None, grey=True),
+    "grey": preset("renormalise", None, grey=True),
     "few bits": replace(_FULL, **_LESS),
 }
 """Further pipelines by name, for the long run."""
