@@ -18,7 +18,7 @@ import numpy as np
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import Design
-from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
+from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.engine import SimulationError
@@ -65,7 +65,8 @@ class Pair:
 
 def models_of(method: str, models: Sequence[str | None]) -> list[str | None]:
     """Those of some models that a method serves, in order: of R·V only ``quotient`` does."""
-    return [model for model in models if METHODS[method].TAKES_VECTORS or model not in MIRROR_LOBES]
+    takes_vectors = (METHODS | PUBLISHED)[method].TAKES_VECTORS
+    return [model for model in models if takes_vectors or model not in MIRROR_LOBES]
 
 
 def _refuses(design: Design, exponent: int) -> bool:
