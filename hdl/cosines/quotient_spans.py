@@ -425,8 +425,10 @@ class QuotientSpansUnit(wiring.Component):
             return register(scaled, f"line_sum_{light}")
         sine, cosine = (part.as_value() for part in self.constants[light])
         if p.takes_heights:
-            sine = Mux(is_second, 0, sine)[: len(sine)].as_signed()
-            cosine = Mux(is_second, 1 << 16, cosine)[: len(cosine)].as_signed()
+            # Gates and no choice: of a choice of constants Yosys makes resets, which multipliers lack.
+            kept = (~is_second).replicate(len(sine))
+            sine, cosine = sine.as_unsigned() & kept, cosine.as_unsigned() & kept
+            sine, cosine = sine.as_signed(), Cat(cosine[:16], cosine[16] | is_second, cosine[17]).as_signed()
         x, z = (
             product(b[f"{axis}{light}"], factor, f"line_{axis}{light}")
             for axis, factor in zip("xz", (sine, cosine), strict=True)

@@ -53,10 +53,10 @@ class IntensityUnit(PipelinedUnit):
     at each level of the adder tree.
 
     The latency is ``5 + ceil(log2(2 lights + 1))`` cycles (terms, factors, products, adder tree, rounding,
-    saturation); the initiation interval is 1. Each multiplier has registers of its own for its factor and its
-    product, as in `registered_product`. There are six multipliers of 17 by 17 bits for each light. Without
-    specular terms there are three for each light, and ``lights`` stands for ``2 lights`` in the latency; with
-    one channel there is a third of the multipliers.
+    saturation); the initiation interval is 1. Each multiplier has registers of its own for its operands and
+    its product, as in `registered_product`. There are six multipliers of 17 by 17 bits for each light.
+    Without specular terms there are three for each light, and ``lights`` stands for ``2 lights`` in the
+    latency; with one channel there is a third of the multipliers.
 
     Parameters
     ----------
@@ -78,6 +78,8 @@ class IntensityUnit(PipelinedUnit):
     FORMULAS: ClassVar[dict[str, str]] = {
         r"factor_diffuse_(\d+)_(\w)": r"D_\1",
         r"factor_specular_(\d+)_(\w)": r"S_\1",
+        r"color_diffuse_(\d+)_(\w)": r"k_d,\2",
+        r"color_specular_(\d+)_(\w)": r"k_s,\2",
         r"diffuse_(\d+)_(\w)": r"k_d,\2·D_\1",
         r"specular_(\d+)_(\w)": r"k_s,\2·S_\1",
         r"sum_\d+_\d+_(\w)": r"Σ of terms, \1",
@@ -107,8 +109,8 @@ class IntensityUnit(PipelinedUnit):
             for light in range(self.parameters.lights):
                 for kind in self.kinds:
                     factor = register(m, operands[kind][light], f"factor_{kind}_{light}_{name}")
-                    product = factor * self.constants[kind][light][channel]
-                    terms.append(register(m, product, f"{kind}_{light}_{name}"))
+                    color = register(m, self.constants[kind][light][channel], f"color_{kind}_{light}_{name}")
+                    terms.append(register(m, factor * color, f"{kind}_{light}_{name}"))
             # A constant needs no registers that delay it to the other terms.
             constant = self.constants.ambient[channel]
             terms.append(constant)
