@@ -1,6 +1,6 @@
 """Memories read through the output register of an FPGA's memory blocks, and FIFOs made from memories."""
 
-from amaranth.hdl import Module, Mux, Shape, Signal, Value, ValueLike
+from amaranth.hdl import Cat, Module, Mux, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
 from amaranth.lib.memory import Memory, WritePort
 
@@ -26,7 +26,7 @@ HEADED_FIFO_LATENCY = 2
 LATE_FIFO_LATENCY = 4
 """Cycles that a payload takes through the empty FIFO of `connect_late_fifo`."""
 
-UNCOUNTED = 2
+UNCOUNTED = 3
 """Payloads that `connect_late_fifo` has taken and its level does not count yet."""
 
 
@@ -196,6 +196,8 @@ def connect_late_fifo(
     payload = Signal(width, name=f"{name}_payload", reset_less=True)
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
     level = Signal(range(depth + 1), name=f"{name}_level")
+    # What the level does not count; whether one payload waits in the memory, and whether more do.
+    came, gone, one, more = (Signal(name=f"{name}_{word}") for word in ("came", "gone", "one", "more"))
     # Whether the memory's word, and the one behind it, are valid.
     read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
     address, reads = Signal((depth - 1).bit_length(), name=f"{name}_address"), Signal(name=f"{name}_reads")
@@ -216,11 +218,19 @@ def connect_late_fifo(
         payload.eq(source.payload),
         written.eq(source.valid & room),
         room.eq(level < depth - UNCOUNTED),
-        level.eq(level + written - reads),
-        some.eq(written | level[1:].any() | (level[0] & ~reads)),
+        Cat(came, gone).eq(Cat(written, reads)),
+        level.eq(level + came - gone),
+        # Whether the first payload is read is known late.
+        some.eq(written | more | (one & ~reads)),
         port.addr.eq(port.addr + written),
-        address.eq(address + reads),
     ]
+    few = [level == number for number in range(3)]
+    m.d.comb += [
+        one.eq((few[0] & came & ~gone) | (few[1] & (came == gone)) | (few[2] & ~came & gone)),
+        more.eq(~Cat(few).any() | (few[1] & came & ~gone) | (few[2] & (came | ~gone))),
+    ]
+    with m.If(reads):
+        m.d.sync += address.eq(address + 1)
     with m.If(moves):
         m.d.sync += [read.eq(reads), there.eq(read)]
     with m.Elif(sink.ready):

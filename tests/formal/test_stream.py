@@ -70,6 +70,12 @@ def kept(depth):
     )
 
 
+def late(depth):
+    return lambda m, number, source, sink: blysk.hdl.core.memory.connect_late_fifo(
+        m, f"late_{number}", source, sink, depth
+    )
+
+
 def equal(came, leaves):
     return came == leaves
 
@@ -173,6 +179,30 @@ def test_bugs_of_a_wide_buffer_are_found(refute, inject, bug):
     """Injected in `connect_wide_fifo`, each refutes the claims of a stream."""
     inject(blysk.hdl.core.memory, "connect_wide_fifo", *WIDE_BUFFER_BUGS[bug])
     refute(of_stream(Chain(kept(2)), 2, 0, 1))
+
+
+def of_late_buffer():
+    """Four in the memory, of which three may be on their way, and two behind it."""
+    return of_stream(Chain(late(4)), 6, 4, 7)
+
+
+def test_late_buffer(prove):
+    """Inductive: the claims of a stream; four cycles through, and one more where another is written."""
+    prove(of_late_buffer())
+
+
+LATE_BUFFER_BUGS = {
+    "what waits is dropped": ("wanted & some", "some"),
+    "it takes in what it has no room for": ("room.eq(level < depth - UNCOUNTED)", "room.eq(level < depth)"),
+    "what was read is read again": ("(one & ~reads)", "one"),
+}
+
+
+@pytest.mark.parametrize("bug", LATE_BUFFER_BUGS)
+def test_bugs_of_a_late_buffer_are_found(refute, inject, bug):
+    """Injected in `connect_late_fifo`, each refutes the claims of a stream."""
+    inject(blysk.hdl.core.memory, "connect_late_fifo", *LATE_BUFFER_BUGS[bug])
+    refute(of_late_buffer(), 14)
 
 
 def test_a_proof_of_too_few_cycles_is_found(prove):
