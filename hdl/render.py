@@ -12,7 +12,7 @@ from blysk.golden.render import Renderer
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register
-from blysk.hdl.core.stream import connect, connect_fifo, moving
+from blysk.hdl.core.stream import connect, moving
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
 from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
@@ -67,8 +67,8 @@ _DEEP = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
 _COMPONENTS = 3
 """Components of a vector of geometry."""
 
-WAITING_SPANS = 513
-"""Spans between geometry and shading: a block RAM and a register behind it; not compact.
+WAITING_SPANS = 512
+"""Spans between geometry and shading, in block RAMs; not compact.
 
 Shading works on these while small triangles are set up; while it has large ones, the setup goes on.
 """
@@ -191,7 +191,7 @@ class RenderUnit(wiring.Component):
             # Memories of 16 words for one span and the next would cost as much as they win.
             connect_register(m, "waiting_span", made, ready)
         else:
-            connect_fifo(m, "spans", made, ready, depth=WAITING_SPANS)
+            connect_late_fifo(m, "spans", made, ready, WAITING_SPANS)
         given, dropped = Signal(name="given"), Signal(name="dropped")
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(pipeline.i.valid & pipeline.i.ready):
@@ -313,7 +313,7 @@ class RenderUnit(wiring.Component):
         with m.If(coarse.i.valid & coarse.i.ready):
             m.d.sync += [number.eq(place.picture), turned.eq(0)]
         answers = stream.Signature(1).create(path=("answers",))
-        connect_fifo(m, "answers", coarse.o, answers, depth=WAITING_SPANS)
+        connect_late_fifo(m, "answers", coarse.o, answers, WAITING_SPANS)
         m.d.comb += [
             *(place[name].eq(span.payload[name]) for name in ("x", "y", "length", "depth", "depth_step")),
             place.picture.eq(number ^ turns),

@@ -9,8 +9,9 @@ from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
 from blysk.golden.geometry.vector_adapter import VectorAdapter
+from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register, hold_output
-from blysk.hdl.core.stream import connect, connect_fifo, moving
+from blysk.hdl.core.stream import connect, moving
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
 from blysk.hdl.geometry.edge_setup import EdgeSetupUnit
@@ -47,15 +48,15 @@ PORT_DESCRIPTIONS = {
 }
 """Fields of a span, for the table in Verilog."""
 
-WAITING_TRIANGLES = 513
-"""Triangles between sort and setup: a block RAM and a register behind it; not compact.
+WAITING_TRIANGLES = 512
+"""Triangles between sort and setup, in block RAMs; not compact.
 
 Dropped triangles come in runs, of up to hundreds where a mesh turns its back; meanwhile the setup works on
 these.
 """
 
-_SCALES = 4
-"""Triangles whose scales the FIFO before the gradient setup holds."""
+BLOCK_WORDS = 64
+"""Words of a memory from which on it is a block RAM: fewer would take look-up tables."""
 
 _COMPACT_GRADIENT = 12
 """Initiation interval of an attribute in the compact style: the number of its products."""
@@ -116,22 +117,20 @@ class _TriangleSetup(wiring.Component):
         _fork(m, edges.o, corners, walks)
         for to in (corners.payload, walks.payload):
             m.d.comb += [to[name].eq(edges.o.payload[name]) for name in to.shape().members]
+        # Registers end the chain of readies from the assembler to the sort.
+        connect_register(m, "waiting_corners", corners, planes.i)
         if self._compact:
-            # Registers end the chain of readies from the assembler to the sort.
-            connect_register(m, "waiting_corners", corners, planes.i)
             connect_register(m, "waiting_walk", walks, wiring.flipped(self.walks))
         else:
-            connect_fifo(m, "waiting_corners", corners, planes.i, depth=3)
-            connect_fifo(m, "waiting_walks", walks, wiring.flipped(self.walks), depth=inside)
+            depth = max(inside + UNCOUNTED, BLOCK_WORDS)
+            connect_late_fifo(m, "waiting_walks", walks, wiring.flipped(self.walks), depth)
 
         ahead = (edges.latency + planes.latency) // self.interval + 3
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
-        connect_fifo(m, "waiting_attributes", serialiser.o, attributes, depth=ATTRIBUTES * ahead)
-        if self._compact:
-            # The plane setup goes on with the next triangle while the gradients of this one are computed.
-            connect_register(m, "waiting_scale", planes.o, scales)
-        else:
-            connect_fifo(m, "waiting_scales", planes.o, scales, depth=_SCALES)
+        depth = max(ATTRIBUTES * ahead + UNCOUNTED, BLOCK_WORDS)
+        connect_late_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
+        # The plane setup goes on with the next triangle while the gradients of this one are computed.
+        connect_register(m, "waiting_scale", planes.o, scales)
         to, turn = self._gradients.i, Signal(range(ATTRIBUTES), name="turn")
         moves = to.valid & to.ready
         with m.If(moves):
@@ -291,7 +290,7 @@ class GeometryUnit(wiring.Component):
         if self.compact:
             connect(m, self._sort.o, drawn)
         else:
-            connect_fifo(m, "waiting_triangles", self._sort.o, drawn, depth=WAITING_TRIANGLES)
+            connect_late_fifo(m, "waiting_triangles", self._sort.o, drawn, WAITING_TRIANGLES)
         lanes = self._lanes
         if len(lanes) == 1:
             connect(m, drawn, lanes[0].i)

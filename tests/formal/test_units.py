@@ -73,8 +73,9 @@ COUNTED = [
 
 @pytest.fixture(autouse=True)
 def short_fifos(monkeypatch):
-    """FIFOs of geometry hold 5 words in place of 513: every bit of theirs is a register of the proof."""
+    """FIFOs of geometry hold 5 words in place of 512: every bit of theirs is a register of the proof."""
     monkeypatch.setattr("blysk.hdl.geometry.geometry.WAITING_TRIANGLES", 5)
+    monkeypatch.setattr("blysk.hdl.geometry.geometry.BLOCK_WORDS", 5)
     monkeypatch.setattr("blysk.hdl.render.WAITING_SPANS", 5)
 
 
