@@ -1,6 +1,7 @@
 """Input and output of the shading pipeline: raster spans, and pixels."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -44,11 +45,11 @@ class Spans:
     factors: np.ndarray | None = None
     vectors: SpanVectors | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.material is None:
             object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.length)
 
     def __getitem__(self, which: slice | np.ndarray) -> "Spans":
@@ -57,8 +58,10 @@ class Spans:
         fields = ("x", "y", "length", "normal_left", "normal_right", "material")
         chosen = {name: getattr(self, name)[which] for name in fields}
         factors = self.factors if self.factors is None else self.factors[which]
-        vectors = self.vectors if self.vectors is None else self.vectors[which]
-        return Spans(**chosen, values=values, factors=factors, vectors=vectors)
+        found = Spans(**chosen, values=values, factors=factors)
+        return (
+            found if self.vectors is None else replace(found, vectors=cast(SpanVectors, self.vectors[which]))
+        )
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,10 @@ LIGHT_STRIDE = 16
 """Addresses from one light to the next."""
 
 
-_WIDER = {"exponent": "lower the exponent,", "roughness": "raise the roughness or lower"}
+_WIDER: dict[str | None, str] = {
+    "exponent": "lower the exponent,",
+    "roughness": "raise the roughness or lower",
+}
 
 
 @dataclass(frozen=True)
@@ -168,7 +171,7 @@ class FrameConstants:
                 continue
             diffuse[index] = Intensity.color(np.multiply(material.diffuse, light.color))
             between = np.zeros(3)
-            if not scene.local:
+            if light.direction is not None and not scene.local:
                 direction[index] = quantise(np.asarray(light.direction))
                 between = halfway_vector(light.direction, scene.camera.viewer)
             has_halfway = np.any(between)
@@ -300,8 +303,8 @@ def address_table(
         rows += [(base + AXIS_STRIDE * row, 3, axis) for row, axis in enumerate(axes)]
     lines = []
     for first, count, name in rows:
-        last = f" to {first + count - 1}" if count > 1 else ""
+        end = f" to {first + count - 1}" if count > 1 else ""
         number = first // LIGHT_STRIDE - (1 if first < AXES_ADDRESS else AXES_ADDRESS // LIGHT_STRIDE)
-        light = f" (light {number})" if first >= LIGHT_STRIDE else ""
-        lines.append(f"  {first:>3}{last:<8} {meanings[name].format(threshold=threshold)}{light}")
+        whose = f" (light {number})" if first >= LIGHT_STRIDE else ""
+        lines.append(f"  {first:>3}{end:<8} {meanings[name].format(threshold=threshold)}{whose}")
     return lines

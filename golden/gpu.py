@@ -33,7 +33,7 @@ class Gpu:
     drawing: Drawing
     buffer: BandBuffer = field(default_factory=BandBuffer)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.drawing.size != self.buffer.mode.size or self.drawing.lines != self.buffer.lines:
             raise ValueError(
                 f"drawn are {self.drawing.size} pixels by {self.drawing.lines} lines, shown "

@@ -60,7 +60,7 @@ class Build:
     setup_interval: int | None = None
     exponent: int | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.style not in STYLES:
             raise ValueError(f"style must be one of {', '.join(STYLES)}, not {self.style!r}")
         if self.exponent is not None and not 1 <= self.exponent <= MAX_EXPONENT:
@@ -123,7 +123,7 @@ class Design:
     factors: tuple[int, ...] = ()
     build: Build = field(default_factory=Build)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._match_table()
         if self.specular is not None and self.specular.operand != self.interpolator.operand:
             matching = replace(self.specular, operand=self.interpolator.operand)
@@ -147,7 +147,7 @@ class Design:
 
     def _match_table(self) -> None:
         """Give a method that takes vectors a lobe of its own, and the kind of its angle; others none."""
-        lobe, method = self.specular, cast(Any, self.interpolator)
+        lobe, method = cast(Any, self.specular), self.interpolator
         if lobe and (lobe.operand == "place") != self.takes_vectors:
             if not self.takes_vectors and lobe.model.MIRROR:
                 raise ValueError(f"{lobe.name} is a lobe of R·V: take the method quotient, or phong_coplanar")
@@ -218,9 +218,14 @@ class Design:
                 interpolator = replace(interpolator, scale=specular.scale_of(list(lobes)))
         return replace(self, materials=len(materials), specular=specular, interpolator=interpolator)
 
-    def built(self, **changes) -> "Design":
+    def built(self, **changes: Any) -> "Design":
         """The same design with other values of its `Build`."""
         return replace(self, build=replace(self.build, **changes))
+
+    @property
+    def lobe(self) -> Lobe:
+        """The specular unit of a design that `loads_tables`."""
+        return cast(Lobe, self.specular)
 
     @property
     def method(self) -> str:
@@ -460,7 +465,8 @@ class Design:
         """Colours of pixels by their materials, without any light."""
         nothing = Fixed(Intensity.TERM_FORMAT, np.zeros((1, 0), dtype=np.int64))
         each = [self.intensity.compute(*self._colors(of), nothing, nothing) for of in constants]
-        return np.concatenate(each)[material]
+        color: np.ndarray = np.concatenate(each)[material]
+        return color
 
     @property
     def intensity(self) -> Intensity:

@@ -39,7 +39,7 @@ class PixelPipelines:
     design: Design = field(default_factory=Design)
     pipes: int = 4
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.pipes not in PIPES:
             raise ValueError(f"pipes must be one of {', '.join(map(str, PIPES))}, not {self.pipes}")
         if self.pipes > 1 << self.design.y_bits:

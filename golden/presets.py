@@ -1,6 +1,7 @@
 """Designs by name: the methods and reflection models of the command line, the API and the tables."""
 
 from dataclasses import fields, replace
+from typing import Any, Literal, cast
 
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
@@ -124,11 +125,11 @@ def preset(
     lights: int = 1,
     *,
     operand: Operand | None = None,
-    style: str = "throughput",
+    style: Literal["throughput", "compact"] = "throughput",
     setup_interval: int | None = None,
     exponent: int | None = None,
     roughness: float | None = None,
-    **options,
+    **options: Any,
 ) -> Design:
     """Make a design by names.
 
@@ -176,7 +177,7 @@ def preset(
     if specular is not None and specular.has_table:
         given = {name: own.pop(name) for name in ("octaves", "steps", "banks", "cutoff") if name in own}
         given.setdefault("banks", min(options.get("materials", 1), Lobe.MAX_BANKS))
-        specular = _with_fixed_table(replace(specular, **given), exponent, roughness)
+        specular = _with_fixed_table(replace(cast(Lobe, specular), **given), exponent, roughness)
         exponent = None
     elif roughness is not None:
         raise ValueError(f"model {model} has no roughness to fix")

@@ -53,7 +53,7 @@ class DrawnPixels:
     out_of_range_spans: int
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Output beats of the hardware: the fields of each pixel."""
         colors = dict(zip("rgb", self.color.T, strict=True))
         return {"x": self.x, "y": self.y, **colors, "depth": self.depth}
@@ -87,7 +87,7 @@ class Renderer:
     geometry: Geometry = None  # type: ignore[assignment]  # becomes one
     coarse: CoarseDepth | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         design, vectors = self.design, self.design.takes_vectors
         lines = design.interpolator.takes_line and not vectors
         suits = Geometry(lines=lines, vectors=vectors, rotates=vectors and design.lights > 1)

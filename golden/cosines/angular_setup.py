@@ -134,7 +134,7 @@ class AngularSetup:
     RADIANS_FORMAT = UQ(2, 15)
     TURNS_PER_RADIAN = Fixed.round(UQ(-2, 19), 1 / (2 * np.pi))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.angle not in SPAN_ANGLES:
             raise ValueError(f"angle must be {' or '.join(SPAN_ANGLES)}, not {self.angle!r}")
 
@@ -165,7 +165,10 @@ class AngularSetup:
         ends = np.minimum(half, np.pi / 2 - half) * HalfChord.RELATIVE_ERROR
         ends = ends + 2 * half * (2.0**-19 / 0.159 + 2.0**-17)
         acute = half <= np.pi / 4 * (1 + 1e-6)
-        return x + np.where(acute, np.sin(half), 1) * y + cordic + ends + 2 * np.pi * 4095 * 2.0**-40
+        found: np.ndarray = (
+            x + np.where(acute, np.sin(half), 1) * y + cordic + ends + 2 * np.pi * 4095 * 2.0**-40
+        )
+        return found
 
     def arccos_error(self, angle: float) -> float:
         """Bound of the error of cos gamma with ``angle="arccos"``, for one span angle in degrees.
@@ -193,7 +196,10 @@ class AngularSetup:
         off += (psi + off) * 2.0**-20 * 2 * np.pi
         chord = 2 * min(np.sin(psi / 2), np.cos(psi / 2))
         cos_beta = min(1 + 2.0**-17 / max(chord, 2.0**-18), np.sqrt(2))
-        return self.error(angle) + cos_beta * (off / 2 + 2 * np.pi * 2.0**-19 + off * 2.0**-17)
+        found: float = self.error(np.asarray(angle)) + cos_beta * (
+            off / 2 + 2 * np.pi * 2.0**-19 + off * 2.0**-17
+        )
+        return found
 
     @cached_property
     def corrections(self) -> tuple[Fixed, Fixed]:
@@ -202,7 +208,7 @@ class AngularSetup:
         start = np.arange(1 << self.ADDRESS_BITS) / (2 << self.ADDRESS_BITS)
         width = start[1]
 
-        def function(z):
+        def function(z: np.ndarray) -> np.ndarray:
             return 1 / (one * np.sqrt(1 - z / one)) - 1
 
         return self._chords(function, start, width, self.CORRECTION_VALUE_FORMAT, self.CORRECTION_RISE_FORMAT)
@@ -218,8 +224,9 @@ class AngularSetup:
         width = start[1]
         used = start >= 1 / 4
 
-        def function(v):
-            return 1 / (2 * np.sqrt(np.maximum(v, 1 / 4) * one))
+        def function(v: np.ndarray) -> np.ndarray:
+            inverse: np.ndarray = 1 / (2 * np.sqrt(np.maximum(v, 1 / 4) * one))
+            return inverse
 
         value, fall = self._chords(
             function, start, width, self.RECIPROCAL_VALUE_FORMAT, self.RECIPROCAL_FALL_FORMAT
@@ -307,12 +314,14 @@ class AngularSetup:
             angle, angle_shift = HalfChord().compute(chord, obtuse), np.where(obtuse, 0, shift)
         else:
             angle, angle_shift = self._by_arccos(cross), np.zeros_like(shift)
-        cos_beta = sum(sign * (radius << 4 >> k) for sign, k in self.gain_terms)
-        cos_beta = Fixed(SQ(4, self.GAIN_BITS), cos_beta).round_half_up(25).saturate(self.COS_BETA_FORMAT)
+        gained = sum(sign * (radius << 4 >> k) for sign, k in self.gain_terms)
+        cos_beta = Fixed(SQ(4, self.GAIN_BITS), gained).round_half_up(25).saturate(self.COS_BETA_FORMAT)
         half = angle.scale(-1).extend(UQ(0, 40))
         phase = (direction.extend(self.PHASE_FORMAT) + half).wrap(self.PHASE_FORMAT)
         step = self._step(angle, angle_shift, length)
-        out_of_range = obtuse & (chord.truncate(self.SHORTEST_SUM.format.fraction_bits) < self.SHORTEST_SUM)
+        out_of_range: np.ndarray = obtuse & (
+            chord.truncate(self.SHORTEST_SUM.format.fraction_bits) < self.SHORTEST_SUM
+        )
         return angle, phase, step, cos_beta, out_of_range
 
     def _by_arccos(self, cross: Fixed) -> Fixed:
@@ -322,7 +331,7 @@ class AngularSetup:
         radians = radians.round_half_up(15).saturate(self.RADIANS_FORMAT)
         return (radians * self.TURNS_PER_RADIAN).extend(self.ANGLE_FORMAT)
 
-    def _looked_up(self, table, bits: np.ndarray, width: int) -> tuple[Fixed, Fixed]:
+    def _looked_up(self, table: tuple[Fixed, Fixed], bits: np.ndarray, width: int) -> tuple[Fixed, Fixed]:
         """Word of a table at the leading bits, and its change times the fraction that follows them."""
         values, changes = table
         address = bits >> (width - self.ADDRESS_BITS)

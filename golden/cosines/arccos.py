@@ -89,7 +89,7 @@ class Arccos:
     RESULT_FORMAT = UQ(2, 16)
     COEFFICIENT_BITS = 18
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.table not in ARCCOS_TABLES:
             raise ValueError(f"the arccos table must be {', '.join(ARCCOS_TABLES)}, not {self.table!r}")
 
@@ -110,7 +110,8 @@ class Arccos:
         largest = np.max(
             np.abs([c1, c2, c1 + c2 * SEGMENT_BOUNDS[:-1], c1 + c2 * SEGMENT_BOUNDS[1:]]), axis=0
         )
-        return np.maximum(np.floor(np.log2(largest)).astype(np.int64) + 2, 2)
+        found: np.ndarray = np.maximum(np.floor(np.log2(largest)).astype(np.int64) + 2, 2)
+        return found
 
     @cached_property
     def codes(self) -> np.ndarray:
@@ -127,13 +128,14 @@ class Arccos:
         if self.table == "refitted":
             # The coarsest word is rounded first: the following fits compensate its rounding error.
             for segment in range(5):
-                held = {}
+                held: dict[int, float] = {}
                 for power in (2, 1, 0):
                     fit = _fit(segment, tuple(held.items()))
                     unit = 2.0 ** -fraction_bits[segment, power]
                     held[power] = float(np.floor(fit[power] / unit + 0.5) * unit)
                     coefficients[segment, power] = held[power]
-        return np.floor(np.ldexp(coefficients, fraction_bits) + 0.5).astype(np.int64)
+        found: np.ndarray = np.floor(np.ldexp(coefficients, fraction_bits) + 0.5).astype(np.int64)
+        return found
 
     @cached_property
     def bounds(self) -> np.ndarray:
@@ -145,7 +147,8 @@ class Arccos:
         x = np.asarray(x, dtype=np.float64)
         c0, c1, c2 = self.coefficients[self._segment(np.abs(x), SEGMENT_BOUNDS[1:-1])].T
         angle = c0.T + np.abs(x) * (c1.T + np.abs(x) * c2.T)
-        return np.where(x < 0, np.pi - angle, angle)
+        found: np.ndarray = np.where(x < 0, np.pi - angle, angle)
+        return found
 
     @cached_property
     def arithmetic_error(self) -> np.ndarray:
@@ -158,10 +161,11 @@ class Arccos:
         x = np.linspace(SEGMENT_BOUNDS[:-1], SEGMENT_BOUNDS[1:], 65, axis=1)
         powers = np.stack([np.ones_like(x), x, x * x])
         rounding = np.abs(np.einsum("sc,csx->sx", words - self.coefficients, powers)).max(axis=1)
-        return rounding + x[:, -1] * 2.0 ** -(fraction_bits + 1) + 2.0**-17 + 2.0**-33
+        found: np.ndarray = rounding + x[:, -1] * 2.0 ** -(fraction_bits + 1) + 2.0**-17 + 2.0**-33
+        return found
 
     @staticmethod
-    def _segment(magnitude: np.ndarray, bounds: Sequence | np.ndarray) -> np.ndarray:
+    def _segment(magnitude: np.ndarray, bounds: Sequence[float] | np.ndarray) -> np.ndarray:
         return np.searchsorted(bounds, magnitude, side="right")
 
     def compute(self, x: Fixed) -> tuple[Fixed, np.ndarray]:
@@ -202,6 +206,5 @@ class Arccos:
 @cache
 def _fit(segment: int, held: tuple[tuple[int, float], ...] = ()) -> np.ndarray:
     """Quadratic of least maximum error on a segment, with some coefficients given."""
-    return minimax(
-        lambda x: np.arccos(np.minimum(x, 1.0)), *SEGMENT_BOUNDS[segment : segment + 2], 2, dict(held)
-    )
+    low, high = SEGMENT_BOUNDS[segment : segment + 2]
+    return minimax(lambda x: np.arccos(np.minimum(x, 1.0)), low, high, 2, dict(held))

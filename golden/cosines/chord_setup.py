@@ -1,7 +1,7 @@
 """Chord setup: forward differences of N·L and of half the squared chord, from three values a span."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -129,7 +129,7 @@ class ChordSetup:
         if scale not in range(cls.MOST_SCALE + 1):
             raise ValueError(f"scale must be 0 to {cls.MOST_SCALE}, not {scale}")
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.fraction_bits not in range(36, 47, 2):
             raise ValueError(f"fraction_bits must be even and 36 to 46, not {self.fraction_bits}")
 
@@ -156,7 +156,7 @@ class ChordSetup:
 
     def compute(
         self, diffuse: Fixed, highlight: Fixed, length: np.ndarray, factor: Fixed | None = None
-    ) -> tuple:
+    ) -> tuple[Any, ...]:
         """Bit-accurate differences of f and of u, and of the factors a of lights that fade.
 
         Parameters

@@ -164,7 +164,8 @@ class HalfChord:
 
 def _angle_by_root(z: np.ndarray) -> np.ndarray:
     root = np.sqrt(np.maximum(z, 1e-24))
-    return 2 * np.arcsin(root) / (np.pi * root)
+    found: np.ndarray = 2 * np.arcsin(root) / (np.pi * root)
+    return found
 
 
 @cache

@@ -76,7 +76,7 @@ class HighlightCosine:
     NEAR_ERROR = (np.pi / 1024) ** 2 * 0.0858 + _COMMON + 2.0**-25 * 2 * np.pi * 0.25 + 2.0**-17 / 32
     ERROR = (np.pi / 1024) ** 2 / 16 + _COMMON + 2.0**-25 * 2 * np.pi + 2.0**-17 + 2.0**-17
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 4 <= self.address_bits <= 12:
             raise ValueError(f"address_bits must be 4 to 12, not {self.address_bits}")
 

@@ -1,7 +1,7 @@
 """Spans of the quotient method: squared lengths and lines of every pixel, by forward differences."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class SpanVectors(NamedTuple):
     step: np.ndarray
     exponent: np.ndarray
 
-    def __getitem__(self, which):  # type: ignore[override]
+    def __getitem__(self, which: Any) -> Any:
         """Some of the spans, by a slice, indices or a mask; or a field, by its number."""
         if isinstance(which, int):
             return tuple.__getitem__(self, which)
@@ -183,7 +183,7 @@ class QuotientSpans:
     ONE = 2**17 - 2
     """Code of length 1 of L: the code's length is under 1 after rounding, and the line never outgrows v."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.lights < 1:
             raise ValueError(f"lights must be at least 1, not {self.lights}")
         if self.mirror and not self.highlights:
@@ -221,7 +221,8 @@ class QuotientSpans:
 
     def codes_of(self, sine: np.ndarray, cosine: np.ndarray) -> np.ndarray:
         """Codes of L in the frames of lights: int64 array, shape (lights, 2), for sin a and cos a."""
-        return np.rint(np.stack([sine, cosine], axis=-1) * self.ONE).astype(np.int64)
+        found: np.ndarray = np.rint(np.stack([sine, cosine], axis=-1) * self.ONE).astype(np.int64)
+        return found
 
     def differences(self, vectors: SpanVectors, direction: np.ndarray | None = None) -> QuotientWords:
         """Bit-accurate starts and differences.
@@ -242,7 +243,7 @@ class QuotientSpans:
         place = {name: index for index, name in enumerate(self.components)}
         shift = exponent[:, np.newaxis]
 
-        def products(a, b):
+        def products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             pairs = a * b
             return np.stack([pairs[:, [place[c] for c in names]].sum(axis=1) for names in self.squares], -1)
 
@@ -251,16 +252,20 @@ class QuotientSpans:
         first = ((products(start, step) << (fraction + 1)) >> shift) + (second >> 1)
         squares = products(start, start) << fraction, first, second
 
+        codes = None
         if self.highlights:
-            direction = Fixed(self.COMPONENT_FORMAT, direction).codes
+            if direction is None:
+                raise ValueError("highlights need sin a and cos a of each light")
+            codes = Fixed(self.COMPONENT_FORMAT, direction).codes
 
-            def line(vector):
-                ends = (vector[:, [place[f"{axis}{k}"] for k in range(self.lights)]] for axis in "xz")
-                return sum(end * direction[:, k] for k, end in enumerate(ends))
-        else:
-
-            def line(vector):
-                return vector[:, [place[f"z{k}"] for k in range(self.lights)]] * self.ONE
+        def line(vector: np.ndarray) -> np.ndarray:
+            height = vector[:, [place[f"z{k}"] for k in range(self.lights)]]
+            if codes is None:
+                scaled: np.ndarray = height * self.ONE
+                return scaled
+            across = vector[:, [place[f"x{k}"] for k in range(self.lights)]]
+            turned: np.ndarray = across * codes[:, 0] + height * codes[:, 1]
+            return turned
 
         fraction = self.LINE_FORMAT.fraction_bits - 34
         lines = line(start) << fraction, (line(step) << fraction) >> shift

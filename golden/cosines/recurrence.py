@@ -28,7 +28,8 @@ def shortcut_cosine(angle: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.3.
     """
-    return (np.cos(angle) - 1) / np.square(np.asarray(steps, dtype=np.float64)) + 1
+    found: np.ndarray = (np.cos(angle) - 1) / np.square(np.asarray(steps, dtype=np.float64)) + 1
+    return found
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class Recurrence:
     LENGTH_BITS = 12
     MAX_STEP = np.pi / 2
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.form not in RECURRENCE_FORMS:
             raise ValueError(f"form must be one of {', '.join(RECURRENCE_FORMS)}, not {self.form!r}")
         if not 8 <= self.fraction_bits <= 32:
@@ -180,11 +181,13 @@ class Recurrence:
             cut = self.state_format.step
             # The state is under 1.01. At the largest shift the coefficient is off by 2^-(F + 47).
             curvature = 1.01 * np.square(angle / np.maximum(steps, 1)) + 2.0**-47
-            return sums * (curvature * word + cut) + (steps + 2) * cut / 2 + rounding
+            error: np.ndarray = sums * (curvature * word + cut) + (steps + 2) * cut / 2 + rounding
+            return error
         growth = sums * word
         with np.errstate(divide="ignore"):
             grown = (1.5 * growth + np.maximum(steps, 0.5) * word) / np.maximum(1 - growth, 0) + rounding
-        return np.minimum(grown, 3.0)
+        found: np.ndarray = np.minimum(grown, 3.0)
+        return found
 
     def _phase_span(self, length: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Steps of the longest phase, and the angle that they cover together."""
@@ -212,7 +215,8 @@ class Recurrence:
         cut = self.state_format.step
         error = (1.01 * np.square(step) + 2.0**-47) * 2.0**-self.fraction_bits + cut
         # An error of the first value recurs up to 1/cos(2d) times as large, with d up to 11.25 degrees.
-        return 1.09 * (3 * error + 2 * cut) + steps * (18 * error + 2 * cut)
+        found: np.ndarray = 1.09 * (3 * error + 2 * cut) + steps * (18 * error + 2 * cut)
+        return found
 
     def coefficient(self, step: np.ndarray) -> tuple[Fixed, np.ndarray]:
         """Coefficient for a step d, in the format of the recurrence unit.
@@ -357,7 +361,9 @@ class Recurrence:
             found = np.moveaxis(found, 2, 1).reshape(-1, found.shape[1])[:steps]
         return Fixed(self.state_format, found)
 
-    def _reinsch(self, x, difference, factor, shift, is_first):
+    def _reinsch(
+        self, x: np.ndarray, difference: np.ndarray, factor: np.ndarray, shift: np.ndarray, is_first: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
         if not is_first:
             bits = self.curvature_format.fraction_bits
             product = (x >> self.guard_bits) * factor << (bits - 2 * self.fraction_bits + 1)
@@ -365,7 +371,9 @@ class Recurrence:
             difference = self.state_format.wrap(difference - (product >> shift >> cut))
         return self.state_format.wrap(x + difference), difference
 
-    def _direct(self, x, other, factor, shift, is_first):
+    def _direct(
+        self, x: np.ndarray, other: np.ndarray, factor: np.ndarray, shift: np.ndarray, is_first: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
         if is_first:
             return other, x
         bits = self.fraction_bits

@@ -109,7 +109,7 @@ class RecurrenceSetup:
     WIDEST = Fixed(UQ(1, 13), (1 << 13) + 1)
     TABLE_ERROR = 8e-7
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         r = self.recurrence
         if (r.interleave, r.fraction_bits) != (4, 16):
             raise ValueError("the recurrence must be interleaved, with 16 fraction bits")
@@ -159,20 +159,25 @@ class RecurrenceSetup:
         chord = np.where(q > 0.499, 0.65 * 2.7e-5, 0)
         cuts = 2.0**-32 + 4095 * 4 * 2.0**-44
         own = self.recurrence.error(length, angle) + self.recurrence.prologue_error(length, angle)
-        return np.square(angle) / 2 * coefficient + angle * slope + difference + chord + cuts + own
+        found: np.ndarray = (
+            np.square(angle) / 2 * coefficient + angle * slope + difference + chord + cuts + own
+        )
+        return found
 
     @cached_property
     def chord_tables(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
         """Tables of ``psi^2/(2q) - 1`` and ``psi/sin psi - 1`` for q from 0 to 1."""
 
-        def angle(q):
+        def angle(q: np.ndarray) -> np.ndarray:
             return 2 * np.arcsin(np.sqrt(q / 2))
 
-        def square(q):
-            return np.square(angle(q)) / (2 * q) - 1
+        def square(q: np.ndarray) -> np.ndarray:
+            found: np.ndarray = np.square(angle(q)) / (2 * q) - 1
+            return found
 
-        def inverse(q):
-            return angle(q) / np.sin(angle(q)) - 1
+        def inverse(q: np.ndarray) -> np.ndarray:
+            found: np.ndarray = angle(q) / np.sin(angle(q)) - 1
+            return found
 
         start = np.arange(1 << self.ADDRESS_BITS) / (1 << self.ADDRESS_BITS)
         return self._lines(square, start), self._lines(inverse, start)
@@ -181,16 +186,18 @@ class RecurrenceSetup:
     def step_tables(self) -> tuple[tuple[Fixed, Fixed], tuple[Fixed, Fixed]]:
         """Tables of ``1 - 4 sin^2(d/2)/d^2`` and ``1 - sin d/d`` for ``d^2`` from 0 to 4."""
 
-        def one_minus_k(square):
-            return 1 - 4 * np.square(np.sin(np.sqrt(square) / 2)) / square
+        def one_minus_k(square: np.ndarray) -> np.ndarray:
+            found: np.ndarray = 1 - 4 * np.square(np.sin(np.sqrt(square) / 2)) / square
+            return found
 
-        def sine(square):
-            return 1 - np.sin(np.sqrt(square)) / np.sqrt(square)
+        def sine(square: np.ndarray) -> np.ndarray:
+            found: np.ndarray = 1 - np.sin(np.sqrt(square)) / np.sqrt(square)
+            return found
 
         start = 4 * np.arange(1 << self.ADDRESS_BITS) / (1 << self.ADDRESS_BITS)
         return self._lines(one_minus_k, start), self._lines(sine, start)
 
-    def _lines(self, function: Callable, start: np.ndarray) -> tuple[Fixed, Fixed]:
+    def _lines(self, function: Callable[[np.ndarray], np.ndarray], start: np.ndarray) -> tuple[Fixed, Fixed]:
         """Lines of nearly least maximum error, start and change, for a function that is 0 at 0."""
         width = start[1]
         low, middle, high = (function(np.maximum(start + width * part, 1e-12)) for part in (0, 0.5, 1))
@@ -205,8 +212,8 @@ class RecurrenceSetup:
         square = 1 / np.square(1 + np.arange(size) / size)
         square[0] = 0.25
         small = square < 0.5
-        square = Fixed.round(UQ(1, 17), square * (1 + small)).saturate(self.WORD_FORMAT)
-        return reciprocal_table(self.WORD_FORMAT), square, small.astype(np.int64)
+        word = Fixed.round(UQ(1, 17), square * (1 + small)).saturate(self.WORD_FORMAT)
+        return reciprocal_table(self.WORD_FORMAT), word, small.astype(np.int64)
 
     def compute(
         self, normal_left: Fixed, normal_right: Fixed, vector: Fixed, length: np.ndarray

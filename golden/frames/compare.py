@@ -207,11 +207,11 @@ def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> floa
     if made.interpolator != design.interpolator:
         return None
     if isinstance(lobe, Lobe):
-        own = made.specular
+        own = made.lobe
         if model.name not in TABLE_MODELS or replace(own, banks=lobe.banks) != lobe:
             return None
         parameters = [design.highlight_parameter(material) for material in scene.materials]
-        if model.PARAMETER == "roughness" and min(parameters) < LEAST_ROUGHNESS:
+        if model.PARAMETER == "roughness" and min(of or 0 for of in parameters) < LEAST_ROUGHNESS:
             return None
         if not hasattr(design.interpolator, "scale") and own.scale_of(parameters):
             return None

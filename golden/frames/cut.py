@@ -69,9 +69,10 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
     """
     cosine = np.cos(np.radians(largest_angle))
 
-    def is_wide(origin, first, last):
+    def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         left, right = (_normals(raster, origin, place) for place in (first, last))
-        return (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
+        wide: np.ndarray = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
+        return wide
 
     return _halve(raster, is_wide)
 
@@ -94,7 +95,7 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         As of `cut_spans`.
     """
 
-    def is_wide(origin, first, last):
+    def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         steps = np.maximum(raster.length[origin] - 1, 1)
         left, right = (lines_along(raster, origin, place / steps) for place in (first, last))
         change = right - left
@@ -105,7 +106,8 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         places = np.floor(nearest), np.ceil(nearest)
         least = [np.linalg.norm(lines_along(raster, origin, place / steps), axis=1) for place in places]
         longest = np.maximum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))
-        return (np.minimum(*least) * largest_ratio < longest) & (last > first)
+        wide: np.ndarray = (np.minimum(*least) * largest_ratio < longest) & (last > first)
+        return wide
 
     return _halve(raster, is_wide)
 
@@ -128,11 +130,12 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         As of `cut_spans`. Spans of two pixels count as cut only if their ends differ so.
     """
 
-    def differs(origin, first, last):
+    def differs(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         steps = np.maximum(raster.length[origin] - 1, 1)
         left, right = (lines_along(raster, origin, place / steps) for place in (first, last))
         shorter, longer = np.sort([np.linalg.norm(end, axis=1) for end in (left, right)], axis=0)
-        wide = (longer > largest_ratio * shorter) | (np.einsum("ij,ij->i", left, right) < 0)
+        wide: np.ndarray = longer > largest_ratio * shorter
+        wide |= np.einsum("ij,ij->i", left, right) < 0
         return wide & (last > first)
 
     spans = np.arange(len(raster.length))
@@ -174,7 +177,7 @@ def _halve(raster: Raster, is_wide: Callable[..., np.ndarray]) -> tuple[Raster, 
     return (_parts(raster, origin, first, last) if cut else raster), cut
 
 
-def _parts(raster, origin, first, last) -> Raster:
+def _parts(raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> Raster:
     """Raster of parts of spans: each part has the pixels ``first`` to ``last`` of the span ``origin``."""
     order = np.lexsort((first, origin))
     origin, first, last = (field[order] for field in (origin, first, last))
@@ -192,7 +195,7 @@ def _parts(raster, origin, first, last) -> Raster:
         ends[f"weights_{side}"][inner] = weights_along(raster, span, t)
         ends[f"magnitude_{side}"][inner] = np.linalg.norm(lines_along(raster, span, t), axis=1)
     span = np.repeat(np.arange(len(length), dtype=np.int32), length)
-    return replace(
+    found: Raster = replace(
         raster,
         x=(raster.x[origin] + first).astype(np.int32),
         y=raster.y[origin],
@@ -203,6 +206,7 @@ def _parts(raster, origin, first, last) -> Raster:
         span=span,
         offset=(np.arange(len(span)) - start[span]).astype(np.int16),
     )
+    return found
 
 
 def cut_by_error(
@@ -246,10 +250,10 @@ def cut_by_error(
     limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
     cosines = np.cos(np.radians([interpolator.widest_span(exponent) for exponent in limits.exponents]))
 
-    def is_wide(origin, first, last):
+    def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         material = scene.mesh.material[raster.triangle[origin]]
         left, right = (_normals(raster, origin, place) for place in (first, last))
-        wide = (np.einsum("ij,ij->i", left, right) < cosines[material]) & (last > first)
+        wide: np.ndarray = (np.einsum("ij,ij->i", left, right) < cosines[material]) & (last > first)
         rest = np.flatnonzero(~wide & (last - first > 1))
         pieces = Pieces.of(scene, raster, origin[rest], first[rest], last[rest])
         wide[rest] = pieces.miss(interpolator, limits, material[rest])

@@ -1,6 +1,6 @@
 """Highlight limits: tolerances of u for a scene's highlights, and where there is no highlight."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -37,7 +37,8 @@ class _Curve:
     def tolerance(self, u: np.ndarray) -> np.ndarray:
         """As of `HighlightLimits`."""
         slope = np.maximum(self._from(self._points[1], u), 2.0**-self.scale)
-        return LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
+        found: np.ndarray = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
+        return found
 
     @cached_property
     def turn(self) -> float:
@@ -45,7 +46,8 @@ class _Curve:
         u, _, slope = curve_lines(self.model, self.parameter)
         # Each slope counts up to the next argument.
         steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slope)).max()
-        return LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
+        found: float = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
+        return found
 
     def is_lit(self, u: np.ndarray) -> np.ndarray:
         """As of `HighlightLimits`."""
@@ -78,17 +80,17 @@ class HighlightLimits:
     def of(cls, materials: Sequence[Material], design: Design | None = None) -> "HighlightLimits":
         """Limits of materials with the specular unit of a design; without a design by their exponents."""
         if design is None or design.specular is None:
-            exponents = [material.exponent for material in materials]
+            exponents = [float(material.exponent) for material in materials]
         else:
             exponents = [design.steepness(material) for material in materials]
         curves: list[_Curve | None] = [None] * len(materials)
         if design is not None and design.loads_tables:
-            model = design.specular.model
-            made = {}
+            lobe = design.lobe
+            made: dict[float | None, _Curve] = {}
             for index, material in enumerate(materials):
                 parameter = design.highlight_parameter(material)
                 if parameter not in made:
-                    made[parameter] = _Curve(model, parameter, design.specular.scale)
+                    made[parameter] = _Curve(lobe.model, parameter, lobe.scale)
                 curves[index] = made[parameter]
         return cls(np.asarray(exponents, dtype=np.float64), tuple(curves))
 
@@ -121,7 +123,8 @@ class HighlightLimits:
         for index, curve in enumerate(self.curves):
             if curve is not None:
                 of_material[index] = curve.turn
-        return of_material[material]
+        found: np.ndarray = of_material[material]
+        return found
 
     def is_lit(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
@@ -130,7 +133,13 @@ class HighlightLimits:
         """
         return self._of("is_lit", LocalChordInterpolator.is_lit, material, u)
 
-    def _of(self, name, by_exponent, material, u):
+    def _of(
+        self,
+        name: str,
+        by_exponent: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        material: np.ndarray,
+        u: np.ndarray,
+    ) -> np.ndarray:
         result = by_exponent(self.exponents[material][:, np.newaxis], u)
         for curve in dict.fromkeys(self.curves):
             if curve is not None:

@@ -30,14 +30,16 @@ CHUNK = 1 << 16
 def weights_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Weights of the triangle's corners at t of each span, shape (spans, 3); they are linear in t."""
     t = t[:, np.newaxis]
-    return (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
+    found: np.ndarray = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
+    return found
 
 
 def lines_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Normals, not of unit length, at t of each span, shape (spans, 3); they are linear in t."""
     t = t[:, np.newaxis]
     left, right = line_ends(raster, span)
-    return (1 - t) * left + t * right
+    found: np.ndarray = (1 - t) * left + t * right
+    return found
 
 
 def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
@@ -114,7 +116,8 @@ class SurfacePoints:
         move = np.linalg.norm(self.viewer - other.viewer, axis=1)
         move = move + np.linalg.norm(self.direction - other.direction, axis=2)
         total = [np.linalg.norm(place.direction + place.viewer, axis=2) for place in (self, other)]
-        return result | (move > method.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=0)
+        found: np.ndarray = result | (move > method.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=0)
+        return found
 
 
 def chunks(count: int) -> Iterator[slice]:
@@ -186,8 +189,8 @@ def local_operands(
             for values, of_place in zip(operands, found, strict=True):
                 values[has[part], :given, place] = of_place
     diffuse, highlight, factor = operands
-    values = SpanValues.quantise(diffuse, highlight, scale)
+    codes = SpanValues.quantise(diffuse, highlight, scale)
     if not factors:
-        return values, None
+        return codes, None
     wanted = factor[:, list(factors)]
-    return values, SpanValues.quantise(wanted, np.zeros_like(wanted)).diffuse
+    return codes, SpanValues.quantise(wanted, np.zeros_like(wanted)).diffuse

@@ -1,5 +1,7 @@
 """Missed spans: how many spans of a frame a method's curve, or its words, miss."""
 
+from typing import Any
+
 import numpy as np
 
 from blysk.golden.frames.highlight_limits import HighlightLimits
@@ -124,7 +126,8 @@ def component_error(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Re
     rows = np.ptp(drawn.triangles.y, axis=1) / steps
     width = np.maximum(drawn.area / np.maximum(rows, 1 / steps) / steps**2, 1 / steps)
     error = GradientSetup.error(rows, width) + ATTRIBUTE.step / 2 + SPAN_NORMAL.step
-    return error[pieces.triangle]
+    found: np.ndarray = error[pieces.triangle]
+    return found
 
 
 def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) -> np.ndarray:
@@ -140,7 +143,8 @@ def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) ->
         factor = 4 if renderer.geometry.rotates else 1
         shortest = np.maximum(longest, VectorAdapter.SHORTEST)
         error += factor * np.sqrt(3) * (shortest + change) * VectorAdapter.ERROR
-    return np.minimum(error / np.maximum(nearest(left, right), SPAN_NORMAL.step), np.pi)
+    found: np.ndarray = np.minimum(error / np.maximum(nearest(left, right), SPAN_NORMAL.step), np.pi)
+    return found
 
 
 def nearest(left: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -148,7 +152,8 @@ def nearest(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     step = right - left
     square = np.einsum("sk,sk->s", step, step)
     t = -np.einsum("sk,sk->s", left, step) / np.where(square, square, 1.0)
-    return np.linalg.norm(left + np.clip(t, 0, 1)[:, np.newaxis] * step, axis=1)
+    found: np.ndarray = np.linalg.norm(left + np.clip(t, 0, 1)[:, np.newaxis] * step, axis=1)
+    return found
 
 
 def _raster(pieces: HardwarePieces, source: np.ndarray, axes: np.ndarray) -> Raster:
@@ -156,23 +161,22 @@ def _raster(pieces: HardwarePieces, source: np.ndarray, axes: np.ndarray) -> Ras
 
     ``axes``, by rows, is the frame of the pieces' normals.
     """
-    ends = {}
+    fields: dict[str, Any] = {}
     sign = np.where(pieces.flip, -1.0, 1.0)[:, np.newaxis]
     for side, end in (("left", pieces.left.values @ axes), ("right", pieces.right.values @ axes)):
         magnitude = np.linalg.norm(end, axis=1)
-        ends[f"normal_{side}"] = sign * end / np.where(magnitude, magnitude, 1.0)[:, np.newaxis]
-        ends[f"magnitude_{side}"] = magnitude
+        fields[f"normal_{side}"] = sign * end / np.where(magnitude, magnitude, 1.0)[:, np.newaxis]
+        fields[f"magnitude_{side}"] = magnitude
         # Without point lights nothing asks where a pixel is on the surface.
-        ends[f"weights_{side}"] = np.full((len(pieces), 3), 1 / 3)
+        fields[f"weights_{side}"] = np.full((len(pieces), 3), 1 / 3)
     none = np.zeros(0, dtype=np.int64)
     counts = ("triangles", "degenerate", "culled", "outside", "uncovered", "hidden_spans", "repaired_normals")
+    fields |= dict.fromkeys(("span", "offset", "pixel", "visible"), none) | dict.fromkeys(counts, 0)
     return Raster(
         x=pieces.x,
         y=pieces.y,
         length=pieces.length,
         triangle=source[pieces.triangle],
-        **ends,
         back=pieces.flip,
-        **dict.fromkeys(("span", "offset", "pixel", "visible"), none),
-        **dict.fromkeys(counts, 0),
+        **fields,
     )

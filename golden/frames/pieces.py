@@ -1,6 +1,6 @@
 """Pieces of spans: how far a method's curve is from the exact values along them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +31,9 @@ class Pieces:
     """Points of each piece at t = 0, 1/4, 1/2, 3/4 and 1."""
 
     @classmethod
-    def of(cls, scene, raster, origin, first, last) -> "Pieces":
+    def of(
+        cls, scene: Scene, raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarray
+    ) -> "Pieces":
         """Pieces with their points of the surface."""
         steps = np.maximum(raster.length[origin] - 1, 1)
         at = [(first + (last - first) * k / 4) / steps for k in range(5)]
@@ -59,30 +61,31 @@ class Pieces:
         margin = self._margin()[:, np.newaxis]
         curve = {name: margin * misses[name] for name in curves}
 
-        def too_far(off, inner):
+        def too_far(off: Mapping[str, np.ndarray], inner: np.ndarray) -> np.ndarray:
             least = np.maximum(curves["highlight"].least - inner, 0)
             wrong = off["diffuse"] > LocalChordInterpolator().diffuse_tolerance
             wrong = wrong | (off["highlight"] > limits.tolerance(material, least))
-            return wrong & (curves["diffuse"].largest + off["diffuse"] >= 0)
+            found: np.ndarray = wrong & (curves["diffuse"].largest + off["diffuse"] >= 0)
+            return found
 
         by_words = too_far(words, words["highlight"]) & (turn > limits.turn(material)[:, np.newaxis])
         if interpolator.takes_line:
-            return np.zeros(len(turn), dtype=bool), by_words.any(axis=1)
+            return np.zeros(len(turn), dtype=bool), np.logical_or.reduce(by_words, axis=1)
         both = {name: curve[name] + words[name] for name in curves}
         inner = margin / LocalChordInterpolator.MARGIN * misses["highlight"] + words["highlight"]
         by_curve = too_far(both, inner).any(axis=1)
         by_curve |= self.places[0].turned(self.places[-1], LocalChordInterpolator())
-        return by_curve & (self.last - self.first >= 2), by_words.any(axis=1)
+        return by_curve & (self.last - self.first >= 2), np.logical_or.reduce(by_words, axis=1)
 
     def _scaled(self, interpolator: Interpolator) -> "Pieces":
         """The pieces with u of their places in the scale of the method's words."""
         scale = getattr(interpolator, "scale", 0)
         return replace(self, places=tuple(place.scaled(scale) for place in self.places)) if scale else self
 
-    def _miss(self, interpolator, limits, material) -> np.ndarray:
+    def _miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
         """Result of `miss`; u of the places has the scale of the method's words."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
-        chord = isinstance(interpolator, LocalChordInterpolator)
+        chord = interpolator if isinstance(interpolator, LocalChordInterpolator) else None
         # From so many pixels on there are pixels between the three, or two, values of the curve.
         between = pixels > (3 if chord else 2)
         fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
@@ -90,7 +93,7 @@ class Pieces:
         curves = {name: _Quadratic.of(self.places, name) for name in names}
         diffuse, highlight = curves["diffuse"], curves["highlight"]
         if chord:
-            wrong = self._flagged(interpolator, curves)
+            wrong = self._flagged(chord, curves)
             misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
         else:
             wrong = np.zeros(len(self.origin), dtype=bool)
@@ -99,7 +102,7 @@ class Pieces:
         margin = self._margin()[:, np.newaxis]
         errors = {name: margin * miss for name, miss in misses.items()}
         if chord:
-            setup = interpolator.setup
+            setup = chord.setup
             errors["diffuse"] += setup.diffuse_error(*diffuse.sizes)
             errors["highlight"] += setup.highlight_error(*highlight.sizes)
         in_front = diffuse.largest + errors["diffuse"] >= 0
@@ -124,7 +127,13 @@ class Pieces:
             )
         return wrong
 
-    def _fades_wrong(self, chosen, curves, highlight_share, lit) -> np.ndarray:
+    def _fades_wrong(
+        self,
+        chosen: np.ndarray,
+        curves: "Mapping[str, _Quadratic]",
+        highlight_share: np.ndarray,
+        lit: np.ndarray,
+    ) -> np.ndarray:
         """Whether the factor of a light, or its product with N·L, is too far off at any pixel of a piece.
 
         Parameters
@@ -145,15 +154,18 @@ class Pieces:
         method = LocalChordInterpolator()
         names = ("diffuse", "factor")
         curves = {name: curves[name].part(chosen) for name in names}
-        ends = (field[chosen] for field in (self.origin, self.first, self.last))
-        misses, largest = _misses_of_pixels(self.scene, self.raster, *ends, curves)
+        origin, first, last = (field[chosen] for field in (self.origin, self.first, self.last))
+        misses, largest = _misses_of_pixels(self.scene, self.raster, origin, first, last, curves)
         words = {name: method.setup.diffuse_error(*curve.sizes) for name, curve in curves.items()}
         # A light that fades may be brighter than white where it is near.
         bright = np.array([max(1.0, *light.color) for light in self.scene.lights])
         factor = np.where(lit, 255 * bright * (misses["factor"] + words["factor"]), 0)
         total = factor + method.HIGHLIGHT_BUDGET * highlight_share * largest * bright
         wrong = bright * (misses["diffuse"] + words["diffuse"]) > method.diffuse_tolerance
-        return wrong | ((factor > method.FACTOR_BUDGET) | (total > method.HIGHLIGHT_BUDGET)) & (largest > 0)
+        found: np.ndarray = wrong | ((factor > method.FACTOR_BUDGET) | (total > method.HIGHLIGHT_BUDGET)) & (
+            largest > 0
+        )
+        return found
 
     def _margin(self) -> np.ndarray:
         """Bound of the largest error on each piece, as a multiple of the error at its quarters.
@@ -167,9 +179,12 @@ class Pieces:
             ends.append([np.linalg.norm(lines_along(*at), axis=1), weights_along(*at).sum(axis=1)])
         smaller, larger = np.sort(ends, axis=0)
         ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
-        return np.maximum(ratio, LocalChordInterpolator.MARGIN)
+        found: np.ndarray = np.maximum(ratio, LocalChordInterpolator.MARGIN)
+        return found
 
-    def _flagged(self, interpolator: LocalChordInterpolator, curves) -> np.ndarray:
+    def _flagged(
+        self, interpolator: LocalChordInterpolator, curves: "Mapping[str, _Quadratic]"
+    ) -> np.ndarray:
         """Whether ``chord-local`` may flag a piece; if ``False``, it does not."""
         setup, one = interpolator.setup, float(ONE_SQUARED.values)
         formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
@@ -185,7 +200,7 @@ class Pieces:
     def _misses_of_normals(self, interpolator: Interpolator) -> dict[str, np.ndarray]:
         """Largest errors of N·L and u of a method's normals, at the places `Interpolator.CHECKED_AT`."""
         left, right = self.places[0].normal, self.places[-1].normal
-        misses = {"diffuse": 0.0, "highlight": 0.0}
+        misses = dict.fromkeys(("diffuse", "highlight"), np.zeros(()))
         known = {k / 4: place for k, place in enumerate(self.places)}
         steps = np.maximum(self.raster.length[self.origin] - 1, 1)
         for t in interpolator.CHECKED_AT:
@@ -230,7 +245,8 @@ class _Quadratic:
     def at(self, piece: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Values at t of pieces, shape (count, lights)."""
         t = t[:, np.newaxis]
-        return self.left[piece] + t * (self.slope[piece] + t * self.curvature[piece])
+        found: np.ndarray = self.left[piece] + t * (self.slope[piece] + t * self.curvature[piece])
+        return found
 
     @property
     def sizes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -239,15 +255,18 @@ class _Quadratic:
 
     def miss(self, places: Sequence[SurfacePoints], name: str) -> np.ndarray:
         """Largest distance from the exact values at t = 1/4 and 3/4."""
-        return np.maximum.reduce(
+        found: np.ndarray = np.maximum.reduce(
             [
                 np.abs(self.left + t * (self.slope + t * self.curvature) - getattr(places[k], name))
                 for k, t in ((1, 0.25), (3, 0.75))
             ]
         )
+        return found
 
 
-def _pixels_of(scene, raster, origin, first, last) -> Iterator[tuple[np.ndarray, SurfacePoints, np.ndarray]]:
+def _pixels_of(
+    scene: Scene, raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarray
+) -> Iterator[tuple[np.ndarray, SurfacePoints, np.ndarray]]:
     """Index of the piece, exact values and t for every pixel of pieces, in chunks."""
     for run in runs_of(last - first + 1, CHUNK):
         span, step = pixels_of((last - first + 1)[run])
@@ -257,7 +276,14 @@ def _pixels_of(scene, raster, origin, first, last) -> Iterator[tuple[np.ndarray,
         yield of_pixel, exact, step / (last - first)[of_pixel]
 
 
-def _misses_of_pixels(scene, raster, origin, first, last, curves) -> tuple[dict[str, np.ndarray], np.ndarray]:
+def _misses_of_pixels(
+    scene: Scene,
+    raster: Raster,
+    origin: np.ndarray,
+    first: np.ndarray,
+    last: np.ndarray,
+    curves: Mapping[str, _Quadratic],
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Largest distance of curves from the exact values at the pixels of pieces.
 
     Returns
@@ -284,7 +310,17 @@ def _misses_of_pixels(scene, raster, origin, first, last, curves) -> tuple[dict[
     return misses, largest
 
 
-def _mistakes_sign(scene, raster, origin, first, last, lights, left, slope, curvature) -> np.ndarray:
+def _mistakes_sign(
+    scene: Scene,
+    raster: Raster,
+    origin: np.ndarray,
+    first: np.ndarray,
+    last: np.ndarray,
+    lights: np.ndarray,
+    left: np.ndarray,
+    slope: np.ndarray,
+    curvature: np.ndarray,
+) -> np.ndarray:
     """Whether N·L of a pixel of a span might have the wrong sign, for the lights in ``lights``."""
     result = np.zeros(len(origin), dtype=bool)
     bound = ChordSetup().diffuse_error(np.abs(slope), np.abs(curvature))

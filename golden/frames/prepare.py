@@ -183,7 +183,7 @@ def with_tables(
         If the materials have more lobes than there are banks, or a lobe that is not among those fixed at
         build time.
     """
-    lobe = design.specular
+    lobe = design.lobe
     parameters = [material.parameter(lobe.model) for material in materials]
     banks = list(lobe.fixed or dict.fromkeys(parameters))
     for parameter in parameters:
@@ -226,8 +226,8 @@ def sort_by_material(raster: Raster, material: np.ndarray) -> Raster:
     place = np.empty_like(spans)
     place[spans] = np.arange(len(spans))
     fragments = np.argsort(place[raster.span], kind="stable")
-    by_span = ("x", "y", "length", "triangle", "normal_left", "normal_right", "back")
-    by_span += ("magnitude_left", "magnitude_right", "weights_left", "weights_right")
+    by_span = ["x", "y", "length", "triangle", "normal_left", "normal_right", "back"]
+    by_span += ["magnitude_left", "magnitude_right", "weights_left", "weights_right"]
     kept = {name: getattr(raster, name) for name in by_span}
     moved = {name: values[spans] if len(values) else values for name, values in kept.items()}
     moved |= {name: getattr(raster, name)[fragments] for name in ("offset", "pixel", "visible")}

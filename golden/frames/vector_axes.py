@@ -12,8 +12,8 @@ __all__ = ["further_axes", "light_frames", "triangle_axes", "vector_axes"]
 def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
     """Frames of a pipeline's lights; those that the scene lacks have the frame of the viewer."""
     viewer = scene.camera.viewer
-    directions = [light.direction for light in scene.lights]
-    return [light_frame(direction, viewer) for direction in (directions + [viewer] * lights)[:lights]]
+    directions = [np.asarray(light.direction) for light in scene.lights] + [viewer] * lights
+    return [light_frame(direction, viewer) for direction in directions[:lights]]
 
 
 def vector_axes(scene: Scene, design: Design) -> np.ndarray:
@@ -35,7 +35,7 @@ def vector_axes(scene: Scene, design: Design) -> np.ndarray:
     """
     model = design.vector_spans
     frames = light_frames(scene, design.lights)
-    rows = {}
+    rows: dict[str, np.ndarray] = {}
     for k, frame in enumerate(frames):
         x, y, z = _axes(frame, model.highlights)
         if model.mirror:
@@ -75,7 +75,8 @@ def further_axes(scene: Scene, design: Design) -> np.ndarray:
     float64 array, shape (lights - 1, rows, 3)
     """
     rows = vector_axes(scene, design) @ triangle_axes(scene, design).T
-    return rows[3 : len(rows) - design.vector_spans.mirror].reshape(design.lights - 1, -1, 3)
+    found: np.ndarray = rows[3 : len(rows) - design.vector_spans.mirror].reshape(design.lights - 1, -1, 3)
+    return found
 
 
 def _axes(frame: LightFrame, highlights: bool) -> np.ndarray:

@@ -42,7 +42,8 @@ class AttributeSerialiser:
         cut = triangles.normal >> (ATTRIBUTE.fraction_bits - self.FRACTION_BITS)
         turned = np.where(triangles.normal[:, :1] < 0, ~cut, cut)
         total, single = turned.sum(axis=2).min(axis=1), turned.min(axis=1).max(axis=1)
-        return np.maximum(np.maximum((9 * total) >> 4, single), 0)
+        found: np.ndarray = np.maximum(np.maximum((9 * total) >> 4, single), 0)
+        return found
 
     def compute(self, triangles: Triangles) -> dict[str, np.ndarray]:
         """Bit-accurate beats, four of each triangle: components x, y and z of N/W, then the depth.

@@ -59,7 +59,7 @@ class CoarseDepth:
     depth_bits: int = 12
     tag_bits: int = 4
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (1 <= self.width <= 4096 and 1 <= self.height <= 4096):
             raise ValueError(f"width and height must be 1 to 4096, not {self.width} and {self.height}")
         if self.block not in BLOCKS:

@@ -46,7 +46,8 @@ class DepthTest:
         """
         span, k = pixels_of(length)
         code = (depth[span] + k * step[span]) >> SPAN_DEPTH.fraction_bits
-        return np.clip(code, 0, self.FARTHEST)
+        found: np.ndarray = np.clip(code, 0, self.FARTHEST)
+        return found
 
     def drawn(self, pixel: np.ndarray, depth: np.ndarray) -> np.ndarray:
         """Whether each pixel is drawn: its depth is less than those of all earlier pixels at its place.

@@ -64,7 +64,7 @@ class Edges:
         return len(self.first)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         return vars(self) | {"flat": self.upper == 0}
 

@@ -47,7 +47,7 @@ class Rows:
         return len(self.y)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         return {name: value for name, value in vars(self).items() if name != "triangle"}
 

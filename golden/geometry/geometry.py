@@ -12,7 +12,7 @@ from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.plane_assembler import PlaneAssembler, Planes
 from blysk.golden.geometry.plane_setup import PlaneSetup
 from blysk.golden.geometry.span_adapter import LineAdapter, LineSpans
-from blysk.golden.geometry.span_attributes import Pieces, SpanAttributes
+from blysk.golden.geometry.span_attributes import Pieces, SpanAttributes, WholeSpans
 from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triangles
@@ -57,7 +57,7 @@ class Geometry:
     vectors: bool = False
     rotates: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.lines and self.vectors:
             raise ValueError("spans have true lines or vectors, not both")
         if self.rotates and not self.vectors:
@@ -82,8 +82,8 @@ class Geometry:
     def planes(self, drawn: SortedTriangles, frame: Frame) -> tuple[Planes, int]:
         """Planes of sorted triangles, and the number of slivers among them."""
         scales = PlaneSetup(self.grid).compute(drawn, EdgeSetup(self.grid).compute(drawn))
-        corners = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
-        gradients = GradientSetup().compute(*corners, scales)
+        first, middle, last = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
+        gradients = GradientSetup().compute(first, middle, last, scales)
         planes = PlaneAssembler(not (self.lines or self.vectors)).compute(
             gradients, AttributeSerialiser().least(drawn.triangles), frame
         )
@@ -93,9 +93,11 @@ class Geometry:
         """Sorted triangles, the pieces of their spans with N/W at both ends, and the counts so far."""
         drawn, rows, _, counts = self.rows(triangles, frame)
         planes, sliver = self.planes(drawn, frame)
-        pieces, more = SpanAttributes(self.vectors).compute(rows, planes)
-        if self.vectors:
-            pieces, more["cut"] = SpanHalver(self.rotates).compute(pieces)
+        spans, more = SpanAttributes(self.vectors).compute(rows, planes)
+        if isinstance(spans, WholeSpans):
+            pieces, more["cut"] = SpanHalver(self.rotates).compute(spans)
+        else:
+            pieces = spans
         counts = {
             **counts,
             "empty": counts["empty"] + more["empty"],

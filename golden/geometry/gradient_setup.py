@@ -37,7 +37,7 @@ class Gradients:
     size: np.ndarray
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         return {
             name: value.codes if isinstance(value, Fixed) else value for name, value in vars(self).items()

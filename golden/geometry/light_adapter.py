@@ -48,7 +48,8 @@ class LightAdapter:
             Vectors of length 1 at most, in the frame of the first light.
         """
         codes = np.rint(np.ldexp(axes, cls.FORMAT.fraction_bits)).astype(np.int64)
-        return np.clip(codes, -cls.FORMAT.max_code, cls.FORMAT.max_code)
+        found: np.ndarray = np.clip(codes, -cls.FORMAT.max_code, cls.FORMAT.max_code)
+        return found
 
     def compute(self, spans: VectorSpans, axes: np.ndarray) -> VectorSpans:
         """Bit-accurate spans: the three components that they have, and those of each row.

@@ -29,7 +29,7 @@ class Planes:
         return len(self.piece)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         gradients = self.gradients.beats
         del gradients["size"]

@@ -204,4 +204,5 @@ def _between(inner: np.ndarray, outer: np.ndarray, d_inner: np.ndarray, d_outer:
     They are always computed from the inner corner, so that two triangles that share an edge cut it at the
     same point, to the bit.
     """
-    return inner + (d_inner / (d_inner - d_outer))[:, np.newaxis] * (outer - inner)
+    found: np.ndarray = inner + (d_inner / (d_inner - d_outer))[:, np.newaxis] * (outer - inner)
+    return found

@@ -1,6 +1,7 @@
 """Span attributes: N/W and depth at both ends of every span, and of every piece of a wide one."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -68,12 +69,12 @@ class Pieces:
         return len(self.x)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         return _beats(self)
 
     @staticmethod
-    def ends(left: np.ndarray, right: np.ndarray) -> dict[str, Fixed]:
+    def ends(left: np.ndarray, right: np.ndarray) -> dict[str, Any]:
         """Fields ``left``, ``right``, ``depth`` and ``depth_last`` of attributes at both ends.
 
         Parameters
@@ -122,7 +123,7 @@ class WholeSpans:
         return len(self.x)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         return _beats(self)
 
@@ -194,10 +195,12 @@ class SpanAttributes:
         if self.whole:
             edge = format.wrap(edge)
             far = format.wrap(edge + (length - 1)[:, np.newaxis] * inward)
-            words = {"near": edge, "far": far, "inward": inward}
             places = {name: getattr(rows, name)[spans] for name in ("x", "y", "right", "flip", "material")}
-            fixed = {name: Fixed(format, codes) for name, codes in words.items()}
-            return WholeSpans(length=length, triangle=triangle, **places, **fixed), counts
+            close, beyond, change = (Fixed(format, codes) for codes in (edge, far, inward))
+            whole = WholeSpans(
+                length=length, triangle=triangle, near=close, far=beyond, inward=change, **places
+            )
+            return whole, counts
         count = -(-length // most)
         span = np.repeat(np.arange(len(spans)), count)
         number = np.arange(len(span)) - np.repeat(np.cumsum(count) - count, count)
@@ -223,7 +226,7 @@ class SpanAttributes:
         return pieces, counts | {"cut": int((count > 1).sum())}
 
 
-def _beats(spans: Pieces | WholeSpans) -> dict:
+def _beats(spans: Pieces | WholeSpans) -> dict[str, np.ndarray]:
     return {
         name: value.codes if isinstance(value, Fixed) else value
         for name, value in vars(spans).items()

@@ -42,7 +42,7 @@ class ClippedRows:
         return len(self.y)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         return vars(self) | {"covered": self.length > 0, "skips": self.skip > 0}
 

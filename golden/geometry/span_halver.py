@@ -76,7 +76,7 @@ class SpanHalver:
         span = np.arange(len(spans))
         first, left = np.zeros(len(spans), dtype=np.int64), spans.length.astype(np.int64)
         near, far, tried = spans.near.codes, spans.far.codes, left
-        found = []
+        found: list[list[np.ndarray]] = []
         while len(span) or not found:
             fits = self.fits(*self.ends(near, far), tried)
             found.append([word[fits] for word in (span, first, tried, near, far)])
@@ -133,7 +133,8 @@ class SpanHalver:
         codes = np.concatenate((first.codes, last.codes), axis=-1)
         used = np.bitwise_or.reduce(np.where(codes < 0, ~codes, codes), axis=-1)
         bits = np.frexp(used.astype(np.float64))[1].astype(np.int64)
-        return np.minimum(SPAN_NORMAL.fraction_bits - bits, self.LARGEST_SHIFT)
+        found: np.ndarray = np.minimum(SPAN_NORMAL.fraction_bits - bits, self.LARGEST_SHIFT)
+        return found
 
     def fits(self, first: Fixed, last: Fixed, pixels: np.ndarray) -> np.ndarray:
         """Whether spans need no cut: bool array, shape (S,).
@@ -156,9 +157,11 @@ class SpanHalver:
         for j, k in ((0, 1), (0, 2), (1, 2)):
             sums = size[..., j] + size[..., k]
             long |= same[:, j] & same[:, k] & (sums >= pair).all(axis=0)
-        large = (size >= half).any(axis=0)
+        large = np.logical_or.reduce(size >= half, axis=0)
         steep = (~same & large).any(axis=1)
         if self.rotates:
             left, right = (end.codes << shift >> cut for end in (first, last))
-            steep = (np.abs(left - right) > int(self.STEEP * 2**self.BITS)).any(axis=1)
-        return (pixels == 1) | ((long | ~large.any(axis=1)) & ~(steep & (pixels == 2)))
+            change: np.ndarray = np.abs(left - right)
+            steep = (change > int(self.STEEP * 2**self.BITS)).any(axis=1)
+        found: np.ndarray = (pixels == 1) | ((long | ~large.any(axis=1)) & ~(steep & (pixels == 2)))
+        return found

@@ -1,6 +1,7 @@
 """Triangles as the hardware takes them: corners on a sub-pixel grid with depth and scaled normal."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +59,7 @@ class Grid:
 
     subpixel_bits: int = 8
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.subpixel_bits not in (4, 8):
             raise ValueError(f"subpixel_bits must be 4 or 8, not {self.subpixel_bits!r}")
 
@@ -119,7 +120,7 @@ class Frame:
     back_faces: str = "flip"
     limit: int = 267
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for low, high in (("left", "right"), ("top", "bottom")):
             first, end = getattr(self, low), getattr(self, high)
             if not (-2048 <= first < end <= 2048 and end - first <= 4095):
@@ -133,7 +134,7 @@ class Frame:
             raise ValueError(f"a frame's limit must be 0 to {(1 << LIMIT_BITS) - 1}, not {self.limit}")
 
     @classmethod
-    def centred(cls, width: int, height: int, **options) -> "Frame":
+    def centred(cls, width: int, height: int, **options: Any) -> "Frame":
         """Frame with the picture in the middle of the grid, so that the guard band is equal on all sides.
 
         Parameters
@@ -193,7 +194,7 @@ class Triangles:
     def __len__(self) -> int:
         return len(self.x)
 
-    def __getitem__(self, key) -> "Triangles":
+    def __getitem__(self, key: Any) -> "Triangles":
         """Triangles picked by a NumPy index."""
         return Triangles(**{name: values[key] for name, values in self.beats.items()})
 
@@ -204,7 +205,7 @@ class Triangles:
         return np.concatenate((self.normal, depth[..., np.newaxis]), axis=-1)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the input beats of the hardware, by name: arrays of codes."""
         names = ("x", "y", "depth", "normal", "material", "two_sided")
         return {name: getattr(self, name) for name in names}

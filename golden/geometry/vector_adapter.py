@@ -139,10 +139,12 @@ class VectorAdapter:
 
     def _smaller(self, codes: np.ndarray) -> np.ndarray:
         """Codes with a margin to 1."""
-        return codes - (codes >> self.margin_shift)
+        found: np.ndarray = codes - (codes >> self.margin_shift)
+        return found
 
 
 def _used(codes: np.ndarray) -> np.ndarray:
     """Bits, without those that repeat the sign, of the components of each vector together."""
     used = np.bitwise_or.reduce(np.where(codes < 0, ~codes, codes), axis=-1)
-    return np.frexp(used.astype(np.float64))[1].astype(np.int64)
+    found: np.ndarray = np.frexp(used.astype(np.float64))[1].astype(np.int64)
+    return found

@@ -80,7 +80,8 @@ class VectorNormaliser:
         c1 = Fixed.round(self.C1_FORMAT, (exact[0] - exact[-1]) * segments)
         left = exact + c1.values * u
         c0 = Fixed.round(self.C0_FORMAT, (left.min(axis=0) + left.max(axis=0)) / 2)
-        return tuple(Fixed(c.format, np.r_[np.zeros(segments // 4, dtype=int), c.codes]) for c in (c0, c1))
+        unused = np.zeros(segments // 4, dtype=int)
+        return Fixed(c0.format, np.r_[unused, c0.codes]), Fixed(c1.format, np.r_[unused, c1.codes])
 
     def shifted(self, vector: Fixed) -> tuple[Fixed, np.ndarray]:
         """Components shifted left together until one fills the word, SQ(1, 17); and whether each is lost."""

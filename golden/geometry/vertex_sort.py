@@ -37,7 +37,7 @@ class SortedTriangles:
         return len(self.area)
 
     @property
-    def beats(self) -> dict:
+    def beats(self) -> dict[str, np.ndarray]:
         """Fields of the output beats of the hardware, by name: arrays of codes."""
         beats = self.triangles.beats | {"area": self.area, "right": self.right, "flip": self.flip}
         return {name: values for name, values in beats.items() if name != "two_sided"}

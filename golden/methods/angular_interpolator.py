@@ -41,7 +41,7 @@ class AngularInterpolator(Interpolator):
     ORIGIN = "documents"
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return (
             "angular"
@@ -50,30 +50,37 @@ class AngularInterpolator(Interpolator):
         )
 
     @property
-    def serves_gate(self):
+    def serves_gate(self) -> bool:
         """Whether a highlight gate can be used: not with an arccosine."""
         return self.setup.angle == "half_chord"
 
     @property
-    def highlight_excess(self):
+    def highlight_excess(self) -> float:
         """Sum of the errors of setup, cosine and its cut, as ``cos gamma(t)`` is that of the great circle."""
         angles = np.linspace(1e-4, self.gate_angle, 1000)
         setup = AngularSetup.error(angles).max()
         return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """Sum of the errors of setup and cosine, of the code of length 1 in place of 1, and half a step."""
-        return float(AngularSetup.error(degrees)) + HighlightCosine.ERROR + 2.0**-16 + 2.0**-26
+        return float(AngularSetup.error(np.asarray(degrees))) + HighlightCosine.ERROR + 2.0**-16 + 2.0**-26
 
-    def compute(self, normal_left, normal_right, length, direction, halfway):
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
         """Bit-accurate operands."""
         pixels = pixels_of(length)
 
-        def complement(vector):
+        def complement(vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             """1 - cosine of a vector at every pixel, and the flags."""
-            vector = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
+            every = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
             _, phase, step, cos_beta, out_of_range = self.setup.compute(
-                normal_left, normal_right, vector, length
+                normal_left, normal_right, every, length
             )
             return HighlightCosine().compute(phase, step, cos_beta, *pixels).codes, out_of_range
 

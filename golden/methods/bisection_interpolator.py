@@ -9,6 +9,7 @@ from blysk.golden.methods.interpolator import NormalInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
+from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR
 from blysk.golden.reference.curves import interpolate
 
@@ -46,17 +47,17 @@ class BisectionInterpolator(NormalInterpolator):
     # None of these is an end of a straight line, which lie at multiples of 1/2^k.
     CHECKED_AT = (0.09, 0.31, 0.45, 0.64, 0.82)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         AdaptiveNormaliser(self.threshold)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return "bisection" if self.serves_gate else "bisection-published"
 
     @property
-    def serves_gate(self):
+    def serves_gate(self) -> bool:
         """Whether a highlight gate can be used: not with the published polynomials."""
         return not self.bisection.as_published
 
@@ -66,26 +67,28 @@ class BisectionInterpolator(NormalInterpolator):
         return _normaliser(self.threshold, self.bisection)
 
     @property
-    def normal_error(self):
+    def normal_error(self) -> float:
         """Error of the normaliser at the largest depth, in three components, plus `CODE_LENGTH_ERROR`."""
         normaliser = self.normaliser
         return float(np.sqrt(3) * normaliser.error(normaliser.depth, False)) + CODE_LENGTH_ERROR
 
     @property
-    def shortest_length(self):
+    def shortest_length(self) -> float:
         """1 minus the threshold and the rounding error of the error block."""
         return 1 - self.threshold - 2.0**-18
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """Error of the normaliser at any depth plus the distance of a straight line from the great circle."""
         return _operand_error(self.normaliser, degrees > MAX_SPAN_ANGLE)
 
-    def normals(self, normal_left, normal_right, length):
+    def normals(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray]:
         """Bit-accurate normals."""
         normals, out_of_range, _ = self.normaliser.compute(normal_left, normal_right, length)
         return normals, out_of_range
 
-    def exact_normals(self, normal_left, normal_right, t):
+    def exact_normals(self, normal_left: np.ndarray, normal_right: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Straight lines between exact points of the great circle."""
         t = np.asarray(t, dtype=np.float64)
         chord = np.linalg.norm(np.subtract(normal_right, normal_left), axis=-1)
@@ -94,8 +97,8 @@ class BisectionInterpolator(NormalInterpolator):
         sagitta = 1 - np.cos(angle[..., np.newaxis] / 2.0 ** np.arange(1, depth + 1))
         segments = 2.0 ** np.count_nonzero(sagitta > self.threshold, axis=-1)
         left = np.minimum(np.floor(t * segments), segments - 1)
-        ends = (interpolate("slerp", normal_left, normal_right, (left + k) / segments) for k in (0, 1))
-        return interpolate("linear", *ends, t * segments - left)
+        start, end = (interpolate("slerp", normal_left, normal_right, (left + k) / segments) for k in (0, 1))
+        return interpolate("linear", start, end, t * segments - left)
 
 
 @cache

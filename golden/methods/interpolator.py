@@ -1,7 +1,7 @@
 """Interpolators: models of the methods that compute the operands of the pixels of a span."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -61,8 +61,6 @@ class Interpolator:
 
     Attributes
     ----------
-    operand : str
-        ``"cosine"``, ``"one_minus_cosine"`` or ``"place"``: operand of the specular unit.
     COSINE_FORMAT : Format
         Format of N·L.
     COSINE_OF_ZERO : float
@@ -106,6 +104,11 @@ class Interpolator:
     @property
     def name(self) -> str:
         """Name on the command line and in tables."""
+        raise NotImplementedError
+
+    @property
+    def operand(self) -> Any:
+        """Operand of the specular unit: ``"cosine"``, ``"one_minus_cosine"`` or ``"place"``."""
         raise NotImplementedError
 
     @property
@@ -216,12 +219,12 @@ class NormalInterpolator(Interpolator):
 
     operand: Operand = "cosine"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.operand not in ("cosine", "one_minus_cosine"):
             raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
 
     @property
-    def uses_chord(self):
+    def uses_chord(self) -> bool:
         """Whether ``operand`` is ``"one_minus_cosine"``."""
         return self.operand == "one_minus_cosine"
 
@@ -236,7 +239,7 @@ class NormalInterpolator(Interpolator):
         return 1.0
 
     @property
-    def highlight_excess(self):
+    def highlight_excess(self) -> float:
         """`normal_error`; with half the squared chord, as ``|N - H| <= 2``, twice the error, and the cut.
 
         On a curve of length r, where c is the cosine to H, half the squared chord is ``(1 - r)^2/2 + r (1 -
@@ -247,7 +250,7 @@ class NormalInterpolator(Interpolator):
         return 2 * (self.normal_error + 2 * CODE_LENGTH_ERROR) + Specular.ARGUMENT_FORMAT.step
 
     @property
-    def shortest_normal(self):
+    def shortest_normal(self) -> float:
         """`shortest_length` if the operand is half the squared chord, else 1."""
         return self.shortest_length if self.uses_chord else 1.0
 
@@ -288,7 +291,14 @@ class NormalInterpolator(Interpolator):
         product = Chord().operand if self.uses_chord else DotProduct().compute
         return DotProduct().compute(normals, direction), product(normals, halfway)
 
-    def compute(self, normal_left, normal_right, length, direction, halfway) -> Operands:
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
         """Bit-accurate operands: products of the normals."""
         normals, out_of_range = self.normals(normal_left, normal_right, length)
         return Operands(*self.products(normals, direction, halfway), out_of_range)

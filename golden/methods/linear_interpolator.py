@@ -36,7 +36,7 @@ class LinearInterpolator(NormalInterpolator):
     """
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return "linear"
 
@@ -45,22 +45,24 @@ class LinearInterpolator(NormalInterpolator):
     CUT_BY_ERROR = False
 
     @property
-    def normal_error(self):
+    def normal_error(self) -> float:
         """Error of the forward differences, with ``|P| <= 0.766``."""
         chord = 2 * np.sin(np.radians(self.gate_angle / 2)) + 4 * CODE_LENGTH_ERROR
         return float(COMPONENT.step * chord + difference_rounding((1 << LENGTH_BITS) - 2))
 
     @property
-    def shortest_length(self):
+    def shortest_length(self) -> float:
         """Length in the middle of a span of the largest angle."""
         return float(np.cos(np.radians(self.gate_angle / 2))) - CODE_LENGTH_ERROR
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """`difference_rounding`, plus ``2^-17 |P|`` for the error of ``1/(m-1)``."""
         half = np.radians(degrees) / 2
         return float(difference_rounding(length) + COMPONENT.step * (2 * np.sin(half) + COMPONENT.step))
 
-    def normals(self, normal_left, normal_right, length):
+    def normals(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray]:
         """Bit-accurate normals."""
         difference = normal_right - normal_left
         p = difference.saturate(GPQ.P_FORMAT)

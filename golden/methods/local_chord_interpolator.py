@@ -91,12 +91,12 @@ class LocalChordInterpolator(Interpolator):
     MAX_HALFWAY_CHANGE: ClassVar[float] = 0.5
     MARGIN: ClassVar[float] = 4 / 3
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _ = self.setup
         ChordSetup.check_scale(self.scale)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return "chord-local"
 
@@ -118,16 +118,24 @@ class LocalChordInterpolator(Interpolator):
             for name, start in starts.items()
         }
 
-    def widest_span(self, exponent):
+    def widest_span(self, exponent: int) -> float:
         """Largest angle of a span, in degrees, whatever the light."""
         return 30.0
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """Error of the setup, for slopes up to 1/2 and squares up to 1/8, plus the cut of the results."""
-        errors = (f(0.5, 0.125) for f in (self.setup.highlight_error, self.setup.diffuse_error))
+        slope, curvature = np.asarray(0.5), np.asarray(0.125)
+        errors = (f(slope, curvature) for f in (self.setup.highlight_error, self.setup.diffuse_error))
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
 
-    def compute(self, normal_left, normal_right, length, direction, halfway):
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
         """Raise `ValueError`: the normals of a span do not give its position."""
         raise ValueError("the local chord method takes values of its spans, not normals; see compute_values")
 
@@ -172,7 +180,8 @@ class LocalChordInterpolator(Interpolator):
                 for word in (quadratic.first, quadratic.second)
             )
             results.append(model.compute(Fixed(model.start_format, start), first, second, *pixels))
-        return Operands(*results[:2], out_of_range & ~short, *results[2:])
+        cosine, highlight, *factor = results
+        return Operands(cosine, highlight, out_of_range & ~short, *factor)
 
     def exact_operands(
         self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None
@@ -225,7 +234,8 @@ class LocalChordInterpolator(Interpolator):
             Least value of u, at least 0.
         """
         x = (np.asarray(exponent) - 1) * u / 2
-        return self.HIGHLIGHT_BUDGET / (255 * np.asarray(exponent)) * (1 + x * (1 + x * (1 + x)))
+        found: np.ndarray = self.HIGHLIGHT_BUDGET / (255 * np.asarray(exponent)) * (1 + x * (1 + x * (1 + x)))
+        return found
 
     @staticmethod
     def is_lit(exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -241,7 +251,8 @@ class LocalChordInterpolator(Interpolator):
         u : array
             Least value of u, at least 0.
         """
-        return (np.asarray(exponent) - 1) * u < 7
+        found: np.ndarray = (np.asarray(exponent) - 1) * u < 7
+        return found
 
     @property
     def diffuse_tolerance(self) -> float:

@@ -11,6 +11,7 @@ from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
+from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 
 __all__ = ["METHODS", "PUBLISHED", "QuadraticInterpolator"]
@@ -51,25 +52,25 @@ class QuadraticInterpolator(NormalInterpolator):
     LARGEST_G = 0.305
     LARGEST_P = 0.83
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         super().__post_init__()
         if self.form != "differences":
             QuadraticEvaluator(self.form)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return {"differences": "quadratic", "direct": "quadratic-eval", "horner": "quadratic-horner"}[
             self.form
         ] + ("" if self.serves_gate else "-published")
 
     @property
-    def serves_gate(self):
+    def serves_gate(self) -> bool:
         """Whether a highlight gate can be used: only with the default fit of the middle normal."""
         return self.middle_normal == MiddleNormal()
 
     @property
-    def normal_error(self):
+    def normal_error(self) -> float:
         """Errors of the middle normal, of the form that evaluates the curve, and of the last rounding.
 
         With forward differences the form adds ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for the reciprocal
@@ -89,11 +90,11 @@ class QuadraticInterpolator(NormalInterpolator):
         return 2.0**-17 * p + (2.0**-16 + 2.0**-17 + 2.0**-34) * g
 
     @property
-    def shortest_length(self):
+    def shortest_length(self) -> float:
         """Root of the least ``1 - (1-c)^2 s^2 (1 - s^2)``, which is at ``s^2 = 1/2``; ``c = cos(psi/2)``."""
         return float(np.sqrt(1 - (1 - np.cos(np.radians(self.gate_angle / 2))) ** 2 / 4))
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """The sum of `normal_error`, at the last pixel of the span."""
         middle = np.sqrt(3) * self.middle_normal.error
         if self.form != "differences":
@@ -101,7 +102,9 @@ class QuadraticInterpolator(NormalInterpolator):
         reciprocal = self._reciprocal_error(self.LARGEST_P, self.LARGEST_G)
         return float(middle + reciprocal + difference_rounding(length))
 
-    def normals(self, normal_left, normal_right, length):
+    def normals(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray]:
         """Bit-accurate normals."""
         middle, out_of_range = self.middle_normal.compute(normal_left, normal_right)
         g, p, q = GPQ().compute(normal_left, middle, normal_right)

@@ -8,6 +8,7 @@ import numpy as np
 from blysk.golden.cosines.quotient import Quotient
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.methods.interpolator import Interpolator, Operands
+from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.reference.reflection import ReflectionModel
 
@@ -50,22 +51,22 @@ class QuotientInterpolator(Interpolator):
     SHORTEST: ClassVar[float] = 1 / (2 * 5**0.5)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return "quotient"
 
     @property
-    def highlight_format(self):
+    def highlight_format(self) -> Format:
         """Format of a place in a lobe's table."""
         return Quotient(self.spans(1, True)).place_format
 
     @property
-    def serves_gate(self):
+    def serves_gate(self) -> bool:
         """``False``: a gate takes unit normals, or values at three places."""
         return False
 
     @property
-    def takes_line(self):
+    def takes_line(self) -> bool:
         """``True``: vectors have the lengths of the true line."""
         return True
 
@@ -93,7 +94,14 @@ class QuotientInterpolator(Interpolator):
         cosine, place, too_small = Quotient(spans).compute(pixels)
         return Operands(cosine, place, np.bincount(pixels_of(length)[0], too_small, len(length)) > 0)
 
-    def compute(self, normal_left, normal_right, length, direction, halfway):
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
         """Raise `ValueError`: spans carry vectors, not normals."""
         raise ValueError("the quotient method takes vectors of its spans, not normals; see compute_vectors")
 
@@ -101,7 +109,7 @@ class QuotientInterpolator(Interpolator):
         """Bounds of the errors of spans, see `QuotientErrors`."""
         return QuotientErrors.of(vectors, length, self.mirror)
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """Bound of the error of N·L for every span that is cut as the method asks."""
         return QuotientErrors.worst(length, self.mirror).cosine
 
@@ -157,12 +165,12 @@ class QuotientErrors:
             Whether the bounds are those of a further light.
         """
         # The components whose squares are q, in the frame of the first light.
-        own = [0, 1, 2, -1] if mirror else [0, 1, 2]
-        start = vectors.start[:, own].astype(np.float64)
+        places = [0, 1, 2, -1] if mirror else [0, 1, 2]
+        start = vectors.start[:, places].astype(np.float64)
         last = np.asarray(length, dtype=np.float64) - 1
         way = vectors.step * np.ldexp(last, -vectors.exponent)[:, np.newaxis]
         difference = np.where(last > 0, np.maximum(np.abs(way).max(axis=1) * 2.0**-17, 1 / 16), 0)
-        way = way[:, own]
+        way = way[:, places]
         # The shortest vector on the segment between the ends.
         square = np.einsum("si,si->s", way, way)
         t = np.clip(-np.einsum("si,si->s", start, way) / np.where(square, square, 1), 0, 1)
@@ -183,7 +191,8 @@ class QuotientErrors:
             Whether the highlight is one of R·V.
         """
         shortest = QuotientInterpolator.SHORTEST * 2.0**17 - 3
-        return cls.of_words(*(np.array([value]) for value in (2.5, shortest, length - 1.0)), mirror)
+        component, least, last = (np.array([value]) for value in (2.5, shortest, length - 1.0))
+        return cls.of_words(component, least, last, mirror)
 
     @classmethod
     def of_words(
@@ -224,7 +233,8 @@ class QuotientErrors:
     def cosine(self) -> float:
         """Largest error of N·L: by the normal, the codes of L, and the words of a pixel."""
         words = 2.0**-16 + 2.0**-17.5 + Quotient.COSINE_ERROR
-        return self.angle + self.drift + self.mismatch / 2 + words
+        found: float = self.angle + self.drift + self.mismatch / 2 + words
+        return found
 
     def highlight(self, model: ReflectionModel, parameter: float | None) -> float:
         """Largest error of the specular term, without that of the lobe's table.

@@ -45,16 +45,16 @@ class RecurrenceInterpolator(Interpolator):
     CURVE = "slerp"
     ORIGIN = "documents"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _ = self.setup
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return "recurrence" if self.form == "reinsch" else "recurrence-direct"
 
     @property
-    def serves_gate(self):
+    def serves_gate(self) -> bool:
         """Whether a highlight gate can be used: not with the direct form, which is unstable."""
         return self.form == "reinsch"
 
@@ -64,7 +64,7 @@ class RecurrenceInterpolator(Interpolator):
         return RecurrenceSetup(Recurrence(self.form, interleave=4, result_format=self.COSINE_FORMAT))
 
     @property
-    def highlight_excess(self):
+    def highlight_excess(self) -> float:
         """Error of setup and recurrence, largest for spans of two pixels, plus length errors and cut."""
         if self.form == "direct":
             return 2.0
@@ -72,11 +72,18 @@ class RecurrenceInterpolator(Interpolator):
         error = self.setup.error(length, np.full(length.shape, np.radians(self.gate_angle)))
         return float(error.max()) + 2 * CODE_LENGTH_ERROR + Specular.ARGUMENT_FORMAT.step
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """Sum of the errors of setup and recurrence."""
-        return float(self.setup.error(length, np.radians(degrees)))
+        return float(self.setup.error(np.asarray(length), np.radians(degrees)))
 
-    def compute(self, normal_left, normal_right, length, direction, halfway):
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
         """Bit-accurate operands."""
         span, index = pixels_of(length)
         shape = (len(span), len(direction.codes))
@@ -90,10 +97,13 @@ class RecurrenceInterpolator(Interpolator):
             span_of_part = np.cumsum(inside)[span[pixels]] - 1
             for which, vectors in enumerate((direction, halfway)):
                 for light in range(shape[1]):
-                    *start, out_of_range[part] = self.setup.compute(
+                    first, second, k, shift, flags = self.setup.compute(
                         normal_left[part], normal_right[part], vectors[light], length[part]
                     )
-                    found = self.setup.recurrence.compute(*start, span_of_part, index[pixels])
+                    out_of_range[part] = flags
+                    found = self.setup.recurrence.compute(
+                        first, second, k, shift, span_of_part, index[pixels]
+                    )
                     results[which, pixels, light] = found.codes
         cosine, highlight = (Fixed(self.COSINE_FORMAT, codes) for codes in results)
         one = Fixed(UQ(1, 25), 1 << 25)

@@ -52,12 +52,12 @@ class RenormaliseInterpolator(NormalInterpolator):
     CUT_BY_ERROR = False
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name on the command line and in tables."""
         return "renormalise"
 
     @property
-    def serves_gate(self):
+    def serves_gate(self) -> bool:
         """``False``: a gate takes unit normals."""
         return False
 
@@ -67,14 +67,16 @@ class RenormaliseInterpolator(NormalInterpolator):
         format = LineSetup.FORMAT
         return DifferenceAccumulator(self.END_FORMAT, format, format, self.END_FORMAT)
 
-    def operand_error(self, length, degrees):
+    def operand_error(self, length: int, degrees: float) -> float:
         """For ends of unit length: the error of the line over its length, plus that of the renormaliser."""
         shortest = np.cos(np.radians(min(degrees, 170.0)) / 2)
         line = LineSetup.ERROR + np.sqrt(3) * self.END_FORMAT.step
         own = Renormaliser.DIRECTION_ERROR + Renormaliser.LENGTH_ERROR
         return float(2 * (line / shortest + own))
 
-    def normals(self, normal_left, normal_right, length):
+    def normals(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray]:
         """Bit-accurate normals, from ends in ``SQ(1, 22)``."""
         first = LineSetup().compute(normal_left, normal_right, length)
         span, step = pixels_of(length)

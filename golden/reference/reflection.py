@@ -118,7 +118,7 @@ class ReflectionModel:
         """
         return self._checked(parameter)
 
-    def energy_factor(self, parameter: float) -> float:
+    def energy_factor(self, parameter: float | None) -> float:
         """Factor of the energy-normalised form, which is this factor times S ([C]).
 
         =============== ==================================== ==============================================
