@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 
-__all__ = ["progress", "resumable", "run"]
+__all__ = ["progress", "resumable", "run", "steps"]
 
 _SECONDS = 10
 """Seconds from a line of `progress` to the next, where there is no terminal."""
@@ -48,6 +48,19 @@ def progress(parts: Iterable[Part] | None = None, *, total: int, unit: str) -> "
     """
     kind = tqdm if sys.stderr.isatty() else _Lines
     return kind(parts, total=total, unit=f" {unit}", leave=False)
+
+
+@contextlib.contextmanager
+def steps() -> Iterator[Callable[[str], None]]:
+    """Show the step of long work; call the context's value with its name.
+
+    On a terminal a line changes; else each step is a line on standard error.
+    """
+    if sys.stderr.isatty():
+        with tqdm(bar_format="{desc}", leave=False) as bar:
+            yield bar.set_description_str
+    else:
+        yield lambda step: click.echo(f"blysk: {step}", err=True)
 
 
 @contextlib.contextmanager

@@ -16,8 +16,8 @@ from typing import Any
 
 import click
 import numpy as np
-from tqdm import tqdm
 
+from blysk.bench.command import progress, steps
 from blysk.bench.tools.board_build import Built, build
 from blysk.bench.tools.board_design import BoardTop, gpu_of, least_cycles
 from blysk.bench.tools.boards import Board
@@ -82,9 +82,9 @@ def planned(
 def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
     """The bitstream of a drawing, see `build`; its steps are shown."""
     rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
-    with tqdm(bar_format="{desc}", leave=False, disable=None) as bar:
+    with steps() as show_step:
         top = BoardTop(board, GpuUnit(gpu, compact=board.compact), plan)
-        return build(board, top, rates, seeds, bar.set_description_str)
+        return build(board, top, rates, seeds, show_step)
 
 
 def write_bitstream(built: Built, path: str) -> None:
@@ -160,7 +160,7 @@ def simulated(
         start = perf_counter()
         rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
         mode = gpu.buffer.mode
-        with tqdm(total=count, unit=" frames", leave=False, disable=None) as bar:
+        with progress(total=count, unit="frames") as bar:
             top = OneClock(GpuUnit(gpu, compact=board.compact), rate)
             shown = show(top, mode, count, progress=lambda pixels: bar.update(pixels / mode.cycles - bar.n))
         seconds = perf_counter() - start

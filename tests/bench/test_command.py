@@ -127,6 +127,13 @@ def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, monkeypatch)
     assert all(re.match(r" *\d+% \d/8 \[.* parts/s\]$", line) for line in lines)
 
 
+def test_steps_without_a_terminal_are_lines(capsys):
+    with command.steps() as show:
+        show("mapping")
+        show("placement 1")
+    assert capsys.readouterr() == ("", "blysk: mapping\nblysk: placement 1\n")
+
+
 def test_progress_of_short_work_says_nothing(capsys):
     with command.progress(total=2, unit="parts") as bar:
         bar.set_description_str("first")
