@@ -268,7 +268,7 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
     cut, _ = cut_spans(case.scene, raster, design)
     first = np.flatnonzero(cut.offset == 0)
     parts = np.bincount(raster.span[first], minlength=len(raster.length))
-    if design.takes_values or design.takes_vectors:
+    if design.takes_values or design.interpolator.takes_line:
         inside = parts == 1
     else:
         widest = design.interpolator.widest_span(case.scene.materials[0].exponent)

@@ -70,6 +70,14 @@ def test_keeps_what_is_promised(group, method):
             assert prepared["error"] <= GOOD, case.name
 
 
+def test_what_is_cut_before_is_not_served():
+    """Of renormalise the lengths count, and no angle: a line to a normal of 0 has none at one end."""
+    [case] = [case for case in cases(6) if case.name == "one normal 0"]
+    found = measure_case(case, "renormalise")
+    assert (found["inside"], found["cut"]) == (0, found["spans"])
+    assert (found["given"]["flagged"], found["given"]["safe"]) == (found["spans"], 0)
+
+
 def test_quotient_is_given_pairs_as_two():
     """The step of a span of two pixels may not fit; longer spans and single pixels stay."""
     [case] = [case for case in cases(1) if case.name == "exponent 100"]
