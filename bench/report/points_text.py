@@ -19,6 +19,7 @@ from blysk.bench.report.perception import (
 from blysk.bench.report.section import Cell, Grade, Table
 from blysk.bench.tools.families import DEVICE
 from blysk.golden.frames.compare import BORDER
+from blysk.golden.presets import METHODS, MIRROR_LOBES
 
 __all__ = [
     "front",
@@ -131,7 +132,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
-    """The trade between error and time at a mesh and exponent, in a few sentences."""
+    """The trade between error and time at a mesh and exponent, in a few sentences; see `_is_comparable`."""
     settings = scene[0]["settings"]
     hardware = [point for point in scene if point["group"] != "software"]
     alike = sum(point["verdicts"]["total"] for point in hardware)
@@ -144,7 +145,7 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
         ("Smallest total error", "errors", "total_max_lsb"),
         ("Smallest method error", "errors", "method_max_lsb"),
     ):
-        measured = [point for point in hardware if point[kind][key] is not None]
+        measured = [point for point in hardware if point[kind][key] is not None and _is_comparable(point)]
         if measured:
             best = measured[int(np.argmin([point[kind][key] for point in measured]))]
             errors, cycles = best["errors"], best["times"]["cycles_per_pixel"]
@@ -161,6 +162,12 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
             f"begins and rounding may switch it: the largest total error of a design there is {most:.1f} LSB."
         )
     return text
+
+
+def _is_comparable(point: Mapping[str, Any]) -> bool:
+    """Whether a design does all of the work, for Blinn's picture: as in `front.conclusion`."""
+    method, model = (point["settings"][name] for name in ("method", "model"))
+    return not ((method in METHODS and METHODS[method].TAKES_VALUES) or model in MIRROR_LOBES)
 
 
 def _heading(axis: Mapping[str, str]) -> str:

@@ -28,7 +28,7 @@ from blysk.bench.report.frames import (
     speeds,
 )
 from blysk.bench.report.points import BEST, DESIGNS, GROUPS, QUICK_SIMULATED, section, tasks
-from blysk.bench.report.points_text import front, readme_table
+from blysk.bench.report.points_text import _is_comparable, front, readme_table
 from blysk.bench.store import Task
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.metrics import ErrorFigures
@@ -88,6 +88,12 @@ def test_every_method_and_model_is_a_design():
     assert {model for method, model in DESIGNS if method == "quotient"} == {"blinn", "phong"}
     assert len(set(DESIGNS)) == len(DESIGNS)
     assert set(QUICK_SIMULATED) < set(DESIGNS)
+
+
+def test_what_is_given_values_or_draws_another_picture_wins_nothing():
+    pairs = [("quotient", "blinn"), ("quotient", "phong"), ("chord-local", "blinn"), ("phong", "blinn")]
+    points = [{"settings": {"method": method, "model": model}} for method, model in pairs]
+    assert [_is_comparable(point) for point in points] == [True, False, False, True]
 
 
 def of_frames(chosen):
