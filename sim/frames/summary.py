@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from blysk.hdl.port_descriptions import COUNTER_TEXTS
 from blysk.sim.frames.error_names import ERRORS, reference_of
 
 __all__ = ["animation_lines", "frame_lines", "short_lines", "specialisation_lines"]
@@ -13,21 +14,21 @@ _COUNTS = {
     "repaired_normals": "stored normals repaired",
     "dropped_faces": "faces without area dropped",
     "degenerate_triangles": "triangles without area on the screen",
-    "culled_triangles": "back faces left out",
+    "culled_triangles": COUNTER_TEXTS["culled"],
     "outside_triangles": "triangles outside the picture",
     "uncovered_triangles": "triangles that hold no pixel centre",
     "repaired_span_normals": "span ends whose normal was 0",
     "clipped_triangles": "triangles cut by the near plane or at the ends of the grid",
-    "sliver_triangles": "triangles at most 1/256 pixel wide",
+    "sliver_triangles": COUNTER_TEXTS["sliver"],
     "far_triangles": "triangles beyond 1,000 times the nearest W, where surfaces 0.1 % apart may swap",
     "hidden_spans": "spans wholly hidden, left out",
     "hidden_pixels": "pixels shaded behind what was drawn before",
-    "dropped_pixels": "pixels of hidden spans dropped before shading",
+    "dropped_pixels": COUNTER_TEXTS["dropped"],
     "cut_spans": "spans cut to the range of the method",
     "missed_spans": "spans that this method misses by over 0.25 LSB",
     "missed_pieces": "spans that this method misses by over 0.25 LSB, as lengths of their normals differ",
     "short_normals": "spans with normals too short for the words, as W differs much, perhaps 0.25 LSB off",
-    "out_of_range_spans": "spans out of range in the pipeline",
+    "out_of_range_spans": COUNTER_TEXTS["out_of_range_spans"],
     "sharp_lobes": "lobes too sharp for this method's table, perhaps over 0.25 LSB off",
 }
 
