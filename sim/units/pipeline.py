@@ -327,7 +327,7 @@ def _counters(unit, rng, count):
 # Variants.
 
 
-_FULL = preset("quadratic", "cosquad", lights=2, gate=True)
+_FULL = preset("chord-local", "cosquad", lights=2, gate=True)
 _BOTH = ("renormalise, blinn", "quadratic, cosquad")
 """Variants of normals that get every stimulus: with a table of the default model, and of the documents."""
 _ALL = ("quotient, blinn", *_BOTH)
@@ -341,7 +341,7 @@ DESIGNS: dict[str, Design] = {
     "compact, normals and a power": preset("linear", "blinn_product", style="compact"),
     "gate": preset("chord-local", "coscos2", gate=True),
     "gate, compact": preset("quadratic", "lyon3", gate=True, style="compact"),
-    "exponent": preset("quadratic", "coscos4", 2, exponent=60),
+    "exponent": preset("renormalise", "coscos4", 2, exponent=60),
     "values, the second of 2 lights fades": preset("chord-local", "blinn", 2, factors=(1,)),
     "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
     "without lights": preset(model="cosquad", lights=0, materials=2),
@@ -366,7 +366,7 @@ LONG_DESIGNS: dict[str, Design] = {
     "compact, 2 lights": preset("quadratic", "lyon3", 2, style="compact"),
     "compact, exponent": preset("quadratic", "exp", exponent=20, style="compact"),
     "gate, 2 lights, compact": preset("chord-local", "cosquad", lights=2, gate=True, style="compact"),
-    "gate, quadratic": _FULL,
+    "gate, quadratic": preset("quadratic", "cosquad", lights=2, gate=True),
     "gate, linear of a chord": preset("linear", "lyon3", operand="one_minus_cosine", gate=True),
     "gate, bisection": preset("bisection", "exp", gate=True),
     "gate, angular": preset("angular", "cosquad", gate=True),
