@@ -61,10 +61,10 @@ class OneByOne(Wrapped):
 
 
 def _units():
-    """The smallest here; CI has the default structures, the long run all."""
+    """CI has the default structures and the smallest, the long run all."""
     for name in UNITS:
-        marks = [pytest.mark.long] * (name != "geometry, compact")
-        yield pytest.param(name, marks=[*marks, *[pytest.mark.ci] * (name in RECORDS)])
+        often = name in RECORDS or name == "geometry, compact"
+        yield pytest.param(name, marks=[pytest.mark.long, *[pytest.mark.ci] * often])
 
 
 @pytest.mark.parametrize("name", list(_units()))
