@@ -24,7 +24,11 @@ from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.span_halver import SpanHalverUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
-from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit, vector_spans_shape
+from blysk.hdl.geometry.vector_adapter import (
+    SerialVectorAdapterUnit,
+    VectorAdapterUnit,
+    vector_spans_shape,
+)
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
 __all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
@@ -156,7 +160,8 @@ class GeometryUnit(wiring.Component):
     edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits before each, so
     that neither keeps the other from its turn. In the *compact* style one divider serves all edges and one
     multiplier the gradients of all attributes; attributes take turns along the spans, too, and so do the
-    normals of a span. There only the attributes have a FIFO in the setup; other words wait in registers.
+    normals of a span, or the components of its vectors. There only the attributes have a FIFO in the setup;
+    other words wait in registers.
 
     The units work on several triangles at the same time, and the slowest one sets the pace. A triangle takes:
 
@@ -243,7 +248,8 @@ class GeometryUnit(wiring.Component):
         if lines:
             self._normals, shape = LineAdapterUnit(), line_spans_shape()
         elif vectors:
-            self._normals, shape = VectorAdapterUnit(VectorAdapter(rotates)), vector_spans_shape()
+            adapter = SerialVectorAdapterUnit if compact else VectorAdapterUnit
+            self._normals, shape = adapter(VectorAdapter(rotates)), vector_spans_shape()
             self._halver = SpanHalverUnit(SpanHalver(rotates))
         else:
             self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
