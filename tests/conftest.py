@@ -76,12 +76,15 @@ def pytest_itemcollected(item):
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items):
-    """The groups in `LONGEST` first, then those of the most tests: at the end no worker waits for another."""
+    """The groups in `LONGEST` first, then those of the most tests: at the end no worker waits for another.
+
+    Workers collect files in two orders, and run them in this one.
+    """
     count = Counter(group_of(item.nodeid) for item in items)
 
     def place(item):
         group = group_of(item.nodeid)
-        return not group.startswith(LONGEST), -count[group], group
+        return not group.startswith(LONGEST), -count[group], group, item.nodeid.partition("::")[0]
 
     items.sort(key=place)
 
