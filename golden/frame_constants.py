@@ -27,6 +27,7 @@ __all__ = [
     "VECTOR_MEANINGS",
     "FrameConstants",
     "address_table",
+    "by_material",
     "writes_of",
 ]
 
@@ -106,6 +107,19 @@ class FrameConstants:
     bank: int = 0
     threshold: int | None = None
     axes: np.ndarray | None = None
+
+    @property
+    def table(self) -> LobeTable:
+        """Table of the lobe.
+
+        Raises
+        ------
+        ValueError
+            If the constants have none.
+        """
+        if self.lobe is None:
+            raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
+        return self.lobe
 
     @property
     def highlight(self) -> int | LobeTable:
@@ -255,6 +269,11 @@ VECTOR_MEANINGS = {
     "values": {"direction": "not read", "halfway": "not read"},
 }
 """What the vectors of a light are, by what a span brings, see `Design.span_members`."""
+
+
+def by_material(constants: FrameConstants | Sequence[FrameConstants]) -> list[FrameConstants]:
+    """Constants of each material, from those of the only material or of each."""
+    return [constants] if isinstance(constants, FrameConstants) else list(constants)
 
 
 def address_table(

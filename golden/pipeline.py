@@ -1,31 +1,26 @@
 """The shading pipeline: the composition of a design, and its bit-accurate model."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, Literal, cast
 
 import numpy as np
 
 from blysk.golden.beats import Pixels, Spans
-from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import QuotientSpans
-from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants
+from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants, by_material
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.factor import Factor
+from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_gate import HighlightGate
+from blysk.golden.lighting.highlight_operand import MAX_EXPONENT, HighlightOperand
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe, LobeTable
-from blysk.golden.lighting.power import Power
-from blysk.golden.lighting.quotient_lobe import QuotientLobe
-from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
-from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
-from blysk.golden.number.unit_vector import COMPONENT
 from blysk.golden.reference.lighting import Material
 
 __all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
@@ -78,7 +73,7 @@ class Design:
     ----------
     interpolator : Interpolator
         The method.
-    specular : Specular or Power or Lobe or None
+    specular : HighlightOperand or None
         Specular unit; it takes the operand that the interpolator gives. ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16. With none there is ambient light alone, and no method.
@@ -112,7 +107,7 @@ class Design:
     """
 
     interpolator: Interpolator = field(default_factory=QuotientInterpolator)
-    specular: Specular | Power | Lobe | None = field(default_factory=Lobe)
+    specular: HighlightOperand | None = field(default_factory=Lobe)
     lights: int = 1
     materials: int = 1
     gate: bool = False
@@ -124,12 +119,10 @@ class Design:
     build: Build = field(default_factory=Build)
 
     def __post_init__(self) -> None:
-        self._match_table()
-        if self.specular is not None and self.specular.operand != self.interpolator.operand:
-            matching = replace(self.specular, operand=self.interpolator.operand)
-            object.__setattr__(self, "specular", matching)
+        method = self.interpolator.matched(self.specular)
+        object.__setattr__(self, "interpolator", method)
+        object.__setattr__(self, "specular", self.specular and method.unit_for(self.specular))
         Intensity(self.lights)
-        self._match_scale()
         if not 1 <= self.materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
         if self.loads_tables:
@@ -145,28 +138,6 @@ class Design:
         if self.factors:
             self._check_factors()
 
-    def _match_table(self) -> None:
-        """Give a method that takes vectors a lobe of its own, and the kind of its angle; others none."""
-        lobe, method = cast(Any, self.specular), self.interpolator
-        if lobe and (lobe.operand == "place") != self.takes_vectors:
-            if not self.takes_vectors and lobe.model.MIRROR:
-                raise ValueError(f"{lobe.name} is a lobe of R·V: take the method quotient, or phong_coplanar")
-            names = ("banks", "cutoff", "fixed") * lobe.has_table
-            kept = {name: getattr(lobe, name) for name in names}
-            made = QuotientLobe if self.takes_vectors else partial(Lobe, operand=method.operand)
-            object.__setattr__(self, "specular", made(lobe.model, **kept))
-        if isinstance(self.interpolator, QuotientInterpolator):
-            mirror = self.specular is not None and self.specular.model.MIRROR
-            object.__setattr__(self, "interpolator", replace(self.interpolator, mirror=mirror))
-
-    def _match_scale(self) -> None:
-        """Give the lobe the scale of the method's operand."""
-        scale = getattr(self.interpolator, "scale", 0)
-        if scale and not self.loads_tables:
-            raise ValueError("a scale of 1 - N·H needs a lobe with a table")
-        if self.loads_tables and cast(Lobe, self.specular).scale != scale:
-            object.__setattr__(self, "specular", replace(cast(Lobe, self.specular), scale=scale))
-
     def _check_factors(self) -> None:
         """Refuse factors of lights that do not exist, and factors that no unit of the design takes."""
         if not (self.takes_values and self.specular):
@@ -178,7 +149,7 @@ class Design:
         """Refuse options that do not go with the tables of a lobe."""
         if self.build.exponent is not None:
             raise ValueError("a lobe has tables and no exponent; fix its tables")
-        lobe = cast(Lobe, self.specular)
+        lobe = self.lobe
         if lobe.operand == "one_minus_cosine" and lobe.fraction_bits != 25:
             raise ValueError(f"1 - N·H has 25 fraction bits in a pipeline, the lobe {lobe.fraction_bits}")
 
@@ -211,11 +182,10 @@ class Design:
             cut for the design.
         """
         specular, interpolator = self.specular, self.interpolator
-        if isinstance(specular, Lobe) and specular.fixed is None:
-            lobes = {self.highlight_parameter(material): None for material in materials}
-            specular = replace(specular, banks=min(len(lobes), Lobe.MAX_BANKS)).for_parameters(list(lobes))
-            if scaled and isinstance(interpolator, LocalChordInterpolator):
-                interpolator = replace(interpolator, scale=specular.scale_of(list(lobes)))
+        if self.loads_tables and self.lobe.fixed is None:
+            lobes = list(dict.fromkeys(map(self.highlight_parameter, materials)))
+            lobe = replace(self.lobe, banks=min(len(lobes), Lobe.MAX_BANKS)).for_parameters(lobes)
+            specular, interpolator = lobe, interpolator.fitted(lobe, lobes) if scaled else interpolator
         return replace(self, materials=len(materials), specular=specular, interpolator=interpolator)
 
     def built(self, **changes: Any) -> "Design":
@@ -260,15 +230,13 @@ class Design:
     @property
     def vector_spans(self) -> QuotientSpans:
         """Model of the setup of a method that takes vectors."""
-        return cast(QuotientInterpolator, self.interpolator).spans(self.lights, self.specular is not None)
+        return self.interpolator.spans(self.lights, self.specular is not None)
 
     @cached_property
-    def highlight_gate(self) -> HighlightGate | ValueGate:
+    def highlight_gate(self) -> Gate:
         """Bit-accurate model of the gate."""
         assert self.specular is not None
-        if isinstance(self.interpolator, LocalChordInterpolator):
-            return ValueGate(self.specular)
-        return HighlightGate(self.specular, interpolator=self.interpolator)
+        return self.interpolator.gate(self.specular, HighlightGate)
 
     @property
     def has_threshold(self) -> bool:
@@ -278,24 +246,16 @@ class Design:
     @property
     def banks(self) -> int:
         """Number of tables of lobes; 0 without a lobe."""
-        return cast(Lobe, self.specular).banks if self.loads_tables else 0
+        return self.specular.banks if self.specular is not None else 0
 
     @property
     def threshold_format(self) -> Format | None:
         """Format of the threshold in the frame constants; ``None`` without a threshold."""
-        if not self.has_threshold:
-            return None
-        gate = self.highlight_gate
-        return gate.THRESHOLD_FORMAT if isinstance(gate, ValueGate) else gate.level_format
+        return self.highlight_gate.threshold_format if self.has_threshold else None
 
     def threshold_of(self, table: LobeTable) -> Fixed:
         """The highlight gate's threshold for a table."""
         return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument]))[0]
-
-    def _thresholds(self, constants: Sequence[FrameConstants]) -> Fixed:
-        """Thresholds of the materials' tables, see `threshold_of`."""
-        tables = [cast(LobeTable, of_material.lobe) for of_material in constants]
-        return self.highlight_gate.thresholds_of(np.array([table.last_lit_argument for table in tables]))
 
     def lit_spans(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> np.ndarray:
         """Spans that may have a highlight of each light, as the highlight gate decides.
@@ -309,28 +269,13 @@ class Design:
         -------
         bool array, shape (spans, lights)
         """
-        constants = [constants] if isinstance(constants, FrameConstants) else constants
-        gate = self.highlight_gate
-        exponent = np.array([of_material.exponent for of_material in constants])[spans.material]
+        each, gate = by_material(constants), self.highlight_gate
         if self.loads_tables:
-            threshold = self._thresholds(constants)[spans.material]
-        if isinstance(gate, ValueGate):
-            highlight = self._values(spans).highlight.astype(np.int64)
-            short = np.asarray(spans.length) < 3
-            # A span of two pixels has no pixel in the middle.
-            highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
-            one = np.asarray(spans.length) == 1
-            highlight[one] = highlight[one][:, :, :1]
-            if self.loads_tables:
-                return gate.compute_by(highlight, threshold[:, np.newaxis])
-            return gate.compute(highlight, exponent[:, np.newaxis])
-        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
-        if self.loads_tables:
-            decide = partial(gate.compute_by, threshold=threshold)
+            arguments = np.array([of_material.table.last_lit_argument for of_material in each])
+            threshold = gate.thresholds_of(arguments)[spans.material]
         else:
-            decide = partial(gate.compute, exponent=exponent)
-        lit = [decide(left, right, Fixed(COMPONENT, halfway)) for halfway in constants[0].halfway]
-        return np.stack(lit, axis=-1)
+            threshold = gate.thresholds_at(np.array([of.exponent for of in each])[spans.material])
+        return gate.lit(spans, each[0].halfway, threshold)
 
     def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
         """Bit-accurate pixels, in the order of the spans.
@@ -348,7 +293,7 @@ class Design:
             If a code is out of range, the constants are for another number of lights or materials, or spans
             lack the values that the method takes.
         """
-        constants = [constants] if isinstance(constants, FrameConstants) else list(constants)
+        constants = by_material(constants)
         self._check(spans, constants)
         kept = np.flatnonzero(np.asarray(spans.length) > 0)
         length = np.asarray(spans.length, dtype=np.int64)[kept]
@@ -357,10 +302,9 @@ class Design:
         out_of_range = 0
         if self.lights:
             lit = self.lit_spans(spans, constants)[kept] if self.gate else None
-            interpolate = self._operands_of(spans, kept, length, constants[0])
-            first = 0
+            shown, first = replace(spans[kept], length=length), 0
             for part in runs_of(length):
-                operands = interpolate(part)
+                operands = self.operands(shown[part], constants[0])
                 pixels = slice(first, first + len(operands.cosine.codes))
                 material = spans.material[kept][span[pixels]]
                 dark = np.zeros(operands.cosine.shape, dtype=bool) if lit is None else ~lit[span[pixels]]
@@ -381,11 +325,6 @@ class Design:
             out_of_range_spans=out_of_range,
         )
 
-    def _values(self, spans: Spans) -> SpanValues:
-        """Values of spans; u is 0 without specular light, so that no u is out of range."""
-        values = cast(SpanValues, spans.values)
-        return values if self.specular else values._replace(highlight=np.zeros_like(values.highlight))
-
     def _check(self, spans: Spans, constants: Sequence[FrameConstants]) -> None:
         """Refuse constants of another design, and codes out of range."""
         if len(constants) != self.materials:
@@ -394,8 +333,8 @@ class Design:
             if len(of_material.direction) != self.lights:
                 given = len(of_material.direction)
                 raise ValueError(f"the constants are for {given} lights, not {self.lights}")
-            if self.loads_tables:
-                cast(Lobe, self.specular).check(cast(LobeTable, of_material.lobe))
+            if self.specular is not None:
+                self.specular.check(of_material.lobe)
             if self.build.exponent not in (None, of_material.exponent):
                 fixed = self.build.exponent
                 raise ValueError(f"the exponent is fixed at {fixed}, not {of_material.exponent}")
@@ -405,39 +344,12 @@ class Design:
             codes = np.asarray(getattr(spans, name))
             if codes.size and not 0 <= codes.min() <= codes.max() < 1 << bits:
                 raise ValueError(f"{name} must be 0 to {(1 << bits) - 1}")
-        if self.takes_vectors and self.lights and spans.vectors is None:
-            raise ValueError(f"method {self.method} takes spans with vectors")
-        if not (self.takes_values and self.lights):
-            return
-        if spans.values is None or spans.values.diffuse.shape != (len(spans), self.lights, 3):
-            raise ValueError(f"method {self.method} takes spans with values for {self.lights} lights")
-        shape = (len(spans), 0, 3) if spans.factors is None else spans.factors.shape
-        if shape != (len(spans), len(self.factors), 3):
-            raise ValueError(f"the design takes spans with factors for {len(self.factors)} lights")
+        if self.lights:
+            self.interpolator.check(spans, self.lights, len(self.factors))
 
     def operands(self, spans: Spans, constants: FrameConstants) -> Operands:
         """Bit-accurate operands of every pixel of spans, each of one pixel or more, in their order."""
-        every = np.arange(len(spans))
-        return self._operands_of(spans, every, np.asarray(spans.length), constants)(slice(None))
-
-    def _operands_of(
-        self, spans: Spans, kept: np.ndarray, length: np.ndarray, constants: FrameConstants
-    ) -> Callable[[slice], Operands]:
-        """Function from a part of the kept spans to the operands of its pixels."""
-        if isinstance(self.interpolator, LocalChordInterpolator):
-            interpolator, given = self.interpolator, spans[kept]
-            factors = given.factors
-            return lambda part: interpolator.compute_values(
-                self._values(given[part]), length[part], None if factors is None else factors[part]
-            )
-        if isinstance(self.interpolator, QuotientInterpolator):
-            method, carried = self.interpolator, cast(Any, spans[kept].vectors)
-            model, direction = self.vector_spans, np.asarray(constants.direction)
-            return lambda part: method.compute_vectors(model, carried[part], length[part], direction)
-        format = self.interpolator.END_FORMAT
-        left, right = (Fixed(format, codes[kept]) for codes in (spans.normal_left, spans.normal_right))
-        vectors = [Fixed(COMPONENT, v) for v in (constants.direction, constants.halfway)]
-        return lambda part: self.interpolator.compute(left[part], right[part], length[part], *vectors)
+        return self.interpolator.operands(spans, constants, self.specular is not None)
 
     def _shade(
         self,
@@ -453,7 +365,7 @@ class Design:
         diffuse = diffuse_unit.compute(cosine)
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
         if self.specular is not None:
-            specular = self.specular.compute(highlight, dark, cast(Any, constants.highlight))
+            specular = self.specular.compute(highlight, dark, constants.highlight)
         if factor is not None:
             codes = specular.codes.copy()
             fading = list(self.factors)

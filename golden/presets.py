@@ -17,7 +17,7 @@ from blysk.golden.methods import (
     recurrence_interpolator,
     renormalise_interpolator,
 )
-from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator, Operand
+from blysk.golden.methods.interpolator import Interpolator, Operand
 from blysk.golden.pipeline import Build, Design
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
 from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS, ReflectionModel
@@ -168,9 +168,7 @@ def preset(
     specular = _specular(model)
     interpolator = (METHODS | PUBLISHED)[method]
     if operand not in (None, interpolator.operand):
-        if not isinstance(interpolator, NormalInterpolator):
-            raise ValueError(f"method {method} finds no normals, so it has one operand")
-        interpolator = replace(interpolator, operand=operand)
+        interpolator = interpolator.with_operand(operand)
     of_design = {field.name for field in fields(Design)}
     own = {name: options.pop(name) for name in list(options) if name not in of_design}
     own = {name: value for name, value in own.items() if value is not None}

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frame_constants import FrameConstants, by_material
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.depth_test import DepthTest
 from blysk.golden.geometry.edge_normals import TrueSpans
@@ -143,7 +143,7 @@ class Renderer:
             hidden = self.coarse.compute(*places)
             dropped = int(spans.length[hidden].sum())
             spans = replace(spans, **{name: value[~hidden] for name, value in vars(spans).items()})
-        spans = self._for_lights(spans, constants if isinstance(constants, FrameConstants) else constants[0])
+        spans = self._for_lights(spans, by_material(constants)[0])
         pixels = self.design.compute(shading_spans(spans), constants)
         test = DepthTest()
         depth = test.depths(spans.length, spans.depth, spans.depth_step)

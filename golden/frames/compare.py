@@ -213,7 +213,7 @@ def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> floa
         parameters = [design.highlight_parameter(material) for material in scene.materials]
         if model.PARAMETER == "roughness" and min(of or 0 for of in parameters) < LEAST_ROUGHNESS:
             return None
-        if not hasattr(design.interpolator, "scale") and own.scale_of(parameters):
+        if design.interpolator.value_setup is None and own.scale_of(parameters):
             return None
     viewer, brightness = scene.distant_viewer, 0.0
     for material in scene.materials:

@@ -79,7 +79,7 @@ class Pieces:
 
     def _scaled(self, interpolator: Interpolator) -> "Pieces":
         """The pieces with u of their places in the scale of the method's words."""
-        scale = getattr(interpolator, "scale", 0)
+        scale = interpolator.scale
         return replace(self, places=tuple(place.scaled(scale) for place in self.places)) if scale else self
 
     def _miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:

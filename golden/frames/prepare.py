@@ -95,7 +95,7 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
         The pipeline.
     """
     spans = quantise_spans(cut, scene.mesh.material)
-    scale = getattr(design.interpolator, "scale", 0)
+    scale = design.interpolator.scale
     if design.takes_vectors and design.lights:
         spans = replace(spans, vectors=span_vectors(scene, cut, design))
     elif design.takes_values:

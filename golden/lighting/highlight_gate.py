@@ -1,22 +1,24 @@
 """Bit-accurate model of the highlight gate: which spans can hold a visible highlight."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
-from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand, Specular
+from blysk.golden.beats import Spans
+from blysk.golden.lighting.gate import Gate
+from blysk.golden.lighting.highlight_operand import HighlightOperand
+from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
-from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 
 __all__ = ["HighlightGate"]
 
 
 @dataclass(frozen=True)
-class HighlightGate:
+class HighlightGate(Gate):
     """Whether a span may be lit, from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
 
     Along the great circle from ``N_l`` to ``N_r``, psi apart, the largest ``N . H`` is inside the arc if
@@ -150,10 +152,10 @@ class HighlightGate:
         limit = self.one_squared.values * (1 - np.cos(np.radians(self.interpolator.gate_angle)))
         return Fixed(self.angle_format, int(limit / self.angle_format.step) - 1)
 
-    @cached_property
-    def thresholds(self) -> Fixed:
-        """The PROM: T for exponents 0 to 1023."""
-        return self.thresholds_of(self.specular.last_lit_arguments)
+    @property
+    def threshold_format(self) -> Format:
+        """`level_format`."""
+        return self.level_format
 
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
         """T from the largest arguments with a term over 0, in steps of 2^-25; see `LobeTable`, too."""
@@ -215,10 +217,13 @@ class HighlightGate:
         ValueError
             If an operand has another format or an exponent is out of range.
         """
-        exponent = np.asarray(exponent, dtype=np.int64)
-        if exponent.size and not 1 <= exponent.min() <= exponent.max() <= MAX_EXPONENT:
-            raise ValueError(f"exponents must be 1 to {MAX_EXPONENT}")
-        return self.compute_by(normal_left, normal_right, halfway, self.thresholds[exponent])
+        return self.compute_by(normal_left, normal_right, halfway, self.thresholds_at(exponent))
+
+    def lit(self, spans: Spans, halfway: np.ndarray, threshold: Fixed) -> np.ndarray:
+        """Bit-accurate decisions from the unit normals of spans, see `Gate.lit`."""
+        left, right = (Fixed(COMPONENT, codes) for codes in (spans.normal_left, spans.normal_right))
+        lit = [self.compute_by(left, right, Fixed(COMPONENT, codes), threshold) for codes in halfway]
+        return np.stack(lit, axis=-1)
 
     def compute_by(
         self, normal_left: Fixed, normal_right: Fixed, halfway: Fixed, threshold: Fixed

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from blysk.golden.lighting.specular import HighlightOperand
+from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.reference.lobes import curve_lines
@@ -177,6 +177,16 @@ class Lobe(HighlightOperand):
     def has_table(self) -> bool:
         """``True``: the unit computes by tables."""
         return True
+
+    @property
+    def table_options(self) -> dict[str, Any]:
+        """``banks``, ``cutoff`` and ``fixed``."""
+        return {"banks": self.banks, "cutoff": self.cutoff, "fixed": self.fixed}
+
+    def for_operand(self, operand: Any, scale: int = 0) -> "Lobe":
+        """The unit for another operand or scale; see `HighlightOperand.for_operand`."""
+        same = (self.operand, self.scale) == (operand, scale)
+        return self if same else replace(self, operand=operand, scale=scale)
 
     @property
     def fixed_tables(self) -> "list[LobeTable] | None":
@@ -364,20 +374,7 @@ class Lobe(HighlightOperand):
         return row * self.steps + (below >> width), Fixed(self.fraction_format, fraction)
 
     def compute(self, operand: Fixed, dark: np.ndarray, table: "LobeTable") -> Fixed:
-        """Bit-accurate specular terms.
-
-        Parameters
-        ----------
-        operand : Fixed, any shape
-            ``N·H`` or ``1 - N·H`` in `operand_format`; a cosine in units of `ONE_SQUARED`.
-        dark : bool array, same shape
-            Whether the light is behind the surface: the result is 0.
-        table : LobeTable
-            Table with the unit's numbers of octaves and steps.
-
-        Returns
-        -------
-        Fixed, same shape, UQ(0, 17)
+        """Bit-accurate specular terms, see `HighlightOperand.compute`; a cosine is in units of `ONE_SQUARED`.
 
         Raises
         ------

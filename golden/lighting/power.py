@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from blysk.golden.lighting.specular import HighlightOperand
+from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.reference.reflection import BLINN
 

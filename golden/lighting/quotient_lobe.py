@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -47,6 +47,20 @@ class QuotientLobe(Lobe):
 
     OPERANDS: ClassVar[tuple[str, ...]] = ("place",)
     SERVES_MIRROR: ClassVar[bool] = True
+
+    def for_operand(self, operand: Any, scale: int = 0) -> Lobe:
+        """The unit for another operand: a `Lobe` with a table of the same model.
+
+        Raises
+        ------
+        ValueError
+            If the model is one of R·V, which has no other operand.
+        """
+        if operand == self.operand:
+            return self
+        if self.model.MIRROR:
+            raise ValueError(f"{self.name} is a lobe of R·V: take the method quotient, or phong_coplanar")
+        return Lobe(self.model, operand, scale=scale, **self.table_options)
 
     @property
     def parts(self) -> int:

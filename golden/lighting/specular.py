@@ -8,9 +8,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.lighting.highlight_operand import MAX_EXPONENT, HighlightOperand
 from blysk.golden.number.fixed import UQ, Fixed, Format
-from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.reference.reflection import (
     COSQUAD,
     AngleCosine,
@@ -19,63 +18,7 @@ from blysk.golden.reference.reflection import (
     ReflectionModel,
 )
 
-__all__ = ["MAX_EXPONENT", "Chords", "HighlightOperand", "Specular"]
-
-MAX_EXPONENT = 1000
-"""Largest specular exponent."""
-
-
-class HighlightOperand:
-    """Base of the models of specular units: format of the operand, range of the exponent.
-
-    A subclass has a field ``operand``. ``"cosine"``: the unit takes ``N . H`` of two unit vectors in
-    ``SQ(4, 34)`` and subtracts it from `ONE_SQUARED`. ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in
-    ``UQ(1, 25)``.
-    """
-
-    operand: str
-
-    OPERANDS: ClassVar[tuple[str, ...]] = ("cosine", "one_minus_cosine")
-    ARGUMENT_FORMAT = UQ(1, 25)
-    RESULT_FORMAT = UQ(0, 17)
-    EXPONENT_BITS = 10
-
-    def __post_init__(self) -> None:
-        if self.operand not in self.OPERANDS:
-            known = " or ".join(map(repr, self.OPERANDS))
-            raise ValueError(f"operand must be {known}, not {self.operand!r}")
-
-    @property
-    def operand_format(self) -> Format:
-        """Format of the input."""
-        return DotProduct().result_format if self.operand == "cosine" else self.ARGUMENT_FORMAT
-
-    def one_minus(self, operand: Fixed, exponent: int) -> Fixed:
-        """One minus the cosine of an operand, exact, after a check of operand and exponent.
-
-        Raises
-        ------
-        ValueError
-            If the operand has another format or the exponent is out of range.
-        """
-        if operand.format != self.operand_format:
-            raise ValueError(f"operand must be {self.operand_format}, not {operand.format}")
-        if not 1 <= exponent <= MAX_EXPONENT:
-            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
-        return ONE_SQUARED - operand if self.operand == "cosine" else operand
-
-    @property
-    def has_table(self) -> bool:
-        """Whether the unit computes by a table for each material, as a `Lobe` does."""
-        return False
-
-    @property
-    def last_lit_arguments(self) -> np.ndarray:
-        """Largest ``1 - cos gamma``, in steps of 2^-25, that may give a term over 0, for each exponent.
-
-        int64 array, shape (1024,); 2^27 where every argument may.
-        """
-        raise NotImplementedError
+__all__ = ["MAX_EXPONENT", "Chords", "Specular"]
 
 
 @dataclass(frozen=True)

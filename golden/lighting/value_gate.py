@@ -5,15 +5,18 @@ from functools import cached_property
 
 import numpy as np
 
+from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand, Specular
-from blysk.golden.number.fixed import SQ, UQ, Fixed
+from blysk.golden.lighting.gate import Gate
+from blysk.golden.lighting.highlight_operand import HighlightOperand
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 
 __all__ = ["ValueGate"]
 
 
 @dataclass(frozen=True)
-class ValueGate:
+class ValueGate(Gate):
     """Whether a span may be lit, from ``u = |N - H|^2 / 2`` at its first pixel, middle and last pixel.
 
     The u of the pixels lie on a quadratic, ``u_l + P t + G t^2`` with ``G = 2 (u_l + u_r - 2 u_m)``. It is
@@ -53,10 +56,10 @@ class ValueGate:
         """Largest distance of a pixel's u from the quadratic through the values."""
         return float(2.0**-23 + ChordSetup().walk_error(np.asarray(3 / 16), np.asarray(1 / 16)) + 2.0**-26)
 
-    @cached_property
-    def thresholds(self) -> Fixed:
-        """The PROM for exponents 0 to 1023, UQ(3, 15)."""
-        return self.thresholds_of(self.specular.last_lit_arguments)
+    @property
+    def threshold_format(self) -> Format:
+        """``THRESHOLD_FORMAT``."""
+        return self.THRESHOLD_FORMAT
 
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
         """Thresholds from the largest arguments with a term over 0, in steps of 2^-25; rounded up.
@@ -88,10 +91,7 @@ class ValueGate:
         ValueError
             If an exponent is out of range.
         """
-        exponent = np.asarray(exponent, dtype=np.int64)
-        if exponent.size and not 1 <= exponent.min() <= exponent.max() <= MAX_EXPONENT:
-            raise ValueError(f"exponents must be 1 to {MAX_EXPONENT}")
-        return self.compute_by(highlight, self.thresholds[exponent])
+        return self.compute_by(highlight, self.thresholds_at(exponent))
 
     def compute_by(self, highlight: np.ndarray, threshold: Fixed) -> np.ndarray:
         """Decisions as by `compute`, from thresholds, UQ(3, 15), in place of exponents."""
@@ -102,6 +102,21 @@ class ValueGate:
         level = threshold.extend(self.LEVEL_FORMAT).codes
         found: np.ndarray = ~held | (self.least(highlight) < level)
         return found
+
+    def lit(self, spans: Spans, halfway: np.ndarray, threshold: Fixed) -> np.ndarray:
+        """Bit-accurate decisions from the values of spans, see `Gate.lit`; H has no effect.
+
+        Values that are no pixel's are replaced: of a span of two pixels that in the middle, of a span of one
+        pixel those behind the first.
+        """
+        if spans.values is None:
+            raise ValueError("a value gate takes spans with values")
+        highlight = spans.values.highlight.astype(np.int64)
+        length = np.asarray(spans.length)
+        short, one = length < 3, length == 1
+        highlight[short, :, 1] = highlight[short][:, :, ::2].min(axis=-1)
+        highlight[one] = highlight[one][:, :, :1]
+        return self.compute_by(highlight, threshold[:, np.newaxis])
 
     @staticmethod
     def least(highlight: np.ndarray) -> np.ndarray:

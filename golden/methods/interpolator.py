@@ -1,11 +1,19 @@
 """Interpolators: models of the methods that compute the operands of the pixels of a span."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord import Chord
+from blysk.golden.cosines.chord_setup import ChordSetup
+from blysk.golden.cosines.quotient_spans import QuotientSpans
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.gate import Gate
+from blysk.golden.lighting.highlight_operand import HighlightOperand
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
@@ -112,6 +120,16 @@ class Interpolator:
         raise NotImplementedError
 
     @property
+    def scale(self) -> int:
+        """Scale s of the operand, see `Lobe`; if it is over 0, the specular unit takes ``min(2^s u, 1)``."""
+        return 0
+
+    @property
+    def value_setup(self) -> ChordSetup | None:
+        """Setup of the quadratics through three values of N·L and u; ``None``: the method finds normals."""
+        return None
+
+    @property
     def highlight_format(self) -> Format:
         """Format of the operand of the specular unit."""
         return Specular(operand=self.operand).operand_format
@@ -150,6 +168,116 @@ class Interpolator:
     def uses_chord(self) -> bool:
         """Whether, in exact arithmetic, the specular operand is ``|N - H|^2 / 2`` of the curve's normals."""
         return False
+
+    def with_operand(self, operand: Operand) -> "Interpolator":
+        """The method with another operand of the specular unit.
+
+        Raises
+        ------
+        ValueError
+            If the method has one operand.
+        """
+        raise ValueError(f"method {self.name} finds no normals, so it has one operand")
+
+    def matched(self, specular: HighlightOperand | None) -> "Interpolator":
+        """The method for a specular unit; ``None``: without specular light.
+
+        Raises
+        ------
+        ValueError
+            If the method cannot feed the unit.
+        """
+        return self
+
+    def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
+        """The specular unit that takes the method's operand, in its scale, with the model of a given unit.
+
+        Raises
+        ------
+        ValueError
+            If no unit of the model takes the operand.
+        """
+        return specular.for_operand(self.operand, self.scale)
+
+    def fitted(self, lobe: Lobe, parameters: Sequence[float | None]) -> "Interpolator":
+        """The method for a lobe and the parameters of its tables, where spans are cut for the method.
+
+        Parameters
+        ----------
+        lobe : Lobe
+            Specular unit.
+        parameters : sequence of float or None
+            Exponent or roughness of each table.
+        """
+        return self
+
+    def gate(self, specular: HighlightOperand, by_normals: Callable[..., Gate]) -> Gate:
+        """Model of the gate that foresees the method's highlights.
+
+        Parameters
+        ----------
+        specular : HighlightOperand
+            Model of the unit that is gated.
+        by_normals : callable
+            `HighlightGate`: makes a gate of unit normals from ``specular`` and ``interpolator``.
+
+        Raises
+        ------
+        ValueError
+            If the method does not serve a gate.
+        """
+        if not self.serves_gate:
+            raise ValueError(f"method {self.name} has no error bound for a gate")
+        return by_normals(specular, interpolator=self)
+
+    def spans(self, lights: int, highlights: bool) -> QuotientSpans:
+        """Model of the setup of spans of vectors.
+
+        Parameters
+        ----------
+        lights : int
+            Number of lights.
+        highlights : bool
+            Whether there is specular light.
+
+        Raises
+        ------
+        ValueError
+            If spans carry no vectors.
+        """
+        raise ValueError(f"method {self.name} takes no vectors")
+
+    def check(self, spans: Spans, lights: int, factors: int) -> None:
+        """Refuse spans that lack what the method takes.
+
+        Parameters
+        ----------
+        spans : Spans
+            The spans.
+        lights, factors : int
+            Number of lights, 1 at least, and of those that fade.
+
+        Raises
+        ------
+        ValueError
+            If values, factors or vectors are missing, or are for another number of lights.
+        """
+
+    def operands(self, spans: Spans, constants: FrameConstants, highlights: bool) -> Operands:
+        """Bit-accurate operands of every pixel, in the order of the spans.
+
+        Parameters
+        ----------
+        spans : Spans
+            Spans of one pixel or more, as `check` accepts them.
+        constants : FrameConstants
+            L and H of each light.
+        highlights : bool
+            Whether there is specular light.
+        """
+        left, right = (Fixed(self.END_FORMAT, codes) for codes in (spans.normal_left, spans.normal_right))
+        vectors = [Fixed(COMPONENT, codes) for codes in (constants.direction, constants.halfway)]
+        return self.compute(left, right, np.asarray(spans.length), *vectors)
 
     def widest_span(self, exponent: int) -> float:
         """Largest angle of a span, in degrees, for good highlights at a specular exponent."""
@@ -222,6 +350,10 @@ class NormalInterpolator(Interpolator):
     def __post_init__(self) -> None:
         if self.operand not in ("cosine", "one_minus_cosine"):
             raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
+
+    def with_operand(self, operand: Operand) -> "NormalInterpolator":
+        """The method with another operand of the specular unit."""
+        return replace(self, operand=operand)
 
     @property
     def uses_chord(self) -> bool:

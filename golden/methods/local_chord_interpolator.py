@@ -1,14 +1,21 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
+from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
+from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.factor import Factor
+from blysk.golden.lighting.gate import Gate
+from blysk.golden.lighting.highlight_operand import HighlightOperand
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
+from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ, Fixed
@@ -104,6 +111,51 @@ class LocalChordInterpolator(Interpolator):
     def setup(self) -> ChordSetup:
         """Model of the setup."""
         return ChordSetup(self.fraction_bits)
+
+    @property
+    def value_setup(self) -> ChordSetup:
+        """`setup`."""
+        return self.setup
+
+    def matched(self, specular: HighlightOperand | None) -> "LocalChordInterpolator":
+        """The method itself.
+
+        Raises
+        ------
+        ValueError
+            If it has a scale, and the unit has no table.
+        """
+        if self.scale and not (specular and specular.has_table):
+            raise ValueError("a scale of 1 - N·H needs a lobe with a table")
+        return self
+
+    def fitted(self, lobe: Lobe, parameters: Sequence[float | None]) -> "LocalChordInterpolator":
+        """The method with the scale that suits sharp lobes, see `Lobe.scale_of`."""
+        return replace(self, scale=lobe.scale_of(parameters))
+
+    def gate(self, specular: HighlightOperand, by_normals: Callable[..., Gate]) -> ValueGate:
+        """Model of the gate by values of u."""
+        return ValueGate(specular)
+
+    def check(self, spans: Spans, lights: int, factors: int) -> None:
+        """Refuse spans without values or factors for every light, see `Interpolator.check`."""
+        if spans.values is None or spans.values.diffuse.shape != (len(spans), lights, 3):
+            raise ValueError(f"method {self.name} takes spans with values for {lights} lights")
+        shape = (len(spans), 0, 3) if spans.factors is None else spans.factors.shape
+        if shape != (len(spans), factors, 3):
+            raise ValueError(f"the design takes spans with factors for {factors} lights")
+
+    def operands(self, spans: Spans, constants: FrameConstants, highlights: bool) -> Operands:
+        """Bit-accurate operands from the values of spans, see `compute_values`.
+
+        Without specular light u counts as 0, so that no u is out of range.
+        """
+        if spans.values is None:
+            raise ValueError(f"method {self.name} takes spans with values")
+        values = spans.values
+        if not highlights:
+            values = values._replace(highlight=np.zeros_like(values.highlight))
+        return self.compute_values(values, spans.length, spans.factors)
 
     @property
     def accumulators(self) -> dict[str, DifferenceAccumulator]:

@@ -1,12 +1,16 @@
 """The quotient method: exact highlights and N·L from quotients of quadratics, without a unit normal."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
+from blysk.golden.beats import Spans
 from blysk.golden.cosines.quotient import Quotient
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.highlight_operand import HighlightOperand
+from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import pixels_of
@@ -69,6 +73,30 @@ class QuotientInterpolator(Interpolator):
     def takes_line(self) -> bool:
         """``True``: vectors have the lengths of the true line."""
         return True
+
+    def matched(self, specular: HighlightOperand | None) -> "QuotientInterpolator":
+        """The method with the kind of highlight of a unit's model."""
+        mirror = specular is not None and specular.model.MIRROR
+        return self if mirror == self.mirror else replace(self, mirror=mirror)
+
+    def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
+        """The unit itself if it takes places; else a `QuotientLobe` of its model, with the same tables."""
+        if specular.operand == self.operand:
+            return specular
+        return QuotientLobe(specular.model, **specular.table_options)
+
+    def check(self, spans: Spans, lights: int, factors: int) -> None:
+        """Refuse spans without vectors, see `Interpolator.check`."""
+        if spans.vectors is None:
+            raise ValueError(f"method {self.name} takes spans with vectors")
+
+    def operands(self, spans: Spans, constants: FrameConstants, highlights: bool) -> Operands:
+        """Bit-accurate operands from the vectors of spans, see `compute_vectors`."""
+        if spans.vectors is None:
+            raise ValueError(f"method {self.name} takes spans with vectors")
+        direction = np.asarray(constants.direction)
+        model = self.spans(len(direction), highlights)
+        return self.compute_vectors(model, spans.vectors, np.asarray(spans.length), direction)
 
     def spans(self, lights: int, highlights: bool) -> QuotientSpans:
         """Model of the setup, for a number of lights, with or without specular light."""

@@ -8,7 +8,8 @@ from amaranth.lib import data, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.lighting.specular import MAX_EXPONENT, Chords, HighlightOperand, Specular
+from blysk.golden.lighting.highlight_operand import HighlightOperand
+from blysk.golden.lighting.specular import MAX_EXPONENT, Chords, Specular
 from blysk.golden.number.fixed import UQ, Format
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.hdl.core.dataflow import Dataflow

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from amaranth.lib.wiring import Component
 
-from blysk.golden.lighting.specular import MAX_EXPONENT, HighlightOperand
+from blysk.golden.lighting.highlight_operand import MAX_EXPONENT, HighlightOperand
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from blysk.golden.number.fixed import Fixed, Format
