@@ -12,8 +12,6 @@ from blysk.golden.frames.frame import Frame
 from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
-from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.lighting import distant_cosine, halfway_vector
 from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
@@ -46,9 +44,6 @@ __all__ = [
 
 BORDER = 0.002
 """Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off."""
-
-_BOUNDED = ("chord-local", "renormalise")
-"""Methods whose spans are cut, or need no cut, so that `error_bound` holds."""
 
 
 @dataclass(frozen=True)
@@ -137,22 +132,36 @@ def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarra
     float64 array, shape (height, width, 3)
         In [0, 1].
     """
-    interpolator = design.interpolator
-    if isinstance(interpolator, LocalChordInterpolator):
+    return design.interpolator.exact_frame(_Shading(scene, design, raster))
+
+
+@dataclass(frozen=True)
+class _Shading:
+    """Shades a frame in exact arithmetic, see `ExactShading`."""
+
+    scene: Scene
+    design: Design
+    raster: Raster
+
+    def by_normals(self) -> np.ndarray:
+        method, model = self.design.interpolator, _model_of(self.design)
+        return shade_spans(self.scene, self.raster, method.exact_normals, model, method.uses_chord)
+
+    def by_lines(self) -> np.ndarray:
+        left, right = line_ends(self.raster)
+        line = replace(self.raster, normal_left=left, normal_right=right)
+        return replace(self, raster=line).by_normals()
+
+    def by_values(self, exact_operands: Callable[..., tuple[np.ndarray, ...]]) -> np.ndarray:
+        scene, raster, scale = self.scene, self.raster, self.design.interpolator.scale
         fading = [index for index, light in enumerate(scene.lights) if light.fades]
-        operands = local_operands(scene, raster, factors=fading, scale=interpolator.scale)
-        cosine, one_minus_cosine, *given = interpolator.exact_operands(
-            operands[0], raster.length, operands[1]
-        )
+        values, factors = local_operands(scene, raster, factors=fading, scale=scale)
+        cosine, one_minus_cosine, *given = exact_operands(values, raster.length, factors)
         factor = None
         if given:
             factor = np.ones(cosine.shape)
             factor[:, fading] = given[0]
-        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(design), factor)
-    if interpolator.takes_line:
-        left, right = line_ends(raster)
-        raster = replace(raster, normal_left=left, normal_right=right)
-    return shade_spans(scene, raster, interpolator.exact_normals, _model_of(design), interpolator.uses_chord)
+        return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(self.design), factor)
 
 
 def _model_of(design: Design) -> ReflectionModel:
@@ -198,17 +207,35 @@ def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> floa
         materials, of a measured curve, and of a roughness under `LEAST_ROUGHNESS`. ``renormalise`` has none
         either where `Lobe.scale_of` gives a scale: its words of 1 - N·H are too coarse for so sharp a lobe.
     """
-    if design.takes_vectors and design.specular is not None and design.lights and cut is not None:
-        return quotient_bound(scene, design, cut)
-    if design.method not in _BOUNDED or design.specular is None:
-        return None
-    lobe, model = design.specular, _model_of(design)
+    return None if design.specular is None else design.interpolator.bound(_Bounds(scene, design, cut))
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """Bounds the error of a frame with specular light, see `ErrorBounds`."""
+
+    scene: Scene
+    design: Design
+    cut: Raster | None
+
+    def by_vectors(self) -> float | None:
+        if self.cut is None or not self.design.lights:
+            return None
+        return quotient_bound(self.scene, self.design, self.cut)
+
+    def by_tolerance(self) -> float | None:
+        return _tolerance_bound(self.scene, self.design)
+
+
+def _tolerance_bound(scene: Scene, design: Design) -> float | None:
+    """Bound from the tolerances by which spans are cut, as `error_bound` states it."""
+    model = _model_of(design)
     made = design.for_materials(scene.materials)
     if made.interpolator != design.interpolator:
         return None
-    if isinstance(lobe, Lobe):
+    if design.loads_tables:
         own = made.lobe
-        if model.name not in TABLE_MODELS or replace(own, banks=lobe.banks) != lobe:
+        if model.name not in TABLE_MODELS or replace(own, banks=design.banks) != design.lobe:
             return None
         parameters = [design.highlight_parameter(material) for material in scene.materials]
         if model.PARAMETER == "roughness" and min(of or 0 for of in parameters) < LEAST_ROUGHNESS:

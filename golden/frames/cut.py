@@ -1,7 +1,7 @@
 """Cutting of spans that are too wide for an interpolation method."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,8 +9,6 @@ from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks, lines_along, weights_along
 from blysk.golden.frames.pieces import Pieces
 from blysk.golden.methods.interpolator import Interpolator
-from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
-from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
@@ -42,14 +40,34 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
     cut : int
         How many of the given spans were cut.
     """
-    interpolator, limits = design.interpolator, HighlightLimits.of(scene.materials, design)
-    if isinstance(interpolator, QuotientInterpolator):
-        return cut_by_ends(raster, interpolator.LARGEST_RATIO)
-    if isinstance(interpolator, RenormaliseInterpolator):
-        return cut_by_length(raster, interpolator.LARGEST_RATIO)
-    if interpolator.CUT_BY_ERROR:
-        return cut_by_error(scene, raster, interpolator, limits)
-    return cut_by_angle(raster, min(map(interpolator.widest_span, limits.exponents)))
+    return design.interpolator.cut(_Cutter(scene, raster, design))
+
+
+@dataclass(frozen=True)
+class _Cutter:
+    """Cuts the spans of a scene for a design, see `SpanCutter`."""
+
+    scene: Scene
+    raster: Raster
+    design: Design
+
+    @property
+    def _limits(self) -> HighlightLimits:
+        return HighlightLimits.of(self.scene.materials, self.design)
+
+    def by_error(self) -> tuple[Raster, int]:
+        return cut_by_error(self.scene, self.raster, self.design.interpolator, self._limits)
+
+    def by_angle(self) -> tuple[Raster, int]:
+        return cut_by_angle(
+            self.raster, min(map(self.design.interpolator.widest_span, self._limits.exponents))
+        )
+
+    def by_length(self, largest_ratio: float) -> tuple[Raster, int]:
+        return cut_by_length(self.raster, largest_ratio)
+
+    def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
+        return cut_by_ends(self.raster, largest_ratio)
 
 
 def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:

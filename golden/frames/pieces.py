@@ -85,15 +85,15 @@ class Pieces:
     def _miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
         """Result of `miss`; u of the places has the scale of the method's words."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
-        chord = interpolator if isinstance(interpolator, LocalChordInterpolator) else None
+        setup = interpolator.value_setup
         # From so many pixels on there are pixels between the three, or two, values of the curve.
-        between = pixels > (3 if chord else 2)
+        between = pixels > (3 if setup else 2)
         fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
         names = ("diffuse", "highlight", "factor") if fading.any() else ("diffuse", "highlight")
         curves = {name: _Quadratic.of(self.places, name) for name in names}
         diffuse, highlight = curves["diffuse"], curves["highlight"]
-        if chord:
-            wrong = self._flagged(chord, curves)
+        if setup:
+            wrong = self._flagged(setup, curves)
             misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
         else:
             wrong = np.zeros(len(self.origin), dtype=bool)
@@ -101,8 +101,7 @@ class Pieces:
         wrong |= between[:, 0] & self.places[0].turned(self.places[-1], LocalChordInterpolator())
         margin = self._margin()[:, np.newaxis]
         errors = {name: margin * miss for name, miss in misses.items()}
-        if chord:
-            setup = chord.setup
+        if setup:
             errors["diffuse"] += setup.diffuse_error(*diffuse.sizes)
             errors["highlight"] += setup.highlight_error(*highlight.sizes)
         in_front = diffuse.largest + errors["diffuse"] >= 0
@@ -118,7 +117,7 @@ class Pieces:
             wrong[chosen] = (self._fades_wrong(chosen, curves, *shares) & fading).any(axis=1)
         turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & lit
         chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
-        if chord:
+        if setup:
             kept = diffuse.left, diffuse.slope, diffuse.curvature
             wrong[chosen] = _mistakes_sign(
                 self.scene,
@@ -182,11 +181,9 @@ class Pieces:
         found: np.ndarray = np.maximum(ratio, LocalChordInterpolator.MARGIN)
         return found
 
-    def _flagged(
-        self, interpolator: LocalChordInterpolator, curves: "Mapping[str, _Quadratic]"
-    ) -> np.ndarray:
+    def _flagged(self, setup: ChordSetup, curves: "Mapping[str, _Quadratic]") -> np.ndarray:
         """Whether ``chord-local`` may flag a piece; if ``False``, it does not."""
-        setup, one = interpolator.setup, float(ONE_SQUARED.values)
+        one = float(ONE_SQUARED.values)
         formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
         formats["factor"] = setup.DIFFUSE_SLOPE_FORMAT
         flagged = np.zeros(len(self.origin), dtype=bool)

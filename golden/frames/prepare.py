@@ -94,17 +94,34 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
     design : Design
         The pipeline.
     """
-    spans = quantise_spans(cut, scene.mesh.material)
-    scale = design.interpolator.scale
-    if design.takes_vectors and design.lights:
-        spans = replace(spans, vectors=span_vectors(scene, cut, design))
-    elif design.takes_values:
-        values, factors = local_operands(scene, cut, design.lights, design.factors, scale)
-        spans = replace(spans, values=values, factors=factors)
-    elif design.interpolator.takes_line:
-        left, right = quantise_line(*_true_ends(scene, cut))
-        spans = replace(spans, normal_left=left, normal_right=right)
-    return spans
+    return design.interpolator.filled(_Filler(scene, cut, design))
+
+
+@dataclass(frozen=True)
+class _Filler:
+    """Fills the beats of cut spans for a design, see `SpanFiller`."""
+
+    scene: Scene
+    cut: Raster
+    design: Design
+
+    def with_normals(self) -> Spans:
+        return quantise_spans(self.cut, self.scene.mesh.material)
+
+    def with_lines(self) -> Spans:
+        left, right = quantise_line(*_true_ends(self.scene, self.cut))
+        return replace(self.with_normals(), normal_left=left, normal_right=right)
+
+    def with_values(self) -> Spans:
+        design = self.design
+        of = design.lights, design.factors, design.interpolator.scale
+        values, factors = local_operands(self.scene, self.cut, *of)
+        return replace(self.with_normals(), values=values, factors=factors)
+
+    def with_vectors(self) -> Spans:
+        if not self.design.lights:
+            return self.with_normals()
+        return replace(self.with_normals(), vectors=span_vectors(self.scene, self.cut, self.design))
 
 
 def _true_ends(scene: Scene, cut: Raster) -> tuple[np.ndarray, np.ndarray]:

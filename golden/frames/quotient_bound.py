@@ -13,8 +13,7 @@ from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.geometry.vertex_sort import SortedTriangles
 from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.lighting.quotient_lobe import QuotientLobe
-from blysk.golden.methods.quotient_interpolator import QuotientErrors, QuotientInterpolator
+from blysk.golden.methods.quotient_interpolator import QuotientErrors
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.lighting import distant_cosine
 from blysk.golden.reference.raster import Raster
@@ -38,12 +37,10 @@ def quotient_bound(scene: Scene, design: Design, cut: Raster) -> float:
     cut : Raster
         The spans that were shaded.
     """
-    method = design.interpolator
-    assert isinstance(method, QuotientInterpolator)
     if not len(cut.length):
         return 0.5
     vectors = span_vectors(scene, cut, design)
-    errors = [QuotientErrors.of(vectors, cut.length, method.mirror, further) for further in (False, True)]
+    errors = [QuotientErrors.of(vectors, cut.length, design.mirror, further) for further in (False, True)]
     return _bound(scene, design, *errors)
 
 
@@ -115,8 +112,7 @@ def _bound(
     scene: Scene, design: Design, errors: QuotientErrors, further: QuotientErrors | None = None
 ) -> float:
     """From the bounds of directions, of the first light and of further ones, to that of a pixel."""
-    lobe = design.specular
-    assert isinstance(lobe, QuotientLobe)
+    lobe = design.lobe
     kinds = [errors] if further is None or len(scene.lights) < 2 else [errors, further]
     largest = 0.0
     for material in scene.materials:

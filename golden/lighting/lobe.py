@@ -310,10 +310,10 @@ class Lobe(HighlightOperand):
         if (self.octaves, self.steps) != (Lobe.octaves, Lobe.steps):
             return self
         finer = replace(self, octaves=self.FINER[0], steps=self.FINER[1])
-        errors = [max(of._line_error(one) for one in dict.fromkeys(parameters)) for of in (self, finer)]
+        errors = [max(of.line_error(one) for one in dict.fromkeys(parameters)) for of in (self, finer)]
         return finer if errors[0] > 1 / 1020 and errors[1] < errors[0] else self
 
-    def _line_error(self, parameter: float | None) -> float:
+    def line_error(self, parameter: float | None) -> float:
         """Largest error of the lines between a table's entries, without arithmetic error."""
         values, knots = self.table(parameter).values.values, self.knots
         share = np.arange(1, 8) / 8

@@ -15,11 +15,13 @@ from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
 from blysk.golden.reference.curves import interpolate
+from blysk.golden.reference.raster import Raster
 
 __all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "difference_rounding"]
 
@@ -278,6 +280,22 @@ class Interpolator:
         left, right = (Fixed(self.END_FORMAT, codes) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, codes) for codes in (constants.direction, constants.halfway)]
         return self.compute(left, right, np.asarray(spans.length), *vectors)
+
+    def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
+        """The spans of a frame, cut as the method needs them, and how many of those given were cut."""
+        return cutter.by_error()
+
+    def filled(self, filler: SpanFiller) -> Spans:
+        """The beats of cut spans, with what the method takes."""
+        return filler.with_normals()
+
+    def exact_frame(self, shading: ExactShading) -> np.ndarray:
+        """A frame by the method in exact arithmetic: float64 array, shape (height, width, 3)."""
+        return shading.by_normals()
+
+    def bound(self, bounds: ErrorBounds) -> float | None:
+        """Bound of the error of a frame against exact normals, in LSB; ``None``: no bound is known."""
+        return None
 
     def widest_span(self, exponent: int) -> float:
         """Largest angle of a span, in degrees, for good highlights at a specular exponent."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blysk.golden.methods.frame_steps import SpanCutter
 from blysk.golden.methods.interpolator import NormalInterpolator, difference_rounding
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
@@ -11,6 +12,7 @@ from blysk.golden.normals.gpq import GPQ
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT
+from blysk.golden.reference.raster import Raster
 
 __all__ = ["METHODS", "LinearInterpolator"]
 
@@ -43,6 +45,10 @@ class LinearInterpolator(NormalInterpolator):
     CURVE = "linear"
     ORIGIN = "baseline"
     CUT_BY_ERROR = False
+
+    def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
+        """Spans cut by their angle alone."""
+        return cutter.by_angle()
 
     @property
     def normal_error(self) -> float:

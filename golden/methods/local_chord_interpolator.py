@@ -16,6 +16,7 @@ from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.lighting.value_gate import ValueGate
+from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ, Fixed
@@ -136,6 +137,18 @@ class LocalChordInterpolator(Interpolator):
     def gate(self, specular: HighlightOperand, by_normals: Callable[..., Gate]) -> ValueGate:
         """Model of the gate by values of u."""
         return ValueGate(specular)
+
+    def filled(self, filler: SpanFiller) -> Spans:
+        """Spans with values of each light."""
+        return filler.with_values()
+
+    def exact_frame(self, shading: ExactShading) -> np.ndarray:
+        """A frame by the quadratics through the values of spans, in exact arithmetic."""
+        return shading.by_values(self.exact_operands)
+
+    def bound(self, bounds: ErrorBounds) -> float | None:
+        """Bound from the tolerances by which spans are cut."""
+        return bounds.by_tolerance()
 
     def check(self, spans: Spans, lights: int, factors: int) -> None:
         """Refuse spans without values or factors for every light, see `Interpolator.check`."""

@@ -11,9 +11,11 @@ from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
+from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import pixels_of
+from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.reflection import ReflectionModel
 
 __all__ = ["METHODS", "QuotientErrors", "QuotientInterpolator"]
@@ -84,6 +86,22 @@ class QuotientInterpolator(Interpolator):
         if specular.operand == self.operand:
             return specular
         return QuotientLobe(specular.model, **specular.table_options)
+
+    def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
+        """Spans whose ends differ in length by `LARGEST_RATIO` at most."""
+        return cutter.by_ends(self.LARGEST_RATIO)
+
+    def filled(self, filler: SpanFiller) -> Spans:
+        """Spans with vectors in the frame of each light."""
+        return filler.with_vectors()
+
+    def exact_frame(self, shading: ExactShading) -> np.ndarray:
+        """A frame by normals on the true line, in exact arithmetic."""
+        return shading.by_lines()
+
+    def bound(self, bounds: ErrorBounds) -> float | None:
+        """Bound from the vectors of the spans, see `QuotientErrors`."""
+        return bounds.by_vectors()
 
     def check(self, spans: Spans, lights: int, factors: int) -> None:
         """Refuse spans without vectors, see `Interpolator.check`."""

@@ -5,12 +5,15 @@ from typing import ClassVar
 
 import numpy as np
 
+from blysk.golden.beats import Spans
+from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import NormalInterpolator, Operand
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
+from blysk.golden.reference.raster import Raster
 
 __all__ = ["METHODS", "RenormaliseInterpolator"]
 
@@ -60,6 +63,22 @@ class RenormaliseInterpolator(NormalInterpolator):
     def serves_gate(self) -> bool:
         """``False``: a gate takes unit normals."""
         return False
+
+    def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
+        """Spans cut where a pixel's vector is shorter than `LARGEST_RATIO` allows."""
+        return cutter.by_length(self.LARGEST_RATIO)
+
+    def filled(self, filler: SpanFiller) -> Spans:
+        """Spans with the ends of the true line."""
+        return filler.with_lines()
+
+    def exact_frame(self, shading: ExactShading) -> np.ndarray:
+        """A frame by normals on the true line, in exact arithmetic."""
+        return shading.by_lines()
+
+    def bound(self, bounds: ErrorBounds) -> float | None:
+        """Bound from the tolerances of spans, which its curve keeps."""
+        return bounds.by_tolerance()
 
     @property
     def accumulator(self) -> DifferenceAccumulator:

@@ -58,7 +58,7 @@ def test_steps_for_lobes():
     finer = BECKMANN.for_parameters([0.3, 1.0])
     assert (finer.octaves, finer.steps) == Lobe.FINER
     assert finer.entries <= 512
-    assert 255 * finer._line_error(1.0) < 0.15 < 0.5 < 255 * BECKMANN._line_error(1.0)
+    assert 255 * finer.line_error(1.0) < 0.15 < 0.5 < 255 * BECKMANN.line_error(1.0)
     assert BECKMANN.for_parameters([0.3]) is BECKMANN
     assert GGX.for_parameters([0.05, 0.5]) is GGX
     mine = replace(BECKMANN, octaves=12, steps=8)

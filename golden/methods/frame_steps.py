@@ -1,0 +1,70 @@
+"""Steps of a frame among which a method chooses: how spans are cut, filled, shaded exactly and bounded.
+
+`blysk.golden.frames` gives a method an object of each interface, for its scene and design. The method calls
+the way that suits it.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from blysk.golden.beats import Spans
+from blysk.golden.reference.raster import Raster
+
+__all__ = ["ErrorBounds", "ExactShading", "SpanCutter", "SpanFiller"]
+
+
+class SpanCutter(Protocol):
+    """Ways to cut the spans of a frame; each gives the spans, and how many of those given were cut."""
+
+    def by_error(self) -> tuple[Raster, int]:
+        """Until the method's curve keeps its tolerance, see `cut_by_error`."""
+
+    def by_angle(self) -> tuple[Raster, int]:
+        """Until no span is wider than `Interpolator.widest_span`, see `cut_by_angle`."""
+
+    def by_length(self, largest_ratio: float) -> tuple[Raster, int]:
+        """Until no pixel's normal is too short beside an end's, see `cut_by_length`."""
+
+    def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
+        """Until the two ends are alike, see `cut_by_ends`."""
+
+
+class SpanFiller(Protocol):
+    """Ways to fill the beats of cut spans."""
+
+    def with_normals(self) -> Spans:
+        """Unit normals at both ends."""
+
+    def with_lines(self) -> Spans:
+        """Ends of the true line, with their lengths."""
+
+    def with_values(self) -> Spans:
+        """Values of N·L, of u and of the factors at three places."""
+
+    def with_vectors(self) -> Spans:
+        """Vectors ``N/W`` in the frames of the lights; none without lights."""
+
+
+class ExactShading(Protocol):
+    """Ways to shade a frame by a method in exact arithmetic; float64 arrays, shape (height, width, 3)."""
+
+    def by_normals(self) -> np.ndarray:
+        """By `Interpolator.exact_normals` of the unit normals at both ends."""
+
+    def by_lines(self) -> np.ndarray:
+        """By `Interpolator.exact_normals` of the ends of the true line."""
+
+    def by_values(self, exact_operands: Callable[..., tuple[np.ndarray, ...]]) -> np.ndarray:
+        """By operands from the values of spans, as of `LocalChordInterpolator.exact_operands`."""
+
+
+class ErrorBounds(Protocol):
+    """Ways to bound the error of a frame, in LSB; ``None`` where no bound is known."""
+
+    def by_tolerance(self) -> float | None:
+        """From the tolerances by which spans are cut, see `error_bound`."""
+
+    def by_vectors(self) -> float | None:
+        """From the vectors of the spans, see `quotient_bound`."""
