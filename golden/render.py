@@ -88,16 +88,12 @@ class Renderer:
     coarse: CoarseDepth | None = None
 
     def __post_init__(self) -> None:
-        design, vectors = self.design, self.design.takes_vectors
-        lines = design.interpolator.takes_line and not vectors
-        suits = Geometry(lines=lines, vectors=vectors, rotates=vectors and design.lights > 1)
+        suits = self.design.interpolator.geometry(self.design.lights)
         if self.geometry is None:
             object.__setattr__(self, "geometry", suits)
-        if design.takes_values:
-            raise ValueError(f"triangles give normals, and {design.method} takes values; use another method")
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
-            raise ValueError(f"method {design.method} takes {taken}, the geometry gives {given}")
+            raise ValueError(f"method {self.design.method} takes {taken}, the geometry gives {given}")
 
     @property
     def mirrors(self) -> bool:

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
+from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.missed import missed_spans
-from blysk.golden.frames.vector_axes import light_frames, vector_axes
+from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Design, Spans
@@ -170,13 +170,7 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
         FrameConstants.of(scene, design.lights, index=index, mirror=design.mirror)
         for index in range(design.materials)
     ]
-    if design.takes_vectors:
-        frames = light_frames(scene, design.lights)
-        codes = np.zeros((design.lights, 3), dtype=np.int64)
-        for index, frame in enumerate(frames[: len(scene.lights)]):
-            if scene.lights[index].is_on:
-                codes[index] = np.rint(frame.direction * QuotientSpans.ONE)
-        constants = [replace(of, direction=codes, halfway=np.zeros_like(codes)) for of in constants]
+    constants = design.interpolator.constants_for(scene, constants)
     return with_tables(constants, scene.materials, design) if design.loads_tables else constants
 
 

@@ -8,10 +8,11 @@ import numpy as np
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.vector_axes import further_axes, light_frames, triangle_axes
+from blysk.golden.frames.vector_axes import further_axes, triangle_axes
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
 from blysk.golden.geometry.triangles import Frame
+from blysk.golden.reference.light_frame import light_frames
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 

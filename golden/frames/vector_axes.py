@@ -3,17 +3,10 @@
 import numpy as np
 
 from blysk.golden.pipeline import Design
-from blysk.golden.reference.light_frame import LightFrame, light_frame
+from blysk.golden.reference.light_frame import LightFrame, light_frames
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["further_axes", "light_frames", "triangle_axes", "vector_axes"]
-
-
-def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
-    """Frames of a pipeline's lights; those that the scene lacks have the frame of the viewer."""
-    viewer = scene.camera.viewer
-    directions = [np.asarray(light.direction) for light in scene.lights] + [viewer] * lights
-    return [light_frame(direction, viewer) for direction in directions[:lights]]
+__all__ = ["further_axes", "triangle_axes", "vector_axes"]
 
 
 def vector_axes(scene: Scene, design: Design) -> np.ndarray:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blysk.golden.beats import Spans
 from blysk.golden.geometry.edge_normals import PlacedSpans, TrueSpans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL, Pieces
 from blysk.golden.geometry.vector_adapter import VectorSpans
 from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.number.fixed import SQ, Fixed
-from blysk.golden.pipeline import Spans
 
 __all__ = ["LineAdapter", "LineSpans", "shading_spans"]
 

@@ -11,6 +11,7 @@ from blysk.golden.cosines.chord import Chord
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
@@ -22,6 +23,7 @@ from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, ONE_SQUARED
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.scene import Scene
 
 __all__ = ["Interpolator", "NormalInterpolator", "Operand", "Operands", "difference_rounding"]
 
@@ -280,6 +282,20 @@ class Interpolator:
         left, right = (Fixed(self.END_FORMAT, codes) for codes in (spans.normal_left, spans.normal_right))
         vectors = [Fixed(COMPONENT, codes) for codes in (constants.direction, constants.halfway)]
         return self.compute(left, right, np.asarray(spans.length), *vectors)
+
+    def geometry(self, lights: int) -> Geometry:
+        """Geometry that makes the method's spans from triangles, for a number of lights.
+
+        Raises
+        ------
+        ValueError
+            If triangles do not give what the method takes.
+        """
+        return Geometry()
+
+    def constants_for(self, scene: Scene, constants: Sequence[FrameConstants]) -> list[FrameConstants]:
+        """Frame constants of each material, with L and H in the frame that the method takes."""
+        return list(constants)
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
         """The spans of a frame, cut as the method needs them, and how many of those given were cut."""

@@ -10,6 +10,7 @@ import numpy as np
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
@@ -137,6 +138,10 @@ class LocalChordInterpolator(Interpolator):
     def gate(self, specular: HighlightOperand, by_normals: Callable[..., Gate]) -> ValueGate:
         """Model of the gate by values of u."""
         return ValueGate(specular)
+
+    def geometry(self, lights: int) -> Geometry:
+        """Raise `ValueError`: triangles give no values."""
+        raise ValueError(f"triangles give normals, and {self.name} takes values; use another method")
 
     def filled(self, filler: SpanFiller) -> Spans:
         """Spans with values of each light."""

@@ -1,5 +1,6 @@
 """The quotient method: exact highlights and N·L from quotients of quadratics, without a unit normal."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -9,14 +10,17 @@ from blysk.golden.beats import Spans
 from blysk.golden.cosines.quotient import Quotient
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import pixels_of
+from blysk.golden.reference.light_frame import light_frames
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.reflection import ReflectionModel
+from blysk.golden.reference.scene import Scene
 
 __all__ = ["METHODS", "QuotientErrors", "QuotientInterpolator"]
 
@@ -86,6 +90,19 @@ class QuotientInterpolator(Interpolator):
         if specular.operand == self.operand:
             return specular
         return QuotientLobe(specular.model, **specular.table_options)
+
+    def geometry(self, lights: int) -> Geometry:
+        """Geometry that makes vectors, which are turned if there are several lights."""
+        return Geometry(vectors=True, rotates=lights > 1)
+
+    def constants_for(self, scene: Scene, constants: Sequence[FrameConstants]) -> list[FrameConstants]:
+        """Constants with L in the frame of each light, and no H; L of a light that is off is 0."""
+        lights = len(constants[0].direction)
+        codes = np.zeros((lights, 3), dtype=np.int64)
+        for index, frame in enumerate(light_frames(scene, lights)[: len(scene.lights)]):
+            if scene.lights[index].is_on:
+                codes[index] = np.rint(frame.direction * QuotientSpans.ONE)
+        return [replace(of, direction=codes, halfway=np.zeros_like(codes)) for of in constants]
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
         """Spans whose ends differ in length by `LARGEST_RATIO` at most."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from blysk.golden.beats import Spans
+from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import NormalInterpolator, Operand
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
@@ -63,6 +64,10 @@ class RenormaliseInterpolator(NormalInterpolator):
     def serves_gate(self) -> bool:
         """``False``: a gate takes unit normals."""
         return False
+
+    def geometry(self, lights: int) -> Geometry:
+        """Geometry that makes true lines."""
+        return Geometry(lines=True)
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
         """Spans cut where a pixel's vector is shorter than `LARGEST_RATIO` allows."""

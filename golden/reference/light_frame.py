@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.scene import Scene
 
-__all__ = ["LightFrame", "light_frame", "squared_sine"]
+__all__ = ["LightFrame", "light_frame", "light_frames", "squared_sine"]
 
 
 class LightFrame(NamedTuple):
@@ -86,3 +87,10 @@ def squared_sine(vector: np.ndarray, frame: LightFrame, mirror: bool = False) ->
     x, y, z = (np.square(component) for component in np.moveaxis(np.asarray(vector, np.float64), -1, 0))
     found: np.ndarray = (x + (frame.cosine**2 * y if mirror else y)) / (x + y + z)
     return found
+
+
+def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
+    """Frames of a pipeline's lights; those that the scene lacks have the frame of the viewer."""
+    viewer = scene.camera.viewer
+    directions = [np.asarray(light.direction) for light in scene.lights] + [viewer] * lights
+    return [light_frame(direction, viewer) for direction in directions[:lights]]
