@@ -68,9 +68,10 @@ _COMPONENTS = 3
 """Components of a vector of geometry."""
 
 WAITING_SPANS = 512
-"""Spans between geometry and shading, in block RAMs; not compact.
+"""Spans between geometry and shading, in block RAMs; compact only of vectors.
 
-Shading works on these while small triangles are set up; while it has large ones, the setup goes on.
+Shading works on these while small triangles are set up, or spans are cut; while it has large ones, the setup
+goes on.
 """
 
 
@@ -78,10 +79,11 @@ class RenderUnit(wiring.Component):
     """Triangles to the pixels that are to be written: `Renderer` is the bit-accurate model.
 
     `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; spans wait between the first two in a
-    FIFO, and their depths pass the pipeline in another. With a coarse depth test a span also waits in the
-    FIFO for the test's answer, and then leaves, or is dropped in one cycle. The units work at the same time:
-    a frame takes as many cycles as the slowest of them alone, if none waits for long. The style of the
-    design's build is that of shading, and that of geometry unless ``compact`` says otherwise.
+    FIFO (compact without vectors or a coarse test: one in a register), and their depths pass the pipeline in
+    another. With a coarse depth test a span also waits in the FIFO for the test's answer, and then leaves, or
+    is dropped in one cycle. The units work at the same time: a frame takes as many cycles as the slowest of
+    them alone, if none waits for long. The style of the design's build is that of shading, and that of
+    geometry unless ``compact`` says otherwise.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
     for the pipeline to be empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
@@ -187,7 +189,7 @@ class RenderUnit(wiring.Component):
             source.ready.eq(made.ready & room),
         ]
         known, drops = self._judge(m, source, room, made.ready, ready)
-        if geometry.compact and self.coarse is None:
+        if geometry.compact and not geometry.vectors and self.coarse is None:
             # Memories of 16 words for one span and the next would cost as much as they win.
             connect_register(m, "waiting_span", made, ready)
         else:

@@ -19,16 +19,13 @@ from blysk.hdl.geometry.edge_walk import EdgeWalkUnit, walk_shape
 from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
 from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit, plane_shape, planes_shape
 from blysk.hdl.geometry.plane_setup import PlaneSetupUnit, scales_shape
+from blysk.hdl.geometry.serial_vectors import SerialVectorsUnit
 from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.span_halver import SpanHalverUnit
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
-from blysk.hdl.geometry.vector_adapter import (
-    SerialVectorAdapterUnit,
-    VectorAdapterUnit,
-    vector_spans_shape,
-)
+from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit, vector_spans_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
 __all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
@@ -160,8 +157,8 @@ class GeometryUnit(wiring.Component):
     edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits before each, so
     that neither keeps the other from its turn. In the *compact* style one divider serves all edges and one
     multiplier the gradients of all attributes; attributes take turns along the spans, too, and so do the
-    normals of a span, or the components of its vectors. There only the attributes have a FIFO in the setup;
-    other words wait in registers.
+    normals of a span. With vectors one unit cuts a span and makes the words of its pieces. There only the
+    attributes have a FIFO in the setup; other words wait in registers.
 
     The units work on several triangles at the same time, and the slowest one sets the pace. A triangle takes:
 
@@ -173,7 +170,8 @@ class GeometryUnit(wiring.Component):
       pixels. For n pixels cut off at the long edge it takes as many cycles more as n has bits. In the compact
       style it takes four cycles for each scanline and for every two of those bits; at the same time the
       normals take three cycles each. With ``vectors`` each time that a span does not fit, and each piece
-      behind the first, takes two cycles (`SpanHalverUnit`).
+      behind the first, takes two cycles (`SpanHalverUnit`); in the compact style a piece takes 13 cycles or
+      more at the same time (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` or ``vectors``
     4 and 2. The second lane adds 4, in the compact style 2.
@@ -248,9 +246,13 @@ class GeometryUnit(wiring.Component):
         if lines:
             self._normals, shape = LineAdapterUnit(), line_spans_shape()
         elif vectors:
-            adapter = SerialVectorAdapterUnit if compact else VectorAdapterUnit
-            self._normals, shape = adapter(VectorAdapter(rotates)), vector_spans_shape()
-            self._halver = SpanHalverUnit(SpanHalver(rotates))
+            shape = vector_spans_shape()
+            if compact:
+                # One unit cuts spans and makes their words.
+                self._normals = self._halver = SerialVectorsUnit(rotates)
+            else:
+                self._normals = VectorAdapterUnit(VectorAdapter(rotates))
+                self._halver = SpanHalverUnit(SpanHalver(rotates))
         else:
             self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
         normaliser = 0 if lines or vectors else self._normals.multipliers
@@ -280,7 +282,7 @@ class GeometryUnit(wiring.Component):
         connect(m, self._walk.o, self._clip.i)
         rows = self._walk_planes(m, planes)
         made = self._attributes.o
-        if self.vectors:
+        if self.vectors and not self.compact:
             m.submodules.halver = self._halver
             connect(m, made, self._halver.i)
             made = self._halver.o
@@ -365,8 +367,9 @@ class GeometryUnit(wiring.Component):
         made, idle = self._attributes, self._attributes.idle
         if self.vectors:
             made, idle = self._halver, idle & self._halver.idle
-        spans = moving(m, "pieces", made.o, self.o)
-        m.d.comb += self.idle.eq(((taken - walked)[:_INSIDE_BITS] == dropped) & idle & ~spans)
+        if made is not self._normals:
+            idle &= ~moving(m, "pieces", made.o, self.o)
+        m.d.comb += self.idle.eq(((taken - walked)[:_INSIDE_BITS] == dropped) & idle)
 
     def _count(self, m: Module) -> None:
         """Counters of the units; a counter that two units have is their sum."""

@@ -14,7 +14,14 @@ from blysk.hdl.geometry.plane_assembler import plane_shape, planes_shape
 from blysk.hdl.geometry.span_clip import clipped_rows_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
-__all__ = ["SpanAttributesUnit", "pieces_shape", "planes_rows_shape", "span_words_shape", "whole_spans_shape"]
+__all__ = [
+    "SpanAttributesUnit",
+    "pieces_shape",
+    "planes_rows_shape",
+    "span_words_shape",
+    "whole_span_shape",
+    "whole_spans_shape",
+]
 
 _BITS = GradientSetup.FORMAT.width
 
@@ -51,6 +58,12 @@ def whole_spans_shape() -> data.StructLayout:
     return data.StructLayout(words | places | _tag_shape().members)
 
 
+def whole_span_shape() -> data.StructLayout:
+    """Shape of one attribute of `whole_spans_shape`, with all that is the span's."""
+    words = {name: FixedShape(SPAN_STEP) for name in ("near", "far", "inward")}
+    return data.StructLayout({**whole_spans_shape().members, **words})
+
+
 class SpanAttributesUnit(wiring.Component):
     """Walks attributes down the long edge and along the spans: `SpanAttributes` is the bit-accurate model.
 
@@ -66,7 +79,8 @@ class SpanAttributesUnit(wiring.Component):
     the fourth time on. A piece also waits until the piece before it has been taken.
 
     With ``whole`` spans are not cut, and leave as the walk finds them, a cycle earlier: `latency` is 2. In
-    the serial form it stays.
+    the serial form they leave attribute by attribute, and the first is offered `latency` cycles, 3, after its
+    scanline came for the first time.
 
     Parameters
     ----------
@@ -81,7 +95,7 @@ class SpanAttributesUnit(wiring.Component):
         Scanlines. The planes are read with the first scanline of a triangle: the first of all, or the one
         after a scanline with ``last``.
     o : :py:`Out(stream.Signature(pieces_shape()))`
-        Pieces; with ``whole`` spans, in `whole_spans_shape`.
+        Pieces; with ``whole`` spans, in `whole_spans_shape`, serial in `whole_span_shape`.
     status : :py:`Out(counters_shape("empty", "cut"))`
         Number of triangles without a span, and of spans of more than one piece, since the reset; with
         ``whole`` the first alone.
@@ -95,11 +109,12 @@ class SpanAttributesUnit(wiring.Component):
     """
 
     def __init__(self, serial: bool = False, whole: bool = False):
-        self.serial, self.whole, self.latency = serial, whole, 6 if serial else 3 - whole
+        self.serial, self.whole, self.latency = serial, whole, (3 if whole else 6) if serial else 3 - whole
+        shape = (whole_span_shape() if serial else whole_spans_shape()) if whole else pieces_shape()
         super().__init__(
             {
                 "i": In(stream.Signature(planes_rows_shape(serial))),
-                "o": Out(stream.Signature(whole_spans_shape() if whole else pieces_shape())),
+                "o": Out(stream.Signature(shape)),
                 "status": Out(counters_shape("empty") if whole else counters_shape("empty", "cut")),
             }
         )
@@ -112,7 +127,7 @@ class SpanAttributesUnit(wiring.Component):
         first, drawn = Signal(name="first", init=1), Signal(name="drawn")
         busy, accept, loads = (Signal(name=name) for name in ("busy", "accept", "loads"))
         mask, tag = Signal(PIXEL_BITS, name="whole_piece"), Signal(_tag_shape(), name="tag")
-        pace = _Pace(m, self.i, busy, self.serial)
+        pace = _Pace(m, self.i, busy, self.serial, not self.whole)
         m.d.comb += [accept.eq(pace.accepts), loads.eq(accept & row.covered)]
         with m.If(pace.goes & pace.loads):
             m.d.sync += [tag[name].eq(row[name]) for name in ("y", "right", "flip", "material")]
@@ -161,7 +176,7 @@ class SpanAttributesUnit(wiring.Component):
 
     def _give(self, m: Module, pace, along, valid: Signal, found) -> None:
         """What was found, to the output; and whether the walk may advance."""
-        if self.whole and not self.serial:
+        if self.whole:
             m.d.comb += [
                 self.o.valid.eq(valid),
                 pace.advance.eq(~valid | self.o.ready),
@@ -180,21 +195,15 @@ class SpanAttributesUnit(wiring.Component):
             m.d.comb += pace.advance.eq(skid_buffer(m, self.o, result_valid, result))
         with m.If(valid & ~result_valid if self.serial else pace.advance):
             m.d.sync += result_valid.eq(valid & found.ends)
-            if self.whole:
-                m.d.sync += self._whole(found, result)
-            else:
-                self._convert(m, valid, found, result)
+            self._convert(m, valid, found, result)
 
     @staticmethod
     def _whole(found, result) -> list:
-        """A whole span of what was found; of an attribute alone, the words are moved on by it."""
-        moved = []
-        for name, words in (("near", found.near), ("far", found.far), ("inward", found.step)):
-            targets = [Value.cast(word) for word in result[name]]
-            given = [*targets, *words][-len(targets) :]
-            moved += [target.eq(word) for target, word in zip(targets, given, strict=True)]
+        """A whole span of what was found, or an attribute of it."""
+        words = (("near", found.near), ("far", found.far), ("inward", found.step))
         places = [result[name].eq(found[name]) for name in ("x", "length")]
-        return moved + places + [result[name].eq(found.tag[name]) for name in _tag_shape().members]
+        tag = [result[name].eq(found.tag[name]) for name in _tag_shape().members]
+        return [*(Value.cast(result[name]).eq(Value.cast(word)) for name, word in words), *places, *tag]
 
     @staticmethod
     def _found_shape(count: int) -> data.StructLayout:
@@ -261,12 +270,13 @@ class _Pace:
     """Control of the attributes' turns: all attributes on one cycle, or *serial* one a cycle, four in all.
 
     In the serial form the first attribute decides whether a scanline comes in, for all four, and the control
-    of the walk moves on with the last one, `ends`.
+    of the walk moves on with the last one, `ends`. With ``ahead`` registers tell whether the walk advances.
     """
 
-    def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool):
+    def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool, ahead: bool):
         self.serial, self.given = serial, rows.valid
-        self.advance, self.leaves = Signal(name="advance", init=serial), Signal(name="would_leave")
+        ahead &= serial
+        self.advance, self.leaves = Signal(name="advance", init=ahead), Signal(name="would_leave")
         self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
         # ``accepts``: a scanline comes in, on a step of each attribute; ``goes``: the control moves on;
         # ``takes``: it takes a scanline; ``loads``: it takes one with pixels.
@@ -280,7 +290,7 @@ class _Pace:
             m.d.comb += self.goes.eq(self.accepts | (busy & self.advance))
             m.d.comb += self.loads.eq(self.takes & covered)
             return
-        first, taken, moves = self.lane == 0, Signal(name="taken"), Signal(name="moves", init=1)
+        first, taken, moves = self.lane == 0, Signal(name="taken"), Signal(name="moves", init=ahead)
         m.d.comb += [
             rows.ready.eq(Mux(first, opens, taken) & moves),
             self.accepts.eq(Mux(first, rows.valid & opens, taken)),
@@ -292,10 +302,14 @@ class _Pace:
         ]
         with m.If(rows.valid):
             m.d.sync += has_pixels.eq(covered)
-        stays, advances = Signal(name="stays_busy"), Signal(name="advances")
-        self.advances = advances
-        m.d.comb += stays.eq(Mux(self.goes, self.loads | (busy & ~self.leaves), busy))
-        m.d.sync += [self.advance.eq(advances), moves.eq(~stays | advances)]
+        if ahead:
+            # Whether the output lets the walk advance is known a cycle before.
+            stays, advances = Signal(name="stays_busy"), Signal(name="advances")
+            self.advances = advances
+            m.d.comb += stays.eq(Mux(self.goes, self.loads | (busy & ~self.leaves), busy))
+            m.d.sync += [self.advance.eq(advances), moves.eq(~stays | advances)]
+        else:
+            m.d.comb += moves.eq(~busy | self.advance)
         with m.If(self.steps):
             m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(self.accepts)]
 

@@ -12,7 +12,7 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.geometry.span_attributes import whole_spans_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
-__all__ = ["SpanHalverUnit", "halved_spans_shape"]
+__all__ = ["SpanHalverUnit", "halved_spans_shape", "is_apart"]
 
 _COMPONENTS = ATTRIBUTES - 1
 
@@ -236,12 +236,13 @@ class SpanHalverUnit(wiring.Component):
         large = [first[k][-1] | last[k][-1] for k in range(len(same))]
         steep = Cat(~keeps & size for keeps, size in zip(same, large, strict=True)).any()
         if self.parameters.rotates:
-            most = int(SpanHalver.STEEP * scale)
-            # Below 0 the first bits are one less than the size's, with the other sign.
-            apart = [
-                Mux(keeps, (left - right > most) | (right - left > most), left + right >= most)
-                for keeps, left, right in zip(same, first, last, strict=True)
-            ]
-            steep = Cat(apart).any()
+            steep = Cat(is_apart(*words) for words in zip(same, first, last, strict=True)).any()
         two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
         return one | ((long | ~Cat(large).any()) & ~(two & steep))
+
+
+def is_apart(keeps: Value, first: Value, last: Value) -> Value:
+    """Whether a component's ends are too far apart for a span of two pixels, from the first bits of both."""
+    most = int(SpanHalver.STEEP * (1 << SpanHalver.BITS))
+    # Below 0 the first bits are one less than the size's, with the other sign.
+    return Mux(keeps, (first - last > most) | (last - first > most), first + last >= most)

@@ -294,7 +294,7 @@ class TriangleSimulator:
         geometry, frame, steps = self._render.geometry, sent.frame, self.renderer.geometry.grid.steps
         drawn, _ = VertexSort(geometry.grid).compute(sent.triangles, frame)
         triangles = drawn.triangles
-        inside = _IN_UNITS if geometry.compact else _IN_UNITS + WAITING_TRIANGLES + WAITING_SPANS
+        inside = _IN_UNITS + WAITING_SPANS + (0 if geometry.compact else WAITING_TRIANGLES)
         sides = []
         for values, first, end in (
             (triangles.x, frame.left, frame.right),

@@ -35,7 +35,6 @@ FURTHER = {
     "quotient": ("interval 3",),
     "recurrence": ("direct", "reinsch, interleaved"),
     "specular": ("cosquad, interval 3",),
-    "vector_adapter": ("serial",),
 }
 UNITS = {
     f"{name}-{variant}" if variant else name: record.variants[variant].unit

@@ -16,7 +16,7 @@ from blysk.sim.units.operands import any_codes
 from blysk.sim.units.record import Case, Record, Stimulus, Variant, first
 from blysk.sim.units.triangles import Stages, random_triangles
 
-__all__ = ["RECORD"]
+__all__ = ["RECORD", "attributes_of"]
 
 
 def _firsts(last):
@@ -56,6 +56,20 @@ def _beats_of(unit, planes, row):
             for name, value in planes.items()
         }
     return {"planes": planes, "row": row}
+
+
+def _expect(unit, case):
+    beats = _pieces(_rows_of(unit, case.beats), unit.whole)[0].beats
+    return attributes_of(beats) if unit.serial and unit.whole else beats
+
+
+def attributes_of(spans):
+    """Beats of whole spans, one for each attribute."""
+    words = ("near", "far", "inward")
+    return {
+        name: value.reshape(-1) if name in words else np.repeat(value, ATTRIBUTES)
+        for name, value in spans.items()
+    }
 
 
 def _status(unit, case):
@@ -136,7 +150,7 @@ RECORD = Record(
         ),
         "whole": Variant(partial(SpanAttributesUnit, whole=True), note="exact sums of the steps", long=True),
     },
-    expect=lambda unit, case: _pieces(_rows_of(unit, case.beats), unit.whole)[0].beats,
+    expect=_expect,
     status=_status,
     stimuli={
         "rows": Stimulus(_rows, 1500),

@@ -8,7 +8,7 @@ from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_N
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.number.fixed import Fixed
-from blysk.hdl.geometry.vector_adapter import SerialVectorAdapterUnit, VectorAdapterUnit
+from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit
 from blysk.sim.units.operands import any_codes, sphere
 from blysk.sim.units.record import Case, Record, Stimulus, Variant
 
@@ -85,12 +85,6 @@ RECORD = Record(
     source="docs/theory/geometry.md#composition",
     variants={
         "": Variant(VectorAdapterUnit, note="1/2 step of each word; shifts are exact"),
-        "serial": Variant(SerialVectorAdapterUnit, note="1/2 step of each word", long=True),
-        "serial, several lights": Variant(
-            partial(SerialVectorAdapterUnit, VectorAdapter(rotates=True)),
-            note="1/2 step of each word",
-            long=True,
-        ),
         "several lights": Variant(
             partial(VectorAdapterUnit, VectorAdapter(rotates=True)), note="1/2 step of each word", long=True
         ),

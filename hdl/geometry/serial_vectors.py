@@ -1,0 +1,317 @@
+"""Serial vectors: spans of one attribute after the other to pieces with the words of the quotient method."""
+
+from itertools import pairwise
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.span_attributes import SPAN_NORMAL, SPAN_STEP
+from blysk.golden.geometry.span_halver import SpanHalver
+from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
+from blysk.golden.geometry.vector_adapter import VectorAdapter
+from blysk.hdl.core.bits import select
+from blysk.hdl.geometry.span_attributes import whole_span_shape
+from blysk.hdl.geometry.span_halver import is_apart
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+from blysk.hdl.geometry.vector_adapter import exponent_of, rounded, used_bits, vector_spans_shape
+
+__all__ = ["SerialVectorsUnit"]
+
+_WIDTH = SPAN_STEP.width
+
+
+class SerialVectorsUnit(wiring.Component):
+    """What `SpanHalverUnit` and `VectorAdapterUnit` do, on one attribute a cycle: their models are its own.
+
+    The four attributes of a span are in rings that turn by one attribute a cycle. A span comes in four turns,
+    which also find its shift, and by the shift of the piece before whether it fits. If its own is another,
+    four turns repeat that. Four turns find the exponent of the step; four more give the start, and the last
+    four the step, while the next span comes in, or what is left of this one. Each component of a vector goes
+    through one shifter, a subtraction, another shifter and a rounding.
+
+    A piece takes 13 cycles, six more each time that it does not fit, and five each time that the shift is
+    another than before. The words of the next begin when it was taken; all before that goes on. A span that
+    fits is offered `latency` cycles at most after its last attribute was taken. No multipliers.
+
+    Parameters
+    ----------
+    rotates : bool
+        That of both models.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(whole_span_shape()))`
+        Attributes of spans, four beats of each: those of `SpanAttributesUnit`, serial and ``whole``.
+    o : :py:`Out(stream.Signature(vector_spans_shape()))`
+        Pieces, as those of `VectorAdapterUnit`.
+    status : :py:`Out(counters_shape("cut"))`
+        Number of spans that were cut, since the reset.
+
+    Attributes
+    ----------
+    idle : Signal
+        Neither a span nor a piece is inside.
+
+    Source: docs/theory/geometry.md#composition; not in the documents.
+    """
+
+    latency = 22
+
+    def __init__(self, rotates: bool = False):
+        self.rotates = rotates
+        super().__init__(
+            {
+                "i": In(stream.Signature(whole_span_shape())),
+                "o": Out(stream.Signature(vector_spans_shape())),
+                "status": Out(counters_shape("cut")),
+            }
+        )
+        self.idle = Signal(name="idle")
+
+    def elaborate(self, platform):
+        """The rings and their turns; what decides; the pieces of a span; the words."""
+        m = Module()
+        # What the turns do; `settles` and a span that does not fit take a cycle without a turn.
+        names = "loads", "settles", "repeats", "tests", "starts", "steps", "renews"
+        loads, settles, repeats, tests, starts, steps, renews = (
+            Signal(name=name, init=name == "loads") for name in names
+        )
+        place, overlaps = Signal(2, name="place"), Signal(name="overlaps")
+        turns, ends, whole = (Signal(name=name) for name in ("turns", "ends", "whole"))
+        fits, agrees = Signal(name="fits"), Signal(name="agrees")
+        begins, decides, retries = ~place.any(), Signal(name="decides"), Signal(name="retries")
+        # A piece is owed to the output: the words of the next have to wait.
+        leaving = Signal(name="leaving")
+        comes = loads | (steps & Mux(begins, whole & self.i.valid, overlaps))
+        m.d.comb += [
+            decides.eq(tests & begins),
+            retries.eq(decides & ~fits),
+            turns.eq(~settles & ~retries & ~(starts & begins & leaving) & (~comes | self.i.valid)),
+            ends.eq(turns & place.all()),
+            self.i.ready.eq(loads | (steps & Mux(begins, whole, overlaps))),
+        ]
+        with m.If(turns):
+            m.d.sync += [place.eq(place + 1), overlaps.eq(comes)]
+        # What is left of a span behind a piece comes about while the step goes.
+        rest_goes = steps & ~whole
+        with m.If(ends | settles | retries):
+            m.d.sync += [
+                loads.eq(steps & whole & ~comes),
+                settles.eq(ends & (comes | renews | repeats | rest_goes)),
+                repeats.eq(settles & ~agrees),
+                tests.eq(settles & agrees),
+                starts.eq(tests & ~retries),
+                steps.eq(starts),
+                renews.eq(retries),
+            ]
+
+        # Of a piece, or of what is left of a span: how its ends follow from those before.
+        odd, renewed = Signal(name="odd"), renews | rest_goes
+        heads = self._rings(m, turns, comes, renewed, odd, steps)
+        tag, pixels, uncut, words = self._pixels(m, comes & ends, retries, steps & ends, (whole, odd))
+        kinds = turns & (comes | renewed | repeats), settles
+        shift = self._test(m, heads, kinds, place, pixels, (fits, agrees))
+        kinds = tests, starts & turns, steps, turns
+        self._words(m, heads, kinds, place, shift, tag, words)
+        count_events(m, self.status, cut=retries & uncut)
+        with m.If(turns & steps & (place == 2)):
+            m.d.sync += leaving.eq(1)
+        with m.Elif(self.o.valid & self.o.ready):
+            m.d.sync += leaving.eq(0)
+        m.d.comb += self.idle.eq(loads & begins & ~leaving)
+        return m
+
+    def _rings(self, m: Module, turns, comes, renews, odd, leaves) -> dict[str, Signal]:
+        """Attributes at both ends, the far end of the whole span, and the step; the first word of each."""
+        given = self.i.payload
+        rings = {
+            name: [Signal(_WIDTH, name=f"{name}_{k}", reset_less=True) for k in range(ATTRIBUTES)]
+            for name in ("near", "far", "last", "step")
+        }
+        near, far, last, step = (ring[0] for ring in rings.values())
+        # Behind a piece the next pixel; else one pixel less, or the mean of both ends.
+        other = Mux(leaves, step, Mux(odd, near, ~step))
+        total = Signal(_WIDTH + 1, name="total")
+        m.d.comb += total.eq(far.as_signed() + other.as_signed() + (~leaves & ~odd))
+        new_far = Mux(leaves, last, Mux(odd, total[1:], total[:_WIDTH]))
+        following = {
+            "near": (given.near, Mux(renews & leaves, total[:_WIDTH], near)),
+            "far": (given.far, Mux(renews, new_far, far)),
+            "last": (given.far, last),
+            "step": (given.inward, step),
+        }
+        with m.If(turns):
+            for name, (new, old) in following.items():
+                ring = rings[name]
+                m.d.sync += [word.eq(behind) for word, behind in pairwise(ring)]
+                m.d.sync += ring[-1].eq(Mux(comes, Value.cast(new), old))
+        return {name: ring[0] for name, ring in rings.items()} | {
+            "new_near": rings["near"][-1],
+            "new_far": rings["far"][-1],
+        }
+
+    def _pixels(self, m: Module, comes, retries, leaves, flags):
+        """Which pixels the piece has: its flags, their number, whether the span is uncut, words that pass."""
+        (whole, odd), given = flags, self.i.payload
+        tag = {
+            name: Signal.like(Value.cast(given[name]), name=name, reset_less=True)
+            for name in ("y", "right", "flip", "material")
+        }
+        x, left, pixels = (Signal(PIXEL_BITS, name=name, reset_less=True) for name in ("x", "left", "pixels"))
+        uncut, rest = Signal(name="uncut"), (left - pixels)[:PIXEL_BITS]
+        is_odd = pixels[0]
+        with m.If(comes):
+            m.d.sync += [
+                *(signal.eq(Value.cast(given[name])) for name, signal in tag.items()),
+                *(signal.eq(given.length) for signal in (left, pixels)),
+                *(x.eq(given.x), whole.eq(1), uncut.eq(1)),
+            ]
+        with m.Elif(retries):
+            shorter = Mux(is_odd, pixels >> 1, pixels) + Mux(is_odd, 1, (1 << PIXEL_BITS) - 1)
+            m.d.sync += [pixels.eq(shorter[:PIXEL_BITS]), odd.eq(is_odd)]
+            m.d.sync += [whole.eq(0), uncut.eq(0)]
+        with m.Elif(leaves):
+            m.d.sync += [left.eq(rest), pixels.eq(rest), whole.eq(1)]
+            m.d.sync += x.eq(Mux(tag["right"], x, x + pixels))
+        words = {"x": Mux(tag["right"], x + rest, x), "y": tag["y"]}
+        return tag, pixels, uncut, words | {"length": pixels, "material": tag["material"]}
+
+    def _test(self, m: Module, heads, kinds, place, pixels, results) -> Signal:
+        """Whether the piece fits, from the third cycle behind its last component on; returns its shift.
+
+        It was looked at with the shift of the piece before. If its own does not agree it comes again.
+        """
+        (comes, settles), is_component, (fits, agrees) = kinds, ~place.all(), results
+        bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
+        top = SPAN_STEP.fraction_bits
+
+        def size_of(word):
+            sign, beyond = word[-1], word[-1] ^ word[-2]
+            chosen = word[top - places - bits : top]
+            return (chosen ^ sign.replicate(len(chosen))) | beyond.replicate(len(chosen))
+
+        # Of a word that came on the cycle before.
+        came, first = Signal(name="came"), Signal(name="came_first")
+        used, shift = Signal(places, name="used"), Signal(range(places + 1), name="shift")
+        rest, chosen = used, []
+        for step in (4, 2, 1):
+            empty = ~rest[-step:].any()
+            rest = Mux(empty, rest << step, rest)[:places]
+            chosen.insert(0, empty)
+        m.d.sync += [came.eq(comes & is_component), first.eq(~place.any())]
+        sizes = {}
+        for end in ("near", "far"):
+            word = size_of(heads[f"new_{end}"])
+            sizes[end] = Signal(len(word), name=f"whole_size_{end}")
+            m.d.comb += sizes[end].eq(word)
+        with m.If(came):
+            m.d.sync += used.eq(Mux(first, 0, used) | sizes["near"][bits:] | sizes["far"][bits:])
+        # It stands until the next piece has come.
+        m.d.comb += agrees.eq(shift == Cat(chosen))
+        with m.If(settles):
+            m.d.sync += shift.eq(Cat(chosen))
+
+        # Of a component the first bits at both ends, and whether its sign is the same.
+        shape = data.StructLayout({"near": bits, "far": bits, "keeps": 1})
+        size, before, zeroth = (Signal(shape, name=name) for name in ("size", "size_before", "size_0"))
+        tested, begins = Signal(name="tested"), Signal(name="tested_first")
+        long, large, steep = (Signal(name=name) for name in ("long", "large", "steep"))
+        axis, pair = (int(bound * (1 << bits)) for bound in (SpanHalver.AXIS, SpanHalver.PAIR))
+
+        def both(other):
+            sums = [size[end] + other[end] >= pair for end in ("near", "far")]
+            return size.keeps & other.keeps & sums[0] & sums[1]
+
+        is_long = size.keeps & (size.near >= axis) & (size.far >= axis)
+        is_large = size.near[-1] | size.far[-1]
+        is_steep = is_large & ~size.keeps
+        if self.rotates:
+            is_steep = is_apart(size.keeps, size.near, size.far)
+        m.d.sync += [tested.eq(came), begins.eq(first)]
+        for end, word in sizes.items():
+            windows = [word[places - n :][:bits] for n in range(places + 1)]
+            m.d.sync += size[end].eq(select(windows, shift))
+        m.d.sync += size.keeps.eq(heads["new_near"][-1] == heads["new_far"][-1])
+        with m.If(tested):
+            m.d.sync += [
+                before.eq(size),
+                long.eq(is_long | (~begins & (long | both(before) | both(zeroth)))),
+                large.eq(is_large | (~begins & large)),
+                steep.eq(is_steep | (~begins & steep)),
+            ]
+            with m.If(begins):
+                m.d.sync += zeroth.eq(size)
+        two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
+        m.d.comb += fits.eq(one | ((long | ~large) & ~(two & steep)))
+        return shift
+
+    def _words(self, m: Module, heads, kinds, place, shift, tag, words) -> None:
+        """Each component through the shifts and the rounding; depths, and what passes."""
+        p, is_component = VectorAdapter(self.rotates), ~place.all()
+        (tests, starts, steps, turns), right = kinds, tag["right"]
+        bits, low = p.STEP_BITS + 1, SPAN_STEP.fraction_bits - SPAN_NORMAL.fraction_bits
+        note = data.StructLayout({"finds": 1, "is_start": 1, "gives": 1, "first": 1, "last": 1})
+        notes = [Signal(note, name=f"note_{stage}") for stage in range(5)]
+        now = notes[0]
+        m.d.comb += [
+            now.finds.eq(tests & is_component),
+            now.is_start.eq(starts & is_component),
+            now.gives.eq((starts | (steps & turns)) & is_component),
+            now.first.eq(~place.any()),
+            now.last.eq(steps & turns & (place == 2)),
+        ]
+
+        def register(value, name):
+            signal = Signal(Value.cast(value).shape(), name=name, reset_less=True)
+            m.d.sync += signal.eq(value)
+            return signal
+
+        m.d.sync += [after.eq(before) for before, after in pairwise(notes)]
+
+        # All with the step's fraction bits: the first pixel's value under 1, and the step modulo 2.
+        value, step = Mux(right, heads["far"], heads["near"]), heads["step"]
+        beyond, sign = value[-1] ^ value[-2], value[-1]
+        value = Cat(Mux(beyond, (~sign).replicate(bits - 1), value[: bits - 1]), sign)
+        code = Mux(starts, Cat(Const(0, low), value[low:]), step[:bits])[:bits]
+        if p.rotates:
+            shift = (shift - shift.any())[: len(shift)]
+        code, late_shift = register(code, "chosen"), register(shift, "late_shift")
+        for k in reversed(range(len(shift))):
+            code = Mux(late_shift[k], code << (1 << k), code)[:bits]
+        code = register(code.as_signed(), "shifted")
+        part = code >> p.margin_shift
+        part = Cat(Mux(notes[2].is_start, 0, part[:low]), part[low:]).as_signed()
+        small = register((code - part)[:bits].as_signed(), "small")
+
+        # The exponent stands until that of the next piece, and so do the flags.
+        used, exponent = Signal(p.LARGEST_EXPONENT, name="step_used"), Signal(4, name="exponent")
+        with m.If(notes[2].finds):
+            found = used_bits(p, [code])
+            m.d.sync += used.eq(Mux(notes[2].first, 0, used) | found)
+        with m.If(notes[2].is_start):
+            m.d.sync += exponent.eq(exponent_of(used))
+        code = small
+        for k in reversed(range(len(exponent))):
+            code = Mux(exponent[k] & ~notes[3].is_start, code << (1 << k), code)[:bits]
+        code = register(code.as_signed(), "large")
+        flip, step_flip = Signal(name="start_flip"), Signal(name="step_flip")
+        word = rounded(code, Mux(notes[4].is_start, flip, step_flip), p.STEP_BITS)
+
+        result = Signal(self.o.payload.shape(), name="result", reset_less=True)
+        ring = [Value.cast(result[name][k]) for name in ("start", "step") for k in range(3)]
+        with m.If(notes[4].gives):
+            m.d.sync += [target.eq(source) for target, source in pairwise([*ring, word])]
+        with m.If(now.is_start & now.first):
+            m.d.sync += [flip.eq(tag["flip"]), step_flip.eq(tag["flip"] ^ right)]
+            m.d.sync += [result[name].eq(word) for name, word in words.items()]
+        with m.If(starts & ~is_component):
+            m.d.sync += Value.cast(result.depth).eq(Cat(value[:-1], ~value[-1]))
+        with m.If(steps & ~is_component):
+            m.d.sync += Value.cast(result.depth_step).eq(Mux(right, -step, step)[: len(step)])
+        there = Signal(name="there")
+        with m.If(notes[4].last):
+            m.d.sync += there.eq(1)
+        with m.Elif(self.o.ready):
+            m.d.sync += there.eq(0)
+        m.d.comb += [self.o.valid.eq(there), self.o.payload.eq(result), self.o.payload.exponent.eq(exponent)]
