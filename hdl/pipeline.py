@@ -309,10 +309,13 @@ class ShadingPipelineUnit(wiring.Component):
         written = self._written
         idle, write_waits = Signal(name="idle", init=1), self.write.valid
         hold = ~idle
+        has_pixels = self.i.payload.length != 0
         if (begun := getattr(self._interpolator, "begun", None)) is not None:
             hold, write_waits = hold | begun, write_waits & ~begun
+            # The payload stays: no path leads from the length then.
+            has_pixels |= begun
         m.d.comb += [
-            nonempty.eq(self.i.valid & (self.i.payload.length != 0)),
+            nonempty.eq(self.i.valid & has_pixels),
             unlocked.eq(~write_waits & ~written & settled),
             self.i.ready.eq(reduce(and_, (ready for _, ready in sinks), unlocked)),
             admit.eq(nonempty & self.i.ready),

@@ -224,13 +224,18 @@ class QuotientSpansUnit(wiring.Component):
         # The turns are starts, second differences, first ones. Registers tell the first and the second turn:
         # they drive the multiplexers of all operands.
         begun, is_second, ends = (Signal(name=name) for name in ("has_begun", "is_second", "ends"))
+        valid, is_long = self.i.valid, span.length[1:].any()
         m.d.comb += [
-            ends.eq(Mux(begun, ~is_second, ~span.length[1:].any())),
+            ends.eq(Mux(begun, ~is_second, ~is_long)),
             self.i.ready.eq(moves & ends),
             self.begun.eq(begun),
         ]
-        with m.If(self.i.valid & moves):
-            m.d.sync += [begun.eq(~ends), is_second.eq(~begun & ~ends)]
+        # Their enable is from registers alone: valid and the length are late.
+        with m.If(moves):
+            m.d.sync += [
+                begun.eq(Mux(begun, is_second | ~valid, valid & is_long)),
+                is_second.eq(Mux(begun, is_second & ~valid, valid & is_long)),
+            ]
 
         def register(value, name):
             result = Signal(Value.cast(value).shape(), name=name, reset_less=True)

@@ -255,7 +255,7 @@ WRITE_BUGS = {
     "a write waits for ever": ("finished & is_one", "finished & ~is_one"),
     "a span is taken in beside a write": ("unlocked.eq(~write_waits & ", "unlocked.eq("),
     "the count forgets a span that came": ("Mux(went, 2, 0)", "Mux(went, 2, 1)"),
-    "empty spans are counted": ("self.i.valid & (self.i.payload.length != 0)", "self.i.valid"),
+    "empty spans are counted": ("has_pixels = self.i.payload.length != 0", "has_pixels = self.i.valid"),
 }
 
 
