@@ -275,6 +275,9 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
     spans = replace(spans, material=np.arange(60) // 10 % materials)
     first, second = (any_constants(rng, design, spans) for _ in range(2))
     cycles = 960 if materials == 1 else 1700
+    if design.loads_tables:
+        tables = len(writes_of(first)["address"])
+        late_cycle, cycles = late_cycle + tables, cycles + 2 * tables
     driver = Driver(design)
     result = []
 
@@ -293,8 +296,10 @@ def test_constants_never_change_under_a_span(late_cycle, materials, method):
     last_clock = pixels[len(expected) - 1][0]
     expected += pixels_of(design, spans[before:], second)
     assert [pixel for _, pixel in pixels] == expected
-    # No span comes between the offer of the writes and the last of them, and no write before the last pixel.
-    assert not any(late_cycle <= clock <= late_writes[-1] for clock in span_cycles)
+    # No span begins between the offer of the writes and the last of them, and no write before the last pixel.
+    # A span with vectors stays at the port for some cycles: one may have begun.
+    taken = [clock for clock in span_cycles if late_cycle <= clock <= late_writes[-1]]
+    assert len(taken) <= design.takes_vectors
     assert late_writes[0] == last_clock + 1
     assert np.all(np.diff(late_writes) == 1)
 
@@ -321,6 +326,9 @@ def test_reset_in_mid_span_leaves_nothing_behind(reset_at, materials, method):
     other = replace(other, material=rng.permutation(np.arange(40) // 4 % materials))
     constants = any_constants(rng, design, spans)
     cycles = 330 if materials == 1 else 600
+    if design.loads_tables:
+        tables = len(writes_of(constants)["address"])
+        reset_at, cycles = reset_at + tables, cycles + tables
     stalls = (rng.random(31) < 0.2).tolist()
     driver, runs, status = Driver(design), [], []
 

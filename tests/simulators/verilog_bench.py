@@ -321,6 +321,10 @@ def assert_beats(found: np.ndarray, expected: np.ndarray | Mapping, path: str = 
         np.testing.assert_array_equal(found, expected, err_msg=path)
 
 
+_WIRES = {"clk", "rst"} | {f"{name}_{wire}" for name in ("i", "o", "write") for wire in ("valid", "ready")}
+"""Ports that the bench drives or reads by their names; other ports may end like these."""
+
+
 def _bench(text: str) -> str:
     """The bench of a module ``core``: its ports are parts of a word for each member, in their order."""
     start = text.index("module core (")
@@ -332,7 +336,7 @@ def _bench(text: str) -> str:
     members = dict.fromkeys(("i", "o", "write", "constants", "status"), 0)
     for port in listed:
         member = port.split("_")[0]
-        if port in ("clk", "rst") or port.endswith(("_valid", "_ready")):
+        if port in _WIRES:
             connections.append(f".{port}({port})")
         elif member in members:
             connections.append(f".{port}({member}_word[{members[member]} +: {widths[port]}])")
