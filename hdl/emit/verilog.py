@@ -23,7 +23,6 @@ __all__ = ["check_name", "emit"]
 LINT_EXCEPTIONS = {
     "CASEOVERLAP": "the select lines of a case are one-hot by construction",
     "DECLFILENAME": "one file holds the whole hierarchy",
-    "UNOPTFLAT": "a vector made of its own bits is no loop; Amaranth has shown that there is none",
     "UNUSED": "carries and the bits that a result leaves out",
     "WIDTH": "operands are extended, and shifts cut, by the rules of the language",
 }

@@ -138,7 +138,6 @@ def test_verilator_exceptions_are_the_ones_needed(texts, tmp_path):
     assert kinds == {
         "CASEOVERLAP",
         "DECLFILENAME",
-        "UNOPTFLAT",
         "UNUSEDSIGNAL",
         "WIDTHEXPAND",
         "WIDTHTRUNC",
