@@ -190,7 +190,14 @@ def connect_late_fifo(
     -------
     Value
         Whether no payload is inside.
+
+    Raises
+    ------
+    ValueError
+        If the depth is `UNCOUNTED` or less: it would never have room.
     """
+    if depth <= UNCOUNTED:
+        raise ValueError(f"depth must be over {UNCOUNTED}, not {depth}")
     require_same_shape(source.payload.shape(), sink.payload.shape())
     width = Shape.cast(source.payload.shape()).width
     payload = Signal(width, name=f"{name}_payload", reset_less=True)

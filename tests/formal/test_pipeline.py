@@ -8,6 +8,7 @@ import blysk.hdl.pipeline
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.presets import preset
+from blysk.hdl.core.memory import UNCOUNTED
 from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.frame_constants import FrameConstantsUnit
 from blysk.hdl.lighting.diffuse import DiffuseUnit
@@ -90,7 +91,7 @@ def stubs(monkeypatch):
         for module, unit, *options in units:
             monkeypatch.setattr(module, unit.__name__, short(unit, *options))
         monkeypatch.setitem(InterpolatorUnit.UNITS, LinearInterpolator, Line)
-        monkeypatch.setattr(ShadingPipelineUnit, "_waiting_spans", 3)
+        monkeypatch.setattr(ShadingPipelineUnit, "_waiting_spans", UNCOUNTED + 1)
         return ShadingPipelineUnit(parameters.built(style=style))
 
     return pipeline
