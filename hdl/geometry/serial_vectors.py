@@ -12,9 +12,9 @@ from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.bits import select
 from blysk.hdl.geometry.span_attributes import whole_span_shape
-from blysk.hdl.geometry.span_halver import is_apart
+from blysk.hdl.geometry.span_halver import is_apart, is_kept, shorter, size_of
 from blysk.hdl.geometry.triangles import count_events, counters_shape
-from blysk.hdl.geometry.vector_adapter import exponent_of, rounded, used_bits, vector_spans_shape
+from blysk.hdl.geometry.vector_adapter import exponent_of, rounded, shift_of, used_bits, vector_spans_shape
 
 __all__ = ["SerialVectorsUnit"]
 
@@ -160,7 +160,6 @@ class SerialVectorsUnit(wiring.Component):
         }
         x, left, pixels = (Signal(PIXEL_BITS, name=name, reset_less=True) for name in ("x", "left", "pixels"))
         uncut, rest = Signal(name="uncut"), (left - pixels)[:PIXEL_BITS]
-        is_odd = pixels[0]
         with m.If(comes):
             m.d.sync += [
                 *(signal.eq(Value.cast(given[name])) for name, signal in tag.items()),
@@ -168,8 +167,7 @@ class SerialVectorsUnit(wiring.Component):
                 *(x.eq(given.x), whole.eq(1), uncut.eq(1)),
             ]
         with m.Elif(retries):
-            shorter = Mux(is_odd, pixels >> 1, pixels) + Mux(is_odd, 1, (1 << PIXEL_BITS) - 1)
-            m.d.sync += [pixels.eq(shorter[:PIXEL_BITS]), odd.eq(is_odd)]
+            m.d.sync += [pixels.eq(shorter(pixels)), odd.eq(pixels[0])]
             m.d.sync += [whole.eq(0), uncut.eq(0)]
         with m.Elif(leaves):
             m.d.sync += [left.eq(rest), pixels.eq(rest), whole.eq(1)]
@@ -184,12 +182,6 @@ class SerialVectorsUnit(wiring.Component):
         """
         (comes, settles), is_component, (fits, agrees) = kinds, ~place.all(), results
         bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
-        top = SPAN_STEP.fraction_bits
-
-        def size_of(word):
-            sign, beyond = word[-1], word[-1] ^ word[-2]
-            chosen = word[top - places - bits : top]
-            return (chosen ^ sign.replicate(len(chosen))) | beyond.replicate(len(chosen))
 
         # Of a word that came on the cycle before.
         came, first = Signal(name="came"), Signal(name="came_first")
@@ -242,8 +234,7 @@ class SerialVectorsUnit(wiring.Component):
             ]
             with m.If(begins):
                 m.d.sync += zeroth.eq(size)
-        two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
-        m.d.comb += fits.eq(one | ((long | ~large) & ~(two & steep)))
+        m.d.comb += fits.eq(is_kept(pixels, long, large, steep))
         return shift
 
     def _words(self, m: Module, heads, kinds, place, shift, tag, words) -> None:
@@ -274,8 +265,7 @@ class SerialVectorsUnit(wiring.Component):
         beyond, sign = value[-1] ^ value[-2], value[-1]
         value = Cat(Mux(beyond, (~sign).replicate(bits - 1), value[: bits - 1]), sign)
         code = Mux(starts, Cat(Const(0, low), value[low:]), step[:bits])[:bits]
-        if p.rotates:
-            shift = (shift - shift.any())[: len(shift)]
+        shift = shift_of(p, shift)
         code, late_shift = register(code, "chosen"), register(shift, "late_shift")
         for k in reversed(range(len(shift))):
             code = Mux(late_shift[k], code << (1 << k), code)[:bits]

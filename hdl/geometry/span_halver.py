@@ -12,7 +12,7 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.geometry.span_attributes import whole_spans_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
-__all__ = ["SpanHalverUnit", "halved_spans_shape", "is_apart"]
+__all__ = ["SpanHalverUnit", "halved_spans_shape", "is_apart", "is_kept", "shorter", "size_of"]
 
 _COMPONENTS = ATTRIBUTES - 1
 
@@ -118,8 +118,7 @@ class SpanHalverUnit(wiring.Component):
                 x.eq(Mux(tag["right"], x, x + pixels)),
             ]
         with m.Elif(retries):
-            shorter = Mux(odd, pixels >> 1, pixels) + Mux(odd, 1, (1 << PIXEL_BITS) - 1)
-            m.d.sync += [known.eq(0), whole.eq(0), uncut.eq(0), pixels.eq(shorter[:PIXEL_BITS])]
+            m.d.sync += [known.eq(0), whole.eq(0), uncut.eq(0), pixels.eq(shorter(pixels))]
         with m.Else():
             m.d.sync += known.eq(1)
 
@@ -174,7 +173,6 @@ class SpanHalverUnit(wiring.Component):
     def _marks(m: Module, again, takes, ends, given) -> dict:
         """Registers: the shift, the first bits of the sizes, whether signs are the same."""
         bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
-        top = SPAN_STEP.fraction_bits
 
         # Each stage is a signal: an expression that is used twice would be made twice.
         def wire(value, name):
@@ -186,11 +184,8 @@ class SpanHalverUnit(wiring.Component):
         for k in range(_COMPONENTS):
             for end, (mine, other) in enumerate(zip(ends[k][:2], (given.near[k], given.far[k]), strict=True)):
                 code = wire(Mux(again, mine, Value.cast(other).as_unsigned()), f"end_{end}_{k}")
-                sign, beyond = code[-1], code[-1] ^ code[-2]
-                chosen = code[top - places - bits : top]
-                size = (chosen ^ sign.replicate(len(chosen))) | beyond.replicate(len(chosen))
-                sizes.append(wire(size, f"whole_size_{end}_{k}"))
-                signs.append(sign)
+                sizes.append(wire(size_of(code), f"whole_size_{end}_{k}"))
+                signs.append(code[-1])
         used = sizes[0][bits:]
         for size in sizes[1:]:
             used = used | size[bits:]
@@ -237,8 +232,42 @@ class SpanHalverUnit(wiring.Component):
         steep = Cat(~keeps & size for keeps, size in zip(same, large, strict=True)).any()
         if self.parameters.rotates:
             steep = Cat(is_apart(*words) for words in zip(same, first, last, strict=True)).any()
-        two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
-        return one | ((long | ~Cat(large).any()) & ~(two & steep))
+        return is_kept(pixels, long, Cat(large).any(), steep)
+
+
+def size_of(code: Value) -> Value:
+    """First bits of the size of a component's code ``SPAN_STEP``: `SpanHalver.BITS`, and those of its shift.
+
+    Below 0 it is the complement; beyond the range all bits are 1.
+    """
+    top = SPAN_STEP.fraction_bits
+    sign, beyond = code[-1], code[-1] ^ code[-2]
+    chosen = code[top - SpanHalver.LARGEST_SHIFT - SpanHalver.BITS : top]
+    return (chosen ^ sign.replicate(len(chosen))) | beyond.replicate(len(chosen))
+
+
+def shorter(pixels: Value) -> Value:
+    """Pixels of the piece to try next: one less than an even number, the larger half of an odd number."""
+    odd = pixels[0]
+    return (Mux(odd, pixels >> 1, pixels) + Mux(odd, 1, (1 << PIXEL_BITS) - 1))[:PIXEL_BITS]
+
+
+def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
+    """Whether a piece needs no cut.
+
+    Parameters
+    ----------
+    pixels : Value
+        Number of its pixels.
+    long : Value
+        Whether a component, or a sum of two, stays long along it.
+    large : Value
+        Whether a component has its first bit at an end; without it the largest shift is too small.
+    steep : Value
+        Whether a component's ends are too far apart for a piece of two pixels.
+    """
+    two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
+    return one | ((long | ~large) & ~(two & steep))
 
 
 def is_apart(keeps: Value, first: Value, last: Value) -> Value:

@@ -9,7 +9,7 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.geometry.span_halver import halved_spans_shape
 
-__all__ = ["VectorAdapterUnit", "exponent_of", "rounded", "used_bits", "vector_spans_shape"]
+__all__ = ["VectorAdapterUnit", "exponent_of", "rounded", "shift_of", "used_bits", "vector_spans_shape"]
 
 
 def vector_spans_shape(components: int = 3) -> data.StructLayout:
@@ -62,9 +62,7 @@ class VectorAdapterUnit(PipelinedUnit):
 
         # Modulo 2, see the model.
         step = [code[: p.STEP_BITS + 1] for code in step]
-        shift = operands.shift
-        if p.rotates:
-            shift = (shift - shift.any())[: len(shift)]
+        shift = shift_of(p, operands.shift)
         for k in reversed(range(len(shift))):
             chosen, places = shift[k], 1 << k
             start = [Mux(chosen, code << places, code)[: bits + 1].as_signed() for code in start]
@@ -116,6 +114,11 @@ def exponent_of(used: Value) -> Value:
 def _smaller(parameters: VectorAdapter, code: Value) -> Value:
     """A code with a margin to 1."""
     return (code - (code >> parameters.margin_shift))[: len(code)].as_signed()
+
+
+def shift_of(parameters: VectorAdapter, shift: Value) -> Value:
+    """Places by which a vector is shifted: one less if it is to turn, so that its length stays under 1."""
+    return (shift - shift.any())[: len(shift)] if parameters.rotates else shift
 
 
 def used_bits(parameters: VectorAdapter, codes: list[Value]) -> Value:
