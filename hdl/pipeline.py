@@ -29,10 +29,10 @@ __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 
 
 def span_shape(parameters: Design) -> data.StructLayout:
-    """Shape of a raster span: first pixel, pixels, and the normals that the method takes.
+    """Shape of a raster span: first pixel, pixels, and what the method takes.
 
-    Unit normals at the first and last pixel centre; the ends of the true line; or values of each light.
-    Without lights there are none. ``material`` is there with several materials.
+    Unit normals at the first and last pixel centre; the ends of the true line; values of each light; or
+    vectors N/W with their steps. Without lights there are none. ``material`` is there with several materials.
 
     Parameters
     ----------

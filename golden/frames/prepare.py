@@ -83,7 +83,7 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
 
 
 def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
-    """The input beats of a pipeline for spans that are cut for it: normals, true lines or values.
+    """The input beats of a pipeline for spans that are cut for it, with what the method takes.
 
     Parameters
     ----------
