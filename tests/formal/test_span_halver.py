@@ -69,7 +69,7 @@ def test_a_piece_that_waits_stays(prove, refute, inject):
 
 @pytest.mark.parametrize(
     ("text", "bug"),
-    [("valid.eq(~whole)", "valid.eq(0)"), ("Mux(odd, pixels >> 1, pixels)", "pixels")],
+    [("valid.eq(~whole)", "valid.eq(0)"), ("pixels.eq(shorter(pixels))", "pixels.eq(pixels)")],
 )
 def test_bugs_are_found(refute, inject, text, bug):
     """What is left of a span is forgotten; a piece is longer than the span."""
