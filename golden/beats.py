@@ -1,6 +1,6 @@
 """Input and output of the shading pipeline: raster spans, and pixels."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -25,7 +25,7 @@ class Spans:
         Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or the vectors that the
         method takes, codes of its `Interpolator.END_FORMAT`.
     material : int array, shape (spans,), optional
-        Index of the material; ``None``: 0 for all.
+        Index of the material; empty: 0 for all.
     values : SpanValues, optional
         Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
     factors : int64 array, shape (spans, factors, 3), optional
@@ -40,13 +40,13 @@ class Spans:
     length: np.ndarray
     normal_left: np.ndarray
     normal_right: np.ndarray
-    material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
+    material: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     values: SpanValues | None = None
     factors: np.ndarray | None = None
     vectors: SpanVectors | None = None
 
     def __post_init__(self) -> None:
-        if self.material is None:
+        if not self.material.size:
             object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
 
     def __len__(self) -> int:

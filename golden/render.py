@@ -19,6 +19,9 @@ from blysk.golden.pipeline import Design
 
 __all__ = ["DrawnPixels", "Renderer"]
 
+_OF_THE_METHOD = Geometry()
+"""Stands for the geometry that suits a design's method."""
+
 
 @dataclass(frozen=True)
 class DrawnPixels:
@@ -69,8 +72,8 @@ class Renderer:
         The shading pipeline, of a method that takes normals or vectors.
     geometry : Geometry
         The part that makes spans of triangles, with ``lines`` for a method that takes true lines, with
-        ``vectors`` for one that takes vectors, and ``rotates``, too, if there are several lights. ``None``:
-        the geometry that suits the method.
+        ``vectors`` for one that takes vectors, and ``rotates``, too, if there are several lights. By
+        default the geometry that suits the method.
     coarse : CoarseDepth, optional
         Depth test that drops spans, before they are shaded, if all of their pixels are hidden; the picture is
         the same.
@@ -84,12 +87,12 @@ class Renderer:
     """
 
     design: Design = field(default_factory=Design)
-    geometry: Geometry = None  # type: ignore[assignment]  # becomes one
+    geometry: Geometry = _OF_THE_METHOD
     coarse: CoarseDepth | None = None
 
     def __post_init__(self) -> None:
         suits = self.design.interpolator.geometry(self.design.lights)
-        if self.geometry is None:
+        if self.geometry is _OF_THE_METHOD:
             object.__setattr__(self, "geometry", suits)
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives

@@ -192,9 +192,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     least = min(found, key=lambda name: _left(found[name], "cells"))
     most = max(found, key=lambda name: _left(found[name], "cells"))
     text = [
-        "`--fit` builds only what a scene needs. It changes no word of the arithmetic, so the frame must be "
-        f"that of the full pipeline to the bit: {same} of {len(found)} are, by the bit-accurate models of "
-        f"both pipelines, {simulated} of them by simulation, too.",
+        "`--specialise` builds only what a scene needs. It changes no word of the arithmetic, so the frame "
+        f"must be that of the full pipeline to the bit: {same} of {len(found)} are, by the bit-accurate "
+        f"models of both pipelines, {simulated} of them by simulation, too.",
         f"What stays is from {_left(found[least], 'cells'):.0%} of the cells ({least}) to "
         f"{_left(found[most], 'cells'):.0%} ({most}). Cells are operators, multiplexers, registers and "
         "memories of any width, before technology mapping.",

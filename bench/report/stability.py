@@ -1,8 +1,8 @@
 """Stiff and extreme cases: every method in each, as a section of the report.
 
-A case is a scene and its spans. Every method shades it twice: with the spans as given, as the pipeline does
-for a user who prepares spans without the module `spans`, and with spans cut first, as `blysk` does. The same
-functions grade the cases for the report and for the tests.
+A case is a scene and its spans. Every method shades each case twice: with the spans as they come, and with
+spans that `golden.frames.cut` has cut first, as `blysk render` does. The same functions grade the cases for
+the report and for the tests.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
 """Triangle meshes as arrays, and unit vectors in float64."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 
 import numpy as np
@@ -24,7 +24,7 @@ class Mesh:
     normals : float64 array, shape (V, 3)
         Unit vertex normals.
     material : int64 array, shape (F,), optional
-        Index of the material of each face, 0 or more. ``None``: 0 for all.
+        Index of the material of each face, 0 or more. Empty: 0 for all.
 
     Raises
     ------
@@ -35,7 +35,7 @@ class Mesh:
     vertices: np.ndarray
     faces: np.ndarray
     normals: np.ndarray
-    material: np.ndarray = None  # type: ignore[assignment]  # becomes an array
+    material: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         for name, kind in (("vertices", np.float64), ("faces", np.int64), ("normals", np.float64)):
@@ -54,7 +54,7 @@ class Mesh:
             raise ValueError(f"faces must index the {len(self.vertices)} vertices")
         if not (np.isfinite(self.vertices).all() and np.isfinite(self.normals).all()):
             raise ValueError("vertices and normals must be finite")
-        if self.material is None:
+        if not self.material.size:
             object.__setattr__(self, "material", np.zeros(len(self.faces), dtype=np.int64))
         if self.material.shape != (len(self.faces),) or (self.material.size and self.material.min() < 0):
             raise ValueError(

@@ -220,7 +220,9 @@ def test_no_light_and_no_span():
     cut, count = cut_by_error(scene, rasterise(scene), METHOD)
     assert local_values(scene, cut).diffuse.shape == (len(cut.length), 0, 3)
     assert count == np.count_nonzero(np.bincount(origins(rasterise(scene), cut)[0]) > 1)
-    empty = replace(scene, mesh=replace(scene.mesh, faces=scene.mesh.faces[:0], material=None))
+    empty = replace(
+        scene, mesh=replace(scene.mesh, faces=scene.mesh.faces[:0], material=scene.mesh.material[:0])
+    )
     cut, count = cut_by_error(empty, rasterise(empty), METHOD)
     assert (count, len(cut.length), len(local_values(empty, cut).diffuse)) == (0, 0, 0)
 

@@ -99,7 +99,7 @@ def test_simulated_sizes_at_their_ends(size):
 def test_two_sided(simulator):
     """Back faces of a two-sided material are turned where others are left out."""
     drawn = scene("teapot", size=SIZE, triangles=200, back_faces="cull")
-    mesh = replace(drawn.mesh, faces=drawn.mesh.faces[::2], material=None)
+    mesh = replace(drawn.mesh, faces=drawn.mesh.faces[::2], material=drawn.mesh.material[::2])
     drawn = replace(drawn, mesh=mesh, material=replace(drawn.materials[0], two_sided=True))
     frame, flipped = simulator.render(drawn), simulator.render(replace(drawn, back_faces="flip"))
     np.testing.assert_array_equal(frame.image, triangle_frame(drawn, simulator.renderer).image)
