@@ -73,7 +73,9 @@ def check_writable(path: str | os.PathLike) -> None:
                 str(path), f"cannot be written, there is no folder {parent}", "make the folder first"
             )
         if not parent.is_dir():
-            raise InputError(str(path), f"cannot be written, {parent} is no folder", "choose another folder")
+            raise InputError(
+                str(path), f"cannot be written, {parent} is not a folder", "choose another folder"
+            )
         for target in (parent, path):
             if target.exists() and not os.access(target, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))

@@ -173,7 +173,7 @@ class Few(Whole):
     def check(self, value: Any) -> Any:
         """An `int` among them."""
         if super().check(value) not in self.numbers:
-            raise ValueError("no such number")
+            raise ValueError("not one of the choices")
         return value
 
 
@@ -219,7 +219,7 @@ class Vector(Value):
             raise ValueError(f"not {self.kind}")
         vector = tuple(_finite(part) for part in value)
         if self.direction and not any(vector[:3]):
-            raise ValueError("no direction")
+            raise ValueError("not a direction")
         return vector
 
 
@@ -321,5 +321,7 @@ class OutputFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name."""
         if not value:
-            raise InputError(f"{param.opts[-1]} ''", "is no file's name", "give one, or leave it out")
+            raise InputError(
+                f"{param.opts[-1]} ''", "is not a file name", "give a file name, or leave the option out"
+            )
         return super().convert(value, param, ctx)

@@ -37,14 +37,14 @@ class _Name(click.ParamType):
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path), default="report")
-@click.option("--quick", is_flag=True, help="Small pictures, few samples: minutes.")
+@click.option("--quick", is_flag=True, help="Use small pictures and few samples; takes minutes.")
 @click.option(
     "--mesh",
     "meshes",
     type=click.Path(),
     multiple=True,
     metavar="FILE",
-    help="A further mesh; repeat for more.",
+    help="Also measure this mesh. Repeat for more.",
 )
 @click.option(
     "--only",
@@ -52,26 +52,27 @@ class _Name(click.ParamType):
     type=_Name(),
     multiple=True,
     metavar="SECTION",
-    help=f"This section alone: {', '.join(sections.SECTIONS)}; repeat for more.",
+    help=f"Write only this section: {', '.join(sections.SECTIONS)}. Repeat for more.",
 )
 @click.option(
     "--jobs",
     type=Whole(1, 64),
-    help="Processes, of up to a GB each; what measures a time runs alone.  [default: number of cores]",
+    help="Processes, with up to 1 GB each. Measurements of time run alone.  [default: number of cores]",
 )
 @click.option(
     "--cluster",
     "address",
     metavar="ADDRESS",
-    help="Dask scheduler, tcp://host:8786, whose workers measure what is no time; times are this machine's.",
+    help="Dask scheduler, tcp://host:8786. Its workers measure everything but times; this machine measures "
+    "times.",
 )
 def command(folder, quick, meshes, names, jobs, address):
     """Measure error against run time and everything else in the report, and write it into FOLDER.
 
-    FOLDER is report by default; it is made, or an earlier report in it is replaced. The page index.html is
-    one file that any browser opens from disk; each table is also a CSV file, each conclusion's drawing an SVG
-    file, and report.json has every figure. Each measurement is kept in the cache: a report that was stopped
-    continues from there, if the code is the same.
+    The default FOLDER is report. The command makes it, or replaces an earlier report in it. The page
+    index.html is one file that any browser opens from disk. Each table is also a CSV file, the drawing of
+    each conclusion is also an SVG file, and report.json has every figure. The cache keeps each measurement:
+    a stopped report continues from there if the code is the same.
 
     \b
     Example:
@@ -83,7 +84,7 @@ def command(folder, quick, meshes, names, jobs, address):
         if jobs:
             raise InputError("--jobs", "a cluster has its own workers", "leave out --jobs or --cluster")
         if meshes:
-            raise InputError("--mesh", "the workers of a cluster have not the file", "leave out --cluster")
+            raise InputError("--mesh", "the workers of a cluster do not have the file", "leave out --cluster")
     for mesh in meshes:
         check_mesh_file(mesh)
     check_folder(folder)

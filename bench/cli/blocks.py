@@ -16,27 +16,40 @@ _MOST_JOBS = 64
 
 @click.command()
 @click.option(
-    "--samples", type=Whole(1000, 10_000_000), default=SAMPLES, show_default=True, help="Of each unit."
+    "--samples",
+    type=Whole(1000, 10_000_000),
+    default=SAMPLES,
+    show_default=True,
+    help="Samples of each unit.",
 )
-@click.option("--seed", type=Whole(0, 2**32 - 1), default=SEED, show_default=True, help="Of the operands.")
+@click.option(
+    "--seed", type=Whole(0, 2**32 - 1), default=SEED, show_default=True, help="Seed of the random operands."
+)
 @click.option(
     "--jobs",
     type=Whole(1, _MOST_JOBS),
     default=lambda: min(os.cpu_count() or 1, 4),
     show_default="number of cores, 4 at most",
-    help="Processes, of a quarter of a GB each.",
+    help="Processes, with a quarter of a GB each.",
 )
-@click.option("--json", "figures", type=OutputFile(), help="Every figure, with domains and notes.")
+@click.option("--json", "figures", type=OutputFile(), help="JSON file with every figure, domains and notes.")
 def command(samples, seed, jobs, figures):
     """Measure every variant of every unit, and print a table.
 
-    Errors are the largest ones found: model error, of the unit's formula in float64 against the exact
-    function; arithmetic error, of the unit against that formula; and total error. Their unit is a full term
-    or a vector's length, or the third column names it; rate: the shares of a gate's decisions that let a dark
-    span through, that stop a lit one, and both. For units of whole spans a sample is a pixel. lat: cycles
-    from an input to its first result; int: cycles from a result to the next; ROM and regs are in bits;
-    multipliers: 3*18 are three of 18x18 bits, 1*c is one by a constant. The variant of a bisection gives its
-    degree and its widest span in degrees.
+    Errors are the largest found. The model error compares the unit's formula in float64 with the exact
+    function. The arithmetic error compares the unit with its formula. The total error compares the unit with
+    the exact function. An error of 1 is a full term or the length of a unit vector, unless the third column
+    names another unit. For units of whole spans a sample is a pixel.
+
+    \b
+    rate         of a gate: shares of decisions that let a dark span through,
+                 that stop a lit span, and the sum of both
+    lat          cycles from an input to its first result
+    int          cycles from one result to the next
+    ROM, regs    bits
+    multipliers  3*18: three of 18x18 bits; 1*c: one by a constant
+
+    The variant of a bisection is its degree and its widest span in degrees.
 
     \b
     Example:

@@ -25,45 +25,51 @@ _MOST_FRAMES = 60
 @click.command()
 @click.argument("board_name", metavar="BOARD")
 @click.option(
-    "--mesh", default="teapot", show_default=True, help="File (OBJ, PLY, ...), scene file, or teapot."
+    "--mesh", default="teapot", show_default=True, help="Mesh file (OBJ, PLY, ...), scene file, or teapot."
 )
 @click.option(
-    "-o", "--output", type=OutputFile(), help="Bitstream; with --simulate the folder of the frames."
+    "-o", "--output", type=OutputFile(), help="Bitstream file; with --simulate the folder for the frames."
 )
-@click.option("--simulate", type=Whole(1, _MOST_FRAMES), help="So many frames, simulated down to the lanes.")
+@click.option(
+    "--simulate",
+    type=Whole(1, _MOST_FRAMES),
+    help="Simulate this many frames, down to the bits of the lanes.",
+)
 @click.option(
     "--colours",
     type=Choice("colours", COLOURS),
-    help="Of the bands.  [default: rgb888 for ulx3s-85f, rgb565 for the others]",
+    help="Bits of a pixel in the band buffer.  [default: rgb888 for ulx3s-85f, rgb565 for the others]",
 )
 @click.option(
     "--clock",
     type=Number(1, 126, "MHz"),
     default=52.5,
     show_default=True,
-    help="Drawing clock, MHz: this or a little less.",
+    help="Drawing clock in MHz: the nearest possible rate that is not higher.",
 )
 @click.option(
-    "--toggles", is_flag=True, help="With --simulate: count register bits that toggle, a proxy of energy."
+    "--toggles",
+    is_flag=True,
+    help="With --simulate: count the register bits that toggle, a proxy for energy.",
 )
-@click.option("--seeds", type=Whole(1, 20), default=4, show_default=True, help="Placements to try at most.")
 @click.option(
-    "--record", type=OutputFile(), help="JSON file of figures, to which those of this run are added."
+    "--seeds", type=Whole(1, 20), default=4, show_default=True, help="Largest number of placements to try."
 )
-@click.option("--load", is_flag=True, help="Load the bitstream by openFPGALoader.")
+@click.option("--record", type=OutputFile(), help="JSON file to which the figures of this run are added.")
+@click.option("--load", is_flag=True, help="Load the bitstream with openFPGALoader.")
 @options_of(OPTIONS)
 @click.pass_context
 def command(context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **_):
-    """A turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
+    """Show a turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
-    Without --simulate a bitstream is made. Used and available parts and reached and needed clock rates are
-    printed, and the exit status is 1 if a clock is not met. With it, frames are decoded from the simulated
-    lanes and compared with those of the bit-accurate model; the exit status is 1 if one differs, or if the
-    frames are too heavy for 60 Hz.
+    Without --simulate the command makes a bitstream. It first prints what is known of this board's bitstream,
+    then used and available parts, and reached and needed clock rates. The exit status is 1 if a clock is not
+    met.
 
-    What is known of the board's bitstream is printed first.
+    With --simulate it decodes frames from the simulated lanes, and compares them with the bit-accurate model.
+    The exit status is 1 if a frame differs, or if the frames are too heavy for 60 Hz.
 
-    The buttons of the board stop the motion, turn it round, and change the material and the light.
+    The buttons of the board stop the motion, reverse it, and change the material and the light.
 
     \b
     Examples:
@@ -76,7 +82,7 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
     given = given_options(context, OPTIONS)
     loader = _loader() if load else ""
     if toggles and not simulate:
-        raise InputError("--toggles", "counts bits of a simulation", "give --simulate N with it")
+        raise InputError("--toggles", "counts bits of a simulation", "also give --simulate N")
     if simulate and load:
         raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
     if not simulate:
@@ -122,7 +128,7 @@ def _recorded(path: str | None) -> dict[str, Any]:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, TypeError, AttributeError) as error:
-        raise InputError(path, "is no JSON file of figures", "give --record another name") from error
+        raise InputError(path, "is not a JSON file of figures", "choose another file for --record") from error
 
 
 def _loader() -> str:

@@ -38,8 +38,8 @@ class _Some(click.ParamType):
         known = {str(one): one for one in self.values}
         unknown = [word for word in value.split(",") if word not in known]
         if unknown:
-            reason = f"{unknown[0]!r} is none of the choices"
-            raise InputError(f"{param.opts[0]} {value}", reason, f"use some of {','.join(known)}")
+            reason = f"{unknown[0]!r} is not one of the choices"
+            raise InputError(f"{param.opts[0]} {value}", reason, f"choose from {','.join(known)}")
         return tuple(dict.fromkeys(known[word] for word in value.split(",")))
 
 
@@ -54,7 +54,11 @@ class _Error(click.ParamType):
         except ValueError:
             number = math.nan
         if not 0 < number <= 255:
-            raise InputError(f"{param.opts[0]} {value}", "no such error", "give a number up to 255, in LSB")
+            raise InputError(
+                f"{param.opts[0]} {value}",
+                "not an error limit",
+                "give a number above 0 and up to 255, in LSB",
+            )
         return number
 
 
@@ -67,59 +71,75 @@ _USUAL = Sweep()
 
 
 @click.command()
-@click.option("--mesh", default="teapot", show_default=True, help="File, or teapot.")
+@click.option("--mesh", default="teapot", show_default=True, help="Mesh file, or teapot.")
 @click.option(
-    "--exponent", type=Whole(1, MAX_EXPONENT), default=EXPONENT, show_default=True, help="Of the highlight."
+    "--exponent",
+    type=Whole(1, MAX_EXPONENT),
+    default=EXPONENT,
+    show_default=True,
+    help="Exponent of the highlight.",
 )
 @click.option(
-    "--size", type=Size(), default="x".join(map(str, SIZE)), show_default=True, help="Of the picture."
+    "--size", type=Size(), default="x".join(map(str, SIZE)), show_default=True, help="Size of the picture."
 )
 @click.option(
-    "--largest-error", "largest", type=_Error(), default=1.0, show_default=True, help="Of any channel."
+    "--largest-error",
+    "largest",
+    type=_Error(),
+    default=1.0,
+    show_default=True,
+    help="Limit of the largest error of any channel.",
 )
 @click.option(
     "--error",
     type=Choice("error", ERRORS),
     default="method",
     show_default=True,
-    help="Against the same method and model in float64, exact normals of every pixel with the same "
-    "model, or exact normals with Blinn's power, of a lobe with its own model.",
+    help="Reference of the error. arithmetic: the same method and model in float64. method: exact normals of "
+    "every pixel, same model. total: exact normals with Blinn's power; lobes with their own model.",
 )
 @click.option(
-    "--cost", type=Choice("cost", COSTS), default="cells", show_default=True, help="What is to be little."
+    "--cost", type=Choice("cost", COSTS), default="cells", show_default=True, help="Cost that is to be low."
 )
 @_option(
     "--methods",
     [*METHODS, *PUBLISHED],
     _USUAL.methods,
-    f"Interpolation along a span; also {', '.join(PUBLISHED)}.",
+    f"Methods of interpolation along a span; also {', '.join(PUBLISHED)}.",
 )
-@_option("--models", SERVED, _USUAL.models, f"Of the reflection models {', '.join(SERVED)}.")
-@_option("--lights", range(1, MAX_LIGHTS + 1), _USUAL.lights, f"Numbers of lights, to {MAX_LIGHTS}.")
+@_option("--models", SERVED, _USUAL.models, f"Reflection models: {', '.join(SERVED)}.")
+@_option("--lights", range(1, MAX_LIGHTS + 1), _USUAL.lights, f"Numbers of lights, up to {MAX_LIGHTS}.")
 @_option("--operands", OPERANDS, OPERANDS, "Operands of the specular unit.")
 @_option(
     "--degrees",
     sorted({degree for degrees in DEGREES.values() for degree in degrees}),
     _USUAL.degrees,
-    "Of the polynomial: quadratic in its forms 2 and 3, bisection 1 and 2.",
+    "Degrees of the polynomial: 2 and 3 for the forms of quadratic, 1 and 2 for bisection.",
 )
-@_option("--fraction-bits", WORDS, _USUAL.fraction_bits, "Of the differences of chord-local: 36 to 46, even.")
+@_option(
+    "--fraction-bits",
+    WORDS,
+    _USUAL.fraction_bits,
+    "Fraction bits of the differences of chord-local: even numbers from 36 to 46.",
+)
 @_option("--styles", STYLES, _USUAL.styles, "One pixel a cycle, or few multipliers.")
-@click.option("--limit", type=Whole(1, 1000), default=10, show_default=True, help="Designs that are listed.")
-@click.option("--jobs", type=Whole(1, 1024), help="Processes.  [default: processors]")
+@click.option(
+    "--limit", type=Whole(1, 1000), default=10, show_default=True, help="Number of designs to list."
+)
+@click.option("--jobs", type=Whole(1, 1024), help="Processes.  [default: number of cores]")
 @click.option(
     "--cluster", "address", metavar="ADDRESS", help="Dask scheduler whose workers measure: tcp://host:8786."
 )
-@click.option("--json", "figures", type=OutputFile(), help="Every design, with every figure.")
+@click.option("--json", "figures", type=OutputFile(), help="JSON file with every figure of every design.")
 def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, figures, **choices):
-    """Draw a scene with every design of a sweep, and list the cheapest under an error.
+    """Draw a scene with every design of a sweep, and list the cheapest designs under an error.
 
-    Choices are lists with commas, and are combined in all ways; a method that lacks a choice is taken once.
-    Errors are in LSB of an 8-bit channel. Cells, multipliers, register and memory bits are counted in the
-    netlist, before technology mapping. Cycles are an upper bound for a pixel, from the units' figures for the
-    scene's spans; bisection states none for spans that it divides. Designs with a * are on the Pareto front
-    of the sweep: no design is better in both error and cost. Several lights stand evenly round the scene.
-    Earlier results come from the cache.
+    Choices are lists with commas between the values. The sweep has every combination of them; a method
+    without one of the choices is taken once. Errors are in LSB of an 8-bit channel. Cells, multipliers,
+    register bits and memory bits are counted in the netlist, before technology mapping. Cycles are an upper
+    bound for a pixel, from the figures of the units for the scene's spans; bisection has no bound for spans
+    that it divides. Designs with a * are on the Pareto front of the sweep: no design is better in both error
+    and cost. Several lights stand evenly around the scene. The cache keeps earlier results.
 
     \b
     Example:

@@ -28,40 +28,50 @@ __all__ = ["command"]
     "--family",
     "family_name",
     type=Choice("family", DEVICES),
-    help="Of FPGAs: "
-    + ", ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
-    + ".  [default: ecp5; of several pipelines ecp5-85f]",
+    help="Family of FPGAs. "
+    + "; ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
+    + ".  [default: ecp5; for several pipelines ecp5-85f]",
 )
 @click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
-@click.option("--every-method", is_flag=True, help="The pipeline of every method.")
+@click.option("--every-method", is_flag=True, help="Place the pipeline of every method.")
 @click.option(
     "--unit",
     "units",
     multiple=True,
     metavar="NAME",
-    help="In place of the pipeline, a unit of the table of blysk blocks: all its variants, or one, as in "
-    "'bisection 1, 45'; repeat for more.",
+    help="Place this unit in place of the pipeline. Names are those of blysk blocks. Add a variant to place "
+    "only that, as in 'bisection 1, 45'. Repeat for more.",
 )
 @click.option(
     "--target",
     type=Whole(1, 1000),
     default=ECP5.target,
     show_default=True,
-    help="Clock rate in MHz that the tool is asked for; one within reach gives more than one far beyond.",
+    help="Clock rate in MHz that the tools aim at. A target within reach gives a higher rate than one far "
+    "beyond.",
 )
-@click.option("--seeds", type=Whole(1, 100), default=SEEDS, show_default=True, help="Placements of each.")
+@click.option(
+    "--seeds", type=Whole(1, 100), default=SEEDS, show_default=True, help="Placements of each design."
+)
 @click.option(
     "--jobs",
     type=Whole(1, 64),
     default=lambda: min(os.cpu_count() or 1, 4),
     show_default="number of cores, 4 at most",
-    help="Placements at once, of half a GB each.",
+    help="Placements at the same time, with half a GB each.",
 )
-@click.option("--keep-registers", is_flag=True, help="ECP5: no registers inside multipliers.")
+@click.option("--keep-registers", is_flag=True, help="ECP5: move no registers into multipliers.")
 @click.option(
-    "--by-unit", is_flag=True, help="Parts of each unit inside, as mapped; without placement and clock rate."
+    "--by-unit",
+    is_flag=True,
+    help="Print the mapped parts of each unit inside, without placement and clock rate.",
 )
-@click.option("--json", "figures", type=OutputFile(), help="Every figure, and the slowest path of each seed.")
+@click.option(
+    "--json",
+    "figures",
+    type=OutputFile(),
+    help="JSON file with every figure, and the slowest path of each seed.",
+)
 @click.pass_context
 def command(
     context,
@@ -82,13 +92,17 @@ def command(
 ):
     """Place and route the pipeline on an FPGA, and print its parts and clock rate.
 
-    LUT: look-up tables of four inputs, with those that serve as carries and memories; FF: flip-flops, without
-    those inside multipliers; mult: multipliers of 18x18 bits; BRAM: block RAMs of 18 Kibit; LUTRAM: memories
-    of 16x4 bits in look-up tables. The first line has the parts of the FPGA. Clock rates are in MHz, over the
-    seeds. The slowest path is that of the slowest seed: its delay in cells and between them, and the
-    registers at its ends. Earlier placements come from the cache. On ECP5 registers beside a multiplier move
-    into it; the tool does not time the path between registers on both sides, and a line below the table says
-    so.
+    \b
+    LUT     look-up tables of four inputs, also those used as carries and memories
+    FF      flip-flops, without those inside multipliers
+    mult    multipliers of 18x18 bits
+    BRAM    block RAMs of 18 Kibit
+    LUTRAM  memories of 16x4 bits in look-up tables
+
+    The first line has the parts of the FPGA. Clock rates are in MHz, over the seeds. The slowest path is that
+    of the slowest seed: the delay in cells, the delay between cells, and the registers at its ends. The cache
+    keeps earlier placements. On ECP5 registers beside a multiplier move into it. The tool does not time a
+    multiplier with registers on both sides; a line below the table then says so.
 
     \b
     Examples:
@@ -106,18 +120,22 @@ def command(
     given = [*chosen, *given_options(context, ["lights", "pipes", "top", "setups", "every_method"])]
     if units and given:
         option = f"--{given[0].replace('_', '-')}"
-        raise InputError(option, "is for the pipeline", "leave it out, or --unit")
+        raise InputError(option, "is for the pipeline", f"leave out {option} or --unit")
     if every_method and "method" in given:
-        raise InputError("--method", "is one of every method", "leave it out, or --every-method")
+        raise InputError("--method", "every method is placed", "leave out --method or --every-method")
     if pipes > 1 and top != "shader":
-        raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave it out, or --top")
+        raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave out --pipes or --top")
     setups = setups or SETUPS["setups"].default
     if setups > 1 and top == "shader":
         raise InputError(
-            f"--setups {setups}", "spans need no triangle setup", "leave it out, or --top geometry or render"
+            f"--setups {setups}",
+            "spans need no triangle setup",
+            "leave out --setups, or use --top geometry or render",
         )
     if by_unit and (placing := given_options(context, ["target", "seeds", "jobs"])):
-        raise InputError(f"--{next(iter(placing))}", "nothing is placed", "leave it out, or --by-unit")
+        raise InputError(
+            f"--{next(iter(placing))}", "nothing is placed", "leave it out, or leave out --by-unit"
+        )
     if figures:
         check_writable(figures)
     unknown = [name for name in units if name.split(" ")[0] not in UNITS]

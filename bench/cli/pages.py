@@ -15,13 +15,17 @@ __all__ = ["command"]
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path), default="docs/blocks")
 @click.option(
-    "--unit", "units", type=Choice("unit", UNITS), multiple=True, help="This page alone; repeat for more."
+    "--unit",
+    "units",
+    type=Choice("unit", UNITS),
+    multiple=True,
+    help="Write only this page. Repeat for more.",
 )
 def command(folder, units):
     """Write a page for each unit, with drawings of structure, timing and errors, into FOLDER.
 
-    FOLDER is docs/blocks by default, and is made if there is none. Pictures that a page no longer has are
-    removed, other files stay.
+    The default FOLDER is docs/blocks; the command makes it if needed. Pictures that no page has any more are
+    removed; other files stay.
 
     \b
     Example:

@@ -39,26 +39,26 @@ class _Design(click.ParamType):
     type=click.Path(path_type=Path),
     default="site",
     show_default=True,
-    help="Folder of the site; it is made, or an earlier site in it replaced.",
+    help="Folder of the site. The command makes it, or replaces an earlier site in it.",
 )
 @click.option(
     "--report",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="A report by `blysk bench`, in place of the quick one that is measured for the site.",
+    help="Report of `blysk bench`. Without this option the command measures a quick report.",
 )
 @click.option(
     "--pages",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="Pages of the units by `blysk pages`.  [default: docs/blocks of the project, if it is there]",
+    help="Pages of the units, from `blysk pages`.  [default: docs/blocks of the project, if it exists]",
 )
 @click.option(
     "--design",
     "designs",
     type=_Design(),
     multiple=True,
-    help=f"A module of this method and model alone; repeat for more.  [default: {len(DESIGNS)} of them]",
+    help=f"Compile only this method and model. Repeat for more.  [default: {len(DESIGNS)} designs]",
 )
 @click.option(
     "--jobs",
@@ -71,9 +71,8 @@ def command(folder, report, pages, designs, jobs):
     """Write a static site: the pipeline as WebAssembly, simulated live while the light is moved.
 
     The page index.html opens from disk and from any web server, and loads only files of the site. The site
-    also has the report of error against run time, guide and theory, and the pages of the units. The first
-    time takes some minutes; modules, spans and measurements are kept in the cache, and made again after the
-    code has changed.
+    also has the report of error against run time, guide, theory, and the pages of the units. The first run
+    takes some minutes. The cache keeps modules, spans and measurements until the code changes.
 
     \b
     Example:

@@ -212,9 +212,9 @@ def _command(units, count, seed, jobs, figures) -> int:
     """Make small faults in every unit, or in the named ones, and print how many its vectors find."""
     unknown = [unit for unit in units if unit not in RECORDS]
     if unknown:
-        raise InputError(unknown[0], "is no unit", f"choose from {', '.join(RECORDS)}")
+        raise InputError(unknown[0], "is not a unit", f"choose from {', '.join(RECORDS)}")
     if version_of("pyosys") is None:
-        raise InputError("mutants", "without pyosys", install_extra("test"))
+        raise InputError("mutants", "pyosys is not installed", install_extra("test"))
     if figures:
         check_writable(figures)
     names = units or tuple(RECORDS)

@@ -451,7 +451,7 @@ def _begin(folder: str) -> None:
 def _command(pixels, unit, beats, seed, jobs, figures) -> int:
     """Compare random pixels of every pipeline, in two engines, with the bit-accurate model."""
     if unit is not None and unit not in RECORDS:
-        raise InputError(unit, "is no unit", f"choose from {', '.join(RECORDS)}")
+        raise InputError(unit, "is not a unit", f"choose from {', '.join(RECORDS)}")
     if figures:
         check_writable(figures)
     baseline = version_of("verilator")

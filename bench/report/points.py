@@ -363,7 +363,7 @@ def _print(report):
         sections = json.loads(Path(report).read_text(encoding="utf-8"))["sections"]
         click.echo(readme_table(sections["points"]["figures"]["points"]), nl=False)
     except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(report, "is no full report", "give the report.json of `blysk bench`") from None
+        raise InputError(report, "is not a full report", "give the report.json of `blysk bench`") from None
 
 
 if __name__ == "__main__":

@@ -154,7 +154,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
     earlier = _earlier(folder) or {}
     for name in files.keys() - set(earlier.get("files", ())):
         if (folder / name).exists():
-            raise InputError(str(folder / name), "is of no report, and would be replaced", "move it")
+            raise InputError(str(folder / name), "is not part of a report, and would be replaced", "move it")
     folder.mkdir(exist_ok=True)
     figures = {
         section.name: {

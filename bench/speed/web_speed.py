@@ -98,11 +98,11 @@ def frame_rates(site: Path, designs: Sequence[str] = (), frames: int = 40) -> di
     """
     page_file = Path(site).absolute() / "index.html"
     if not page_file.is_file():
-        raise InputError(str(site), "is no site", "make one with `blysk web -o FOLDER`")
+        raise InputError(str(site), "is not a site", "make one with `blysk web -o FOLDER`")
     modules = sorted(path.stem for path in Path(site, "modules").glob("*.js"))
     unknown = [name for name in designs if name not in modules]
     if unknown:
-        raise InputError(unknown[0], f"is no module of {site}", f"choose from {', '.join(modules)}")
+        raise InputError(unknown[0], f"is not a module of {site}", f"choose from {', '.join(modules)}")
     chromium = find_chromium()
     try:
         from playwright.sync_api import sync_playwright

@@ -13,7 +13,9 @@ _LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup
 DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
 """Defaults that differ from those of a rendering."""
 
-_METHOD = "Interpolation along a span.  [default: quotient; renormalise with a model that is from no table]"
+_METHOD = (
+    "Method of interpolation along a span.  [default: quotient; renormalise with a model without a table]"
+)
 
 OPTIONS = {
     name: option._replace(default=DEFAULTS.get(name, option.default))

@@ -298,7 +298,7 @@ def explore(
         raise InputError(
             f"--largest-error {largest:g}",
             f"no design of the sweep reaches it, {least}",
-            "allow more, or sweep more",
+            "allow a larger error, or sweep more designs",
         )
     listed = best[:limit]
     print(_table([designs[index] for index in listed], on_front[listed]))

@@ -89,7 +89,7 @@ def report_files(folder: Path) -> list[Path]:
         names = []
     files = [folder / name for name in names if Path(name).name == name]
     if not files or not all(path.is_file() for path in files):
-        raise InputError(f"--report {folder}", "is no report", "make one with `blysk bench FOLDER`")
+        raise InputError(f"--report {folder}", "is not a report", "make one with `blysk bench FOLDER`")
     for path in files:
         reads(path)
     return files

@@ -53,7 +53,7 @@ class Lights(Value):
         """A tuple of `Light`."""
         entries = [value] if isinstance(value, Light | Mapping | str) or _is_numbers(value) else value
         if not isinstance(entries, list | tuple):
-            raise ValueError("no lights")
+            raise ValueError("not a light")
         if len(entries) > MAX_LIGHTS:
             raise PartError("", f"{len(entries)} lights", f"give at most {MAX_LIGHTS}")
         return tuple(self._light(entry, f"[{number}]") for number, entry in enumerate(entries, 1))
@@ -74,7 +74,7 @@ class Lights(Value):
         if isinstance(entry, Mapping):
             return self._of_table(entry, key)
         if not isinstance(entry, str) and not _is_numbers(entry):
-            raise PartError(key, f"{shown(entry)} is no light", self.in_python)
+            raise PartError(key, f"{shown(entry)} is not a light", self.in_python)
         try:
             numbers = self.numbers.read(entry)
         except ValueError as error:

@@ -198,65 +198,68 @@ _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)
 
 
 SCENE: dict[str, Option] = {
-    "size": Option(Size(), (640, 480), "Of the picture.", "size"),
-    "background": Option(Color(), "#1a1c20", "Where no surface is.", "background"),
-    "ambient_light": Option(Color(8), 1.0, "Intensity I_a.", "ambient_light"),
+    "size": Option(Size(), (640, 480), "Size of the picture.", "size"),
+    "background": Option(Color(), "#1a1c20", "Colour of the pixels that show no surface.", "background"),
+    "ambient_light": Option(Color(8), 1.0, "Intensity I_a of the ambient light.", "ambient_light"),
     "back_faces": Option(
         Choice("treatment of back faces", BACK_FACES),
         "flip",
-        "Shade them with their normals turned, as they are, or not at all.",
+        "Back faces. flip turns their normals, show takes them as they are, cull leaves the faces out.",
         "back_faces",
     ),
     "triangles": Option(
-        Whole(MIN_TRIANGLES, MAX_TRIANGLES), DEFAULT_TRIANGLES, "Of the teapot, about.", "mesh.triangles"
+        Whole(MIN_TRIANGLES, MAX_TRIANGLES),
+        DEFAULT_TRIANGLES,
+        "Approximate number, for the teapot.",
+        "mesh.triangles",
     ),
     "crease": Option(
         Number(0, 180, "degrees"),
         DEFAULT_CREASE,
-        "Degrees over which an edge is sharp, in a mesh without normals.",
+        "In a mesh without normals, edges over this angle are sharp; degrees.",
         "mesh.crease",
     ),
     "materials": Option(
         Choice("source of materials", ("file", "one")),
         "file",
-        "Colours of the mesh file, where it has some and no option gives them, or of the options alone.",
+        "file: colours of the mesh file, where it has some and no option gives them. one: of options only.",
         "mesh.materials",
     ),
     "projection": Option(
-        Choice("projection", PROJECTIONS), "perspective", "Of the camera.", "camera.projection"
+        Choice("projection", PROJECTIONS), "perspective", "Projection of the camera.", "camera.projection"
     ),
     "view": Option(
         Direction({word: word for word in VIEW_WORDS}),
         (0.4, 0.5, 1.0),
-        "Direction from the mesh to the viewer: the camera shows all of the mesh. The words and the default "
+        "Direction from the mesh to the viewer. The camera shows the whole mesh. The words and the default "
         "turn with --up.",
         "camera.view",
     ),
     "position": Option(
         Vector("three numbers"),
         None,
-        "Of the camera, in place of --view, in the mesh's units.",
+        "Position of the camera in the mesh's units; replaces --view.",
         "camera.position",
     ),
     "target": Option(
         Vector("three numbers"),
         None,
-        "With --position: the middle of the picture.  [default: of the mesh]",
+        "With --position: the point in the middle of the picture.  [default: the middle of the mesh]",
         "camera.target",
     ),
     "up": Option(
         Direction(_UP_WORDS),
         (0.0, 1.0, 0.0),
-        "Upright in the picture: z for most STL files and those of CAD programs, whatever the format.",
+        "Direction that points up in the picture. Most STL files and files of CAD programs need z.",
         "camera.up",
     ),
     "field_of_view": Option(
-        Number(1, 179, "degrees"), 30.0, "Vertical angle of the picture, degrees.", "camera.field_of_view"
+        Number(1, 179, "degrees"), 30.0, "Vertical angle of view, degrees.", "camera.field_of_view"
     ),
     "viewer": Option(
         Choice("viewer", VIEWERS),
         "distant",
-        "Highlights as seen from one direction, or from the camera: near needs --method chord-local.",
+        "distant: highlights seen from one direction. near: from the camera; needs --method chord-local.",
         "camera.viewer",
     ),
     "lights": Option(
@@ -266,7 +269,7 @@ SCENE: dict[str, Option] = {
             "give a direction other than 0 and colours of 0 or more",
         ),
         (-0.5, 0.8, 0.7),
-        "Direction to a light, and its colour, 1,1,1 if left out.",
+        "Direction to a light, and its colour (1,1,1 if left out).",
         "lights",
     ),
     "point_lights": Option(
@@ -276,8 +279,8 @@ SCENE: dict[str, Option] = {
             "give colours and coefficients of 0 or more",
         ),
         None,
-        "Position of a light in the mesh's units, its colour, and its attenuation: at the distance d it "
-        "counts 1/(K0 + K1 d + K2 d^2), at most 1; needs --method chord-local.",
+        "Position of a light in the mesh's units, its colour, and its attenuation. At distance d the light "
+        "counts 1/(K0 + K1 d + K2 d^2), at most 1. Needs --method chord-local.",
     ),
     "spot_lights": Option(
         Lights(
@@ -290,23 +293,23 @@ SCENE: dict[str, Option] = {
             "give an axis other than 0, a larger outer angle, colours and coefficients of 0 or more",
         ),
         None,
-        "The same of a light that shines along DX,DY,DZ: in full up to INNER degrees from there, and not at "
-        "all from OUTER on.",
+        "Point light that shines along DX,DY,DZ: in full up to INNER degrees from this direction, not at "
+        "all from OUTER degrees on.",
     ),
-    "ambient": Option(Color(), (0.08, 0.05, 0.03), "Reflection k_a.", "material.ambient"),
-    "diffuse": Option(Color(), (0.75, 0.42, 0.2), "Reflection k_d.", "material.diffuse"),
-    "specular": Option(Color(), 0.6, "Reflection k_s.", "material.specular"),
-    "exponent": Option(Whole(1, MAX_EXPONENT), 50, "Of the highlight.", "material.exponent"),
+    "ambient": Option(Color(), (0.08, 0.05, 0.03), "Ambient reflection k_a.", "material.ambient"),
+    "diffuse": Option(Color(), (0.75, 0.42, 0.2), "Diffuse reflection k_d.", "material.diffuse"),
+    "specular": Option(Color(), 0.6, "Specular reflection k_s.", "material.specular"),
+    "exponent": Option(Whole(1, MAX_EXPONENT), 50, "Exponent of the highlight.", "material.exponent"),
     "roughness": Option(
         Roughness(),
         None,
-        "Of models that have one in place of an exponent, as in glTF.  [default: by the exponent]",
+        "Roughness as in glTF, for models without an exponent.  [default: from the exponent]",
         "material.roughness",
     ),
     "fresnel": Option(
         Color(),
         None,
-        "Reflection F_0 along the normal: k_s times Schlick's F_0 + (1 - F_0)(1 - V.H)^5.  [default: none]",
+        "Reflection F_0 along the normal: Schlick's F_0 + (1 - F_0)(1 - V.H)^5 times k_s.  [default: none]",
         "material.fresnel",
     ),
 }
@@ -316,33 +319,33 @@ DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
         None,
-        "Interpolation along a span.  [default: quotient; quadratic with --gate; renormalise with --operand, "
-        "--setup-interval, or a model that is from no table]",
+        "Method of interpolation along a span.  [default: quotient; quadratic with --gate; renormalise with "
+        "--operand, --setup-interval, or a model without a table]",
         "pipeline.method",
     ),
     "model": Option(
         Model(),
         "blinn",
-        "Reflection model; every method serves each, phong quotient alone. A file holds a curve of N.H.",
+        "Reflection model. Every method serves it; only phong needs quotient. FILE.csv: a curve of N.H.",
         "pipeline.model",
     ),
     "operand": Option(
         Choice("operand", get_args(Operand)),
         None,
-        "Operand of the specular unit, for methods that find normals.  [default: the method's]",
+        "Operand of the specular unit, for methods that compute normals.  [default: the method's own]",
         "pipeline.operand",
     ),
     "gate": Option(
         Truth(),
         False,
-        "A highlight gate: spans without a highlight pass the specular units by.",
+        "Build a highlight gate: spans without a highlight bypass the specular units.",
         "pipeline.gate",
     ),
     "setup_interval": Option(
         Whole(1, 46),
         None,
-        "Least cycles from a span to the next; fewer take more multipliers.  "
-        "[default: 3 or 4, by the method; compact: the most]",
+        "Minimum cycles from one span to the next. A shorter interval takes more multipliers.  "
+        "[default: 3 or 4, depending on the method; compact: the longest]",
         "pipeline.setup_interval",
     ),
     "style": Option(
@@ -353,11 +356,11 @@ DESIGN: dict[str, Option] = {
 
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
-    "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials, of up to 64 tables of lobes."),
+    "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials, with up to 64 lobe tables."),
     "factors": Option(
         Whole(0, MAX_LIGHTS),
         0,
-        "How many of the lights, the first ones, fade by distance or as spots; needs --method chord-local.",
+        "Number of lights that fade by distance or as spots; these come first. Needs --method chord-local.",
     ),
 }
 """Counts of a design, for commands without a scene; a scene gives its own."""
@@ -366,7 +369,7 @@ GEOMETRY: dict[str, Option] = {
     "geometry": Option(
         Choice("geometry", GEOMETRIES),
         "software",
-        "Who turns triangles into spans: software, or hardware, which tests depths, too.",
+        "Where triangles become spans: in software, or in the geometry RTL, which also tests depths.",
         "pipeline.geometry",
     ),
 }
@@ -376,7 +379,7 @@ PIPES: dict[str, Option] = {
     "pipes": Option(
         Few(*PIPE_COUNTS),
         1,
-        "Number of pipelines, each for the scanlines y of a remainder of y by it: so many pixels a cycle.",
+        "Number of pipelines, N. Pipeline k shades the scanlines with y mod N = k.",
         "pipeline.pipes",
     ),
 }
@@ -386,14 +389,14 @@ PORTS: dict[str, Option] = {
     "top": Option(
         Choice("core", PACKETS),
         None,
-        "What the core does: spans to pixels, triangles to spans, or triangles to pixels.  [default: shader, "
-        "of hardware geometry render]",
+        "shader: spans to pixels. geometry: triangles to spans. render: triangles to pixels.  [default: "
+        "shader; with hardware geometry render]",
     ),
     "bus": Option(
         Choice("bus", ("native", *BUSES)),
         "native",
-        "Ports of the core: its own streams, or AXI4-Stream with registers on AXI4-Lite or Wishbone; -o X.v "
-        "then writes X.md, X.h and X.svd, too.",
+        "Ports of the core. native: its own streams. axi, wishbone: AXI4-Stream, with registers on AXI4-Lite "
+        "or Wishbone; -o X.v then also writes X.md, X.h and X.svd.",
     ),
 }
 """Options of Verilog alone."""
@@ -402,7 +405,7 @@ SETUPS: dict[str, Option] = {
     "setups": Option(
         Few(1, 2),
         1,
-        "Of hardware geometry: lanes of triangle setup; two take twice as many small triangles.",
+        "Lanes of triangle setup in hardware geometry. Two lanes take twice as many small triangles.",
         "pipeline.setups",
     ),
 }
@@ -412,8 +415,8 @@ COARSE: dict[str, Option] = {
     "coarse": Option(
         Size(),
         None,
-        "A coarse depth test drops hidden spans before shading, in pictures of at most this size, "
-        "of triangles to pixels.",
+        "Build a coarse depth test, which drops hidden spans before shading, for pictures of at most this "
+        "size. Needs a core from triangles to pixels.",
     ),
 }
 """Option of Verilog, for a core from triangles to pixels."""
@@ -424,20 +427,20 @@ RENDERING: dict[str, Option] = {
     "coarse": Option(
         Truth(),
         False,
-        "With --geometry hardware: a coarse depth test drops hidden spans before shading.",
+        "With --geometry hardware: add a coarse depth test, which drops hidden spans before shading.",
         "pipeline.coarse",
     ),
     **PIPES,
     "specialise": Option(
         Truth(),
         False,
-        "Build only what the scene needs, say what is left out, and compare with the full pipeline.",
+        "Build only what the scene needs, print what is left out, and compare with the full pipeline.",
         "pipeline.specialise",
     ),
     "short_words": Option(
         Truth(),
         False,
-        "With --specialise: shorter words, too, where the error bound stays; pixels may change by a step.",
+        "With --specialise: also shorten words where the error bound stays. Pixels may change by one step.",
         "pipeline.short_words",
     ),
 }

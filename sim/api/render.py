@@ -213,7 +213,7 @@ def _simulator(
 def _check_geometry(settings: Settings, design: Design) -> None:
     """Refuse options that hardware geometry does not serve, and options that need it."""
     if settings["geometry"] == "software":
-        remedy = "give geometry hardware, too"
+        remedy = "also give geometry hardware"
         if settings["setups"] > 1:
             raise settings.refuse("setups", "spans need no triangle setup", remedy)
         if settings["coarse"]:

@@ -109,7 +109,7 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
     Raises
     ------
     InputError
-        If the file cannot be read, is no TOML, has an unknown key, a value of another type or out of range,
+        If the file cannot be read, is not TOML, has an unknown key, a value of another type or out of range,
         or names no mesh. The message names the file and the key.
     """
     values: dict[str, Any] = {}
@@ -161,7 +161,7 @@ def _parse(path: Path) -> dict[str, Any]:
     # A syntax error, or a whole number of more than 4300 digits.
     except ValueError as error:
         text = str(error).split("\n")[0]
-        raise PartError("", f"is no TOML ({text})", "mend it there; text stands in quotes") from error
+        raise PartError("", f"is not TOML ({text})", "mend it there; text stands in quotes") from error
 
 
 def _read_table(
@@ -180,7 +180,7 @@ def _read_table(
         expected = schema[name]
         if isinstance(expected, dict):
             if not isinstance(value, dict):
-                raise PartError(key, f"{shown(value)} is no table", f"write [{key}], and its keys below")
+                raise PartError(key, f"{shown(value)} is not a table", f"write [{key}], and its keys below")
             _read_table(value, expected, f"{key}.", values, keys)
             continue
         option, kind = expected
@@ -204,7 +204,7 @@ class _MeshFile(Value):
         if not isinstance(value, str):
             raise ValueError("not text")
         if not (value.isprintable() and Path(value).stem):
-            raise ValueError("no file's name")
+            raise ValueError("not a file name")
         return value
 
 

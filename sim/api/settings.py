@@ -162,7 +162,9 @@ def rendering_settings(
     settings = read_settings(source, options, {**SCENE, **DESIGN, **RENDERING}, **slow)
     with settings.located():
         if settings["short_words"] and not settings["specialise"]:
-            raise settings.refuse("short_words", "nothing is specialised", "leave it out, or specialise", "")
+            raise settings.refuse(
+                "short_words", "nothing is specialised", "leave it out, or also give specialise", ""
+            )
     return settings
 
 
@@ -241,9 +243,9 @@ def _check_pairs(settings: Settings) -> None:
                 raise settings.refuse(name, "the scene has its own", "leave it out, or change the scene")
         return
     if "position" in given and "view" in given:
-        raise settings.refuse("view", "the camera has a position, too", "leave one of them out")
+        raise settings.refuse("view", "the camera also has a position", "leave one of them out")
     if "target" in given and "position" not in given:
-        raise settings.refuse("target", "the camera has no position", "give a position, too")
+        raise settings.refuse("target", "the camera has no position", "also give a position")
     if "triangles" in given and not (isinstance(settings.source, str) and settings.source == "teapot"):
         raise settings.refuse("triangles", "only the teapot is tessellated", "leave it out for a file")
     if settings.values.get("viewer") == "near" and settings["projection"] != "perspective":

@@ -83,7 +83,7 @@ class Turntable(Sequence[RenderedFrame]):
             If the name has another suffix, or the file cannot be written, or was read for the frames.
         """
         if Path(path).suffix.lower() != ".gif":
-            raise InputError(os.fspath(path), "the animation is a GIF", "let the name end in .gif")
+            raise InputError(os.fspath(path), "the animation is a GIF", "use a name that ends in .gif")
         with self.files.active(), tempfile.TemporaryDirectory(prefix="blysk-") as folder:
             check_writable(path)
             pictures = []

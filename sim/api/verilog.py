@@ -317,7 +317,7 @@ def verilog_and_unit(
     (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
     top, bus = _top_and_bus(chosen, top, bus)
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
-        raise OptionError("name", name, "no Verilog name", "use letters, digits and underscores")
+        raise OptionError("name", name, "not a Verilog name", "use letters, digits and underscores")
     try:
         check_name(name)
     except ValueError as error:
@@ -328,16 +328,18 @@ def verilog_and_unit(
     if setups > 1 and not hardware:
         raise OptionError("setups", str(setups), "spans need no triangle setup", "use top geometry or render")
     if hardware and pipes > 1:
-        raise OptionError("pipes", str(pipes), "triangles go to one pipeline", "leave it out, or use spans")
+        raise OptionError(
+            "pipes", str(pipes), "triangles go to one pipeline", "leave out pipes, or use spans"
+        )
     if merged and pipes == 1:
-        raise OptionError("merged", "", "one pipeline has one stream", "give pipes, too")
+        raise OptionError("merged", "", "one pipeline has one stream", "also give pipes")
     if pipes > 1 and bus != "native":
-        raise OptionError("pipes", str(pipes), f"a core on {bus} has one pipeline", "leave it out, or bus")
+        raise OptionError("pipes", str(pipes), f"a core on {bus} has one pipeline", "leave out pipes or bus")
     asked = ("geometry", chosen) if chosen == "hardware" else ("top", top)
     parameters = renderer_of(design, *asked) if hardware else design
     if coarse is not None:
         if top != "render":
-            raise OptionError("coarse", "", "it is of triangles to pixels", "give --top render, too")
+            raise OptionError("coarse", "", "it is of triangles to pixels", "also give --top render")
         size = checked({"coarse": coarse}, COARSE)["coarse"]
         parameters = replace(cast(Renderer, parameters), coarse=CoarseDepth(*size))
     if hardware or bus != "native":

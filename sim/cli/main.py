@@ -159,7 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 141
     except OSError as error:
         text = one_line(f"{error.filename or 'standard output'}: {error.strerror or error}")
-        print(f"blysk: {text}; free some space or send it elsewhere", file=sys.stderr)
+        print(f"blysk: {text}; free some space, or send the output elsewhere", file=sys.stderr)
         _give_up_output()
         return 2
 

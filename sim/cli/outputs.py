@@ -34,7 +34,7 @@ def check_outputs(
     for path in [*pictures, *others]:
         if path:
             if os.path.realpath(path) in seen:
-                raise InputError(path, "is another output, too", "choose another file")
+                raise InputError(path, "is also another output", "choose another file")
             seen.add(os.path.realpath(path))
             (check_image_path if path in pictures else check_writable)(path)
 
@@ -58,7 +58,7 @@ def animation_paths(output: str, count: int, others: Mapping[str, str | None]) -
     """
     for option, path in others.items():
         if path:
-            raise InputError(f"{option} {path}", "is for one frame", "leave it out, or --frames")
+            raise InputError(f"{option} {path}", "is for one frame", f"leave out {option} or --frames")
     stem, suffix = os.path.splitext(output)
     if suffix.lower() not in (".gif", ".png"):
         raise InputError(output, "the frames are PNG, the animation GIF", "use .gif or .png")

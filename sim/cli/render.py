@@ -26,8 +26,8 @@ def _described(lines: dict[str, str]) -> str:
 _KEYS = "\n".join(f"    {line}" for line in key_lines())
 _HELP = f"""Render MESH through the simulated pipeline.
 
-MESH is a file (OBJ, PLY, STL, GLB, glTF), or `teapot`, or a scene file (TOML) that names one beside
-camera, lights, material, size and method; options given here go before those of the file.
+MESH is a mesh file (OBJ, PLY, STL, GLB, glTF), the word `teapot`, or a scene file (TOML). A scene file
+names a mesh and sets camera, lights, material, size and method. Options given here override the scene file.
 
 \b
 Examples:
@@ -48,7 +48,7 @@ Models:
 {_described(MODEL_LINES)}
 
 \b
-Keys of a scene file, all but mesh.file optional:
+Keys of a scene file (only mesh.file is required):
 {_KEYS}
 """
 
@@ -62,34 +62,47 @@ Keys of a scene file, all but mesh.file optional:
     type=Choice("engine", get_args(Engine)),
     default="auto",
     show_default=True,
-    help="auto: compiled or, without a C++ compiler, pysim at a smaller size.",
+    help="cxxrtl is compiled; pysim is Amaranth's own. auto: cxxrtl, or without a C++ compiler pysim at a "
+    "smaller size.",
 )
 @click.option(
     "-o",
     "--output",
     type=OutputFile(),
-    help="Picture of the simulated frame.  [default: MESH's name, -blysk.png; none with --compare]",
+    help="Picture of the simulated frame.  [default: name of MESH with -blysk.png; none with --compare]",
 )
-@click.option("--compare", "comparison", type=OutputFile(), help="Picture: simulated, golden, error map.")
-@click.option("--json", "figures", type=OutputFile(), help="Every printed figure.")
+@click.option(
+    "--compare",
+    "comparison",
+    type=OutputFile(),
+    help="Picture with the simulated frame, the golden frame and the error map.",
+)
+@click.option("--json", "figures", type=OutputFile(), help="JSON file with every figure.")
 @options_of(RENDERING)
-@click.option("--vcd", type=OutputFile(), help="Waveforms; --engine pysim, by default 160x120 pixels.")
+@click.option(
+    "--vcd", type=OutputFile(), help="Waveforms of the engine pysim; the default size is then 160x120."
+)
 @click.option(
     "--frames",
     type=Whole(1, MAX_FRAMES),
-    help="Turntable: so many pictures, OUTPUT-0001.png and on, and OUTPUT.gif.",
+    help="Draw a turntable of this many frames: OUTPUT-0001.png and so on, and OUTPUT.gif.",
 )
-@click.option("--jobs", type=Whole(1, 1024), help="Processes that draw the frames.  [default: processors]")
 @click.option(
-    "--cluster", "address", metavar="ADDRESS", help="Dask scheduler whose workers draw them: tcp://host:8786."
+    "--jobs", type=Whole(1, 1024), help="Processes that draw the frames.  [default: number of cores]"
 )
-@click.option("-v", "--verbose", is_flag=True, help="Every figure, not the few that most need.")
+@click.option(
+    "--cluster",
+    "address",
+    metavar="ADDRESS",
+    help="Dask scheduler whose workers draw the frames: tcp://host:8786.",
+)
+@click.option("-v", "--verbose", is_flag=True, help="Print every figure, not only the main ones.")
 @click.pass_context
 def command(context, mesh, engine, output, comparison, figures, vcd, frames, jobs, address, verbose, **_):
     """Render a mesh or a scene file; `_HELP` is the text that users see."""
     start = perf_counter()
     if not Path(mesh).stem:
-        raise InputError(f"MESH {mesh!r}", "is no file's name", "give a mesh or scene file, or teapot")
+        raise InputError(f"MESH {mesh!r}", "is not a file name", "give a mesh file, a scene file, or teapot")
     given = given_options(context, {**SCENE, **DESIGN, **RENDERING})
     if vcd and engine == "cxxrtl":
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
@@ -111,7 +124,9 @@ def command(context, mesh, engine, output, comparison, figures, vcd, frames, job
         check_beside(path for path in (gif, *pictures) if path != output)
         written = {"frames": f"{pictures[0]} to {pictures[-1]}", "animation": gif}
     elif jobs or address is not None:
-        raise InputError("--jobs" if jobs else "--cluster", "is for many frames", "give --frames, too")
+        raise InputError(
+            "--jobs" if jobs else "--cluster", "is only for several frames", "also give --frames"
+        )
     else:
         check_outputs(inputs, pictures=[output, comparison], others=[figures, vcd])
         written = {"frame": output, "comparison": comparison}

@@ -34,14 +34,14 @@ __all__ = ["command"]
     "--testbench",
     metavar="DIR",
     type=click.Path(),
-    help="New or empty folder for the Verilog with a cocotb test bench, which needs nothing of blysk.",
+    help="New or empty folder for the Verilog and a cocotb test bench, which runs without blysk.",
 )
 @click.pass_context
 def command(context, name, output, testbench, geometry, pipes, merged, top, bus, setups, coarse, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
-    A test bench compares it with the pixels of a small frame, in Icarus Verilog or Verilator: pip install
-    cocotb, then python DIR/run.py. DIR/README.md tells the rest.
+    The test bench compares the Verilog with the pixels of a small frame, in Icarus Verilog or Verilator. Run
+    pip install cocotb, then python DIR/run.py. DIR/README.md explains the rest.
 
     \b
     Examples:
@@ -54,13 +54,15 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
     geometry = geometry or GEOMETRY["geometry"].default
     pipes = pipes or PIPES["pipes"].default
     if testbench is not None and pipes > 1 and not merged:
-        raise InputError("--testbench", "its bench takes one stream of pixels", "give --merged, too")
+        raise InputError("--testbench", "its bench takes one stream of pixels", "also give --merged")
     bus, setups = bus or PORTS["bus"].default, setups or SETUPS["setups"].default
     if testbench is not None and (bus != "native" or top not in (None, "shader")):
         wrong = f"--bus {bus}" if bus != "native" else f"--top {top}"
         raise InputError("--testbench", f"its bench drives the native shader, not {wrong}", "leave one out")
     if output and bus != "native" and not output.endswith(".v"):
-        raise InputError(f"-o {output}", "X.md, X.h and X.svd go beside X.v", "let the name end in .v")
+        raise InputError(
+            f"-o {output}", "X.md, X.h and X.svd are written beside X.v", "use a name that ends in .v"
+        )
     if testbench is not None and geometry == "hardware":
         raise InputError(
             "--testbench", "its bench sends spans, and hardware geometry takes triangles", "leave one out"

@@ -50,7 +50,7 @@ def _picture_format(path: str | os.PathLike) -> str:
     suffix = Path(path).suffix.lower()
     name = Image.registered_extensions().get(suffix)
     if name not in Image.SAVE or name not in {**_EXACT, **_LOSSY}:
-        reason = f"the suffix {suffix} is no picture format" if suffix else "the name has no suffix"
+        reason = f"the suffix {suffix} is not a picture format" if suffix else "the name has no suffix"
         if name in Image.SAVE:
             reason = f"{name} does not hold a frame as it is"
         raise InputError(str(path), reason, f"use {_COMMON}")

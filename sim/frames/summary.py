@@ -11,34 +11,34 @@ __all__ = ["animation_lines", "frame_lines", "short_lines", "specialisation_line
 
 _COUNTS = {
     "opposed_faces": "triangles with normals against their winding",
-    "repaired_normals": "stored normals repaired",
-    "dropped_faces": "faces without area dropped",
+    "repaired_normals": "stored normals that were repaired",
+    "dropped_faces": "faces without area, dropped",
     "degenerate_triangles": "triangles without area on the screen",
     "culled_triangles": COUNTER_TEXTS["culled"],
     "outside_triangles": "triangles outside the picture",
     "uncovered_triangles": "triangles that hold no pixel centre",
     "repaired_span_normals": "span ends whose normal was 0",
-    "clipped_triangles": "triangles cut by the near plane or at the ends of the grid",
+    "clipped_triangles": "triangles cut at the near plane or at the ends of the grid",
     "sliver_triangles": COUNTER_TEXTS["sliver"],
     "far_triangles": "triangles beyond 1,000 times the nearest W, where surfaces 0.1 % apart may swap",
-    "hidden_spans": "spans wholly hidden, left out",
-    "hidden_pixels": "pixels shaded behind what was drawn before",
+    "hidden_spans": "spans that are wholly hidden, left out",
+    "hidden_pixels": "pixels shaded behind earlier pixels",
     "dropped_pixels": COUNTER_TEXTS["dropped"],
     "cut_spans": "spans cut to the range of the method",
-    "missed_spans": "spans that this method misses by over 0.25 LSB",
-    "missed_pieces": "spans that this method misses by over 0.25 LSB, as lengths of their normals differ",
-    "short_normals": "spans with normals too short for the words, as W differs much, perhaps 0.25 LSB off",
+    "missed_spans": "spans over 0.25 LSB off with this method",
+    "missed_pieces": "spans over 0.25 LSB off with this method, as their normals differ in length",
+    "short_normals": "spans with normals too short for the words, as W differs much; perhaps 0.25 LSB off",
     "out_of_range_spans": COUNTER_TEXTS["out_of_range_spans"],
     "sharp_lobes": "lobes too sharp for this method's table, perhaps over 0.25 LSB off",
 }
 
 _REMEDIES = {
-    "opposed_faces": "--back-faces show takes their normals as they are; if they stay dark, export them anew",
-    "far_triangles": "leave out what is nearest, or use geometry software",
+    "opposed_faces": "--back-faces show takes their normals as they are; if they stay dark, export again",
+    "far_triangles": "leave out the nearest triangles, or use geometry software",
     "missed_spans": "use quotient or renormalise",
     "missed_pieces": "use geometry software, or smaller triangles",
     "short_normals": "use geometry software, or divide the triangles",
-    "out_of_range_spans": "pixels of theirs are wrong: use another method, or divide the triangles",
+    "out_of_range_spans": "their pixels are wrong: use another method, or divide the triangles",
     "sharp_lobes": "use method chord-local",
 }
 """What helps against a count; after a semicolon."""
@@ -72,9 +72,7 @@ def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("method", figures["method"])
     yield _line("engine", figures["engine"])
     if "geometry" in figures:
-        text = (
-            f"{figures['geometry']}, the last triangle taken in after {figures['triangle_cycles']:,} cycles"
-        )
+        text = f"{figures['geometry']}, took the last triangle after {figures['triangle_cycles']:,} cycles"
         yield _line("geometry", text)
     yield _line("triangles", f"{figures['triangles']:,}")
     yield _line("spans", f"{figures['spans']:,}")
@@ -136,7 +134,7 @@ def animation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("engine", f"{figures['engine']}, {figures['workers']}")
     yield _line("turntable", f"{figures['frame_count']:,} frames, {rate:.2f} a second")
     yield from _pixel_lines(figures)
-    yield _line("errors", "the worst of every frame")
+    yield _line("errors", "the worst of all frames")
     yield from _error_lines(figures)
     yield from _count_lines(figures["counts"])
     yield from _ignored_lines(figures)
@@ -157,7 +155,7 @@ def specialisation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         parts.append(f"{figures['cycles']:,} of {figures['full_cycles']:,} cycles")
     yield _line("specialised", ", ".join(parts))
     if "full_cycles" in figures:
-        text = "the frame is that of the full pipeline, to the bit"
+        text = "the frame equals that of the full pipeline, to the bit"
         if figures["different_pixels"]:
             text = (
                 f"{figures['different_pixels']:,} pixels differ from the full pipeline's, by at most "
@@ -208,7 +206,7 @@ def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
             f"{error['psnr_db']:>10.2f}   {reference_of(name, figures['target'])}"
         )
     method = figures["method_error"]
-    where = f"largest method error off the border of a light {method['steady_lsb']:.3f}"
+    where = f"largest method error away from the border of a light {method['steady_lsb']:.3f}"
     hypothesis = ", for spans from software" * (
         figures["bound_lsb"] is not None and "geometry" not in figures
     )

@@ -72,7 +72,7 @@ def gltf_document(data: bytes, suffix: str, found: Found) -> dict:
     except ValueError as error:
         raise Refused(f"its JSON is damaged ({error})") from error
     if not isinstance(document, dict):
-        raise Refused("its JSON is no glTF document")
+        raise Refused("its JSON is not a glTF document")
     asset = document.get("asset")
     asset = asset if isinstance(asset, dict) else {}
     # The first version has its parts by name, and before it was finished, no asset.

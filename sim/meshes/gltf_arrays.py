@@ -99,7 +99,7 @@ def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list
             try:
                 found = base64.b64decode(uri.partition("base64,")[2])
             except (binascii.Error, ValueError):
-                raise Refused(f"the text of its buffer {number} is no base64") from None
+                raise Refused(f"the text of its buffer {number} is not base64") from None
         else:
             found = _beside(folder, uri)
         if len(found) < length:
@@ -284,7 +284,9 @@ def _plain_primitive(primitive: dict, arrays: _Arrays, found: Found) -> dict:
         corners = arrays.corners(primitive)
     else:
         if any(accessors[index]["componentType"] != _FLOAT for index in given.values()):
-            raise Refused("its POSITION is compressed and quantised, too", "export it with one of both")
+            raise Refused(
+                "its POSITION is both compressed and quantised", "export it with only one of the two"
+            )
         decoded, corners = arrays.decoded(primitive)
         vectors = {
             name: decoded[name].astype(np.float64) if name in decoded else arrays.vectors(index, name)

@@ -207,7 +207,7 @@ def given_mesh(source: object, crease_angle: float = DEFAULT_CREASE) -> LoadedMe
             return _given(name, lambda: _assemble(scene, found, Path("trimesh"), b"", crease_angle))
     elif isinstance(source, list | tuple) and len(source) in (2, 3):
         return _given("the arrays of a mesh", lambda: _of_arrays(source, crease_angle))
-    raise InputError(f"a mesh of type {type(source).__name__}", "is none that can be drawn", GIVE_A_MESH)
+    raise InputError(f"a mesh of type {type(source).__name__}", "cannot be drawn", GIVE_A_MESH)
 
 
 def _given(name: str, load: Callable[[], LoadedMesh]) -> LoadedMesh:

@@ -130,7 +130,7 @@ def _indices(columns: _Columns) -> _List | None:
         return None
     indices = lists[name] if name else next(iter(lists.values()))
     if (indices.values != np.floor(indices.values)).any():
-        raise Refused("a face has an index that is no whole number")
+        raise Refused("a face has an index that is not a whole number")
     return _List(indices.values.astype(np.int64), indices.counts)
 
 
@@ -216,7 +216,7 @@ def _text(element: _Element, rows: list[bytes]) -> _Columns:
     try:
         flat = np.array([float(word) for row in words for word in row])
     except ValueError:
-        raise Refused(f"its {shown(element.name)} rows hold a word that is no number") from None
+        raise Refused(f"its {shown(element.name)} rows hold a word that is not a number") from None
     ends = np.cumsum(lengths)
     cursor = ends - lengths
     wrong = f"a row of its {shown(element.name)} has more or fewer numbers than it says"

@@ -87,7 +87,7 @@ def test_unwritable_paths(tmp_path):
     cases = {
         tmp_path / "no" / "a": f"cannot be written, there is no folder {tmp_path}/no; make the folder first",
         tmp_path: "cannot be written, it is a folder; give the name of a file",
-        tmp_path / "file" / "a": f"cannot be written, {tmp_path}/file is no folder; choose another folder",
+        tmp_path / "file" / "a": f"cannot be written, {tmp_path}/file is not a folder; choose another folder",
         tmp_path / ("x" * 300): "cannot be written, the name is too long; choose a shorter name",
     }
     for path, message in cases.items():

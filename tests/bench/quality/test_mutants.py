@@ -118,7 +118,7 @@ def test_mutants_are_killed():
 def test_bad_input_is_told_in_one_line(capsys, tmp_path):
     name = "blysk.bench.quality.mutants"
     for arguments, text in (
-        (["tea"], f"{name}: tea: is no unit; choose from "),
+        (["tea"], f"{name}: tea: is not a unit; choose from "),
         (["--count", "0"], f"{name}: "),
         (["diffuse", "--json", str(tmp_path)], f"{name}: {tmp_path}: cannot be written, it is a folder; "),
     ):

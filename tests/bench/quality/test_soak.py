@@ -183,7 +183,7 @@ def test_a_case_is_computed_once():
     ("arguments", "line"),
     [
         (["--pixels", "0"], "--pixels 0: out of range; give a whole number from 1 to 1000000000000\n"),
-        (["--unit", "nothing"], "nothing: is no unit"),
+        (["--unit", "nothing"], "nothing: is not a unit"),
     ],
 )
 def test_bad_input_is_told_in_one_line(arguments, line, capsys):

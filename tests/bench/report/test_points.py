@@ -472,4 +472,4 @@ def test_readme_table_of_no_report(tmp_path):
     for name in ("report.json", "none.json"):
         found = CliRunner().invoke(points._print, [str(tmp_path / name)])
         assert isinstance(found.exception, InputError)
-        assert "is no full report; give the report.json of `blysk bench`" in str(found.exception)
+        assert "is not a full report; give the report.json of `blysk bench`" in str(found.exception)

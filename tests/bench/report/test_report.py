@@ -140,7 +140,7 @@ def test_an_earlier_report_is_replaced(tmp_path, points_section, plain_section):
     tables = (f"{part.name}.csv" for part in points_section.parts if hasattr(part, "rows"))
     clash = next(name for name in tables if name not in other)
     (tmp_path / clash).write_text("kept")
-    with pytest.raises(InputError, match=f"{clash}: is of no report, and would be replaced; move it"):
+    with pytest.raises(InputError, match=f"{clash}: is not part of a report, and would be replaced; move it"):
         write_report(tmp_path, [points_section], ABOUT)
     assert (tmp_path / clash).read_text() == "kept"
 
@@ -264,7 +264,10 @@ def test_meshes_go_to_the_points(monkeypatch, tmp_path, plain_section):
         (["--jobs", "0"], "--jobs 0: out of range"),
         (["--cluster", "nowhere"], "--cluster nowhere: not the address of a Dask scheduler"),
         (["--cluster", "tcp://a:1", "--jobs", "2"], "--jobs: a cluster has its own workers"),
-        (["--cluster", "tcp://a:1", "--mesh", "a.obj"], "--mesh: the workers of a cluster have not the file"),
+        (
+            ["--cluster", "tcp://a:1", "--mesh", "a.obj"],
+            "--mesh: the workers of a cluster do not have the file",
+        ),
     ],
 )
 def test_bad_options(run, tmp_path, arguments, message):

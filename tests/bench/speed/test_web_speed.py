@@ -25,10 +25,10 @@ def test_help(capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["{0}/site"], "{0}/site: is no site; make one with `blysk web -o FOLDER`"),
+        (["{0}/site"], "{0}/site: is not a site; make one with `blysk web -o FOLDER`"),
         (
             ["{0}", "angular-exp", "angular-exq"],
-            "angular-exq: is no module of {0}; choose from angular-exp, linear-exp",
+            "angular-exq: is not a module of {0}; choose from angular-exp, linear-exp",
         ),
         (["{0}"], f"browser: playwright is not installed; {install_package('playwright')}"),
     ],

@@ -66,7 +66,7 @@ def pattern_on(board):
         ),
         (
             ["ulx3s-25f", "--toggles", "-o", "x"],
-            "--toggles: counts bits of a simulation; give --simulate N with it",
+            "--toggles: counts bits of a simulation; also give --simulate N",
         ),
         (
             ["ulx3s-25f", "--simulate", "1", "-o", "x", "--record", "no/x.json"],
@@ -202,7 +202,7 @@ def test_figures_are_no_json(capsys, tmp_path):
     path.write_text("[1]")
     assert main(["board", "ulx3s-25f", "--simulate", "1", "-o", "x", "--record", str(path)]) == 2
     assert capsys.readouterr().err.endswith(
-        "x.json: is no JSON file of figures; give --record another name\n"
+        "x.json: is not a JSON file of figures; choose another file for --record\n"
     )
     assert path.read_text() == "[1]"
 

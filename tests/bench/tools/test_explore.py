@@ -108,15 +108,15 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
     [
         (
             ["--methods", "angular,gouraud"],
-            "--methods angular,gouraud: 'gouraud' is none of the choices; use some of ",
+            "--methods angular,gouraud: 'gouraud' is not one of the choices; choose from ",
         ),
-        (["--models", ""], "--models : '' is none of the choices"),
-        (["--lights", "0"], "--lights 0: '0' is none of the choices; use some of 1,2,"),
-        (["--fraction-bits", "41"], "use some of 36,38,40,42,44,46"),
-        (["--degrees", "4"], "use some of 1,2,3"),
-        (["--operands", "sine"], "use some of cosine,one_minus_cosine"),
-        (["--largest-error", "0"], "--largest-error 0: no such error"),
-        (["--largest-error", "nan"], "--largest-error nan: no such error"),
+        (["--models", ""], "--models : '' is not one of the choices"),
+        (["--lights", "0"], "--lights 0: '0' is not one of the choices; choose from 1,2,"),
+        (["--fraction-bits", "41"], "choose from 36,38,40,42,44,46"),
+        (["--degrees", "4"], "choose from 1,2,3"),
+        (["--operands", "sine"], "choose from cosine,one_minus_cosine"),
+        (["--largest-error", "0"], "--largest-error 0: not an error limit"),
+        (["--largest-error", "nan"], "--largest-error nan: not an error limit"),
         (["--cost", "area"], "--cost area: unknown cost; use one of cells, multipliers, registers, memory"),
         (["--error", "model"], "--error model: unknown error; use one of arithmetic, method, total"),
         (["--size", "0x3"], "--size 0x3: out of range"),
@@ -161,7 +161,7 @@ def test_no_design_under_the_error_is_one_line(monkeypatch, tmp_path):
     assert isinstance(result.exception, InputError)
     assert str(result.exception) == (
         "--largest-error 1: no design of the sweep reaches it, the least is 2.25 LSB; "
-        "allow more, or sweep more"
+        "allow a larger error, or sweep more designs"
     )
     assert json.loads(path.read_text())["designs"]
     made_up(monkeypatch, out_of_range=True)

@@ -173,20 +173,29 @@ def test_designs():
     ("arguments", "line"),
     [
         (["--top", "render", "--pipes", "2"], "--pipes 2: triangles go to one pipeline"),
-        (["--by-unit", "--seeds", "2"], "--seeds: nothing is placed; leave it out, or --by-unit\n"),
-        (["--pipes", "3"], "--pipes 3: no such number; give one of 1, 2, 4, 8"),
-        (["--unit", "gpq", "--pipes", "2"], "--pipes: is for the pipeline; leave it out, or --unit"),
+        (["--by-unit", "--seeds", "2"], "--seeds: nothing is placed; leave it out, or leave out --by-unit\n"),
+        (["--pipes", "3"], "--pipes 3: not one of the choices; give one of 1, 2, 4, 8"),
+        (["--unit", "gpq", "--pipes", "2"], "--pipes: is for the pipeline; leave out --pipes or --unit"),
         (
             ["--setups", "2"],
-            "--setups 2: spans need no triangle setup; leave it out, or --top geometry",
+            "--setups 2: spans need no triangle setup; leave out --setups, or use --top geometry",
         ),
         (["--seeds", "0"], "--seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "--jobs no: not a whole number; give"),
         (["--unit", "fuse"], "--unit fuse: unknown unit; use attribute_serialiser, coarse_depth, "),
         (["--unit", "gpq x"], "--unit gpq x: unknown variant; use gpq\n"),
-        (["--unit", "gpq", "--method", "renormalise"], "--method: is for the pipeline; leave it out, or"),
-        (["--unit", "gpq", "--every-method"], "--every-method: is for the pipeline; leave it out"),
-        (["--method", "renormalise", "--every-method"], "--method: is one of every method; leave it out"),
+        (
+            ["--unit", "gpq", "--method", "renormalise"],
+            "--method: is for the pipeline; leave out --method or",
+        ),
+        (
+            ["--unit", "gpq", "--every-method"],
+            "--every-method: is for the pipeline; leave out --every-method or --unit",
+        ),
+        (
+            ["--method", "renormalise", "--every-method"],
+            "--method: every method is placed; leave out --method",
+        ),
         (["--family", "ice40"], "--family ice40: unknown family; use one of ecp5, nexus"),
         (["--method", "none"], "--method none: unknown method; use one of"),
         (

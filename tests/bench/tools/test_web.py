@@ -285,7 +285,7 @@ def test_report_in_the_site(tmp_path, work, results):
     (report / "report.json").write_text(
         json.dumps({"program": "blysk", "files": ["index.html", "report.json", "a.csv"]})
     )
-    with pytest.raises(InputError, match="is no report; make one with `blysk bench FOLDER`"):
+    with pytest.raises(InputError, match="is not a report; make one with `blysk bench FOLDER`"):
         web.write_site(tmp_path / "site", work, results, report)
     (report / "a.csv").write_text("1,2\n")
     web.write_site(tmp_path / "site", work, results, report)
@@ -412,7 +412,7 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
             ["--design", "quotient/cosquad"],
             "--design quotient/cosquad: unknown model; use one of blinn, ggx, phong",
         ),
-        (["--report", "nothing"], "--report nothing: is no report; make one with `blysk bench FOLDER`"),
+        (["--report", "nothing"], "--report nothing: is not a report; make one with `blysk bench FOLDER`"),
         (["-o", "no/site"], "no/site: cannot be written, there is no folder no; make the folder first"),
     ],
 )

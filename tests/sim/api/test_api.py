@@ -192,13 +192,13 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         ("teapot", {"size": 5}, "size 5: not a size; "),
         ("teapot", {"background": "red"}, "background 'red': not a colour; "),
         ("teapot", {"gate": 1}, "gate 1: neither true nor false; "),
-        ("teapot", {"up": (0, 0, 0)}, "up [0, 0, 0]: no direction; "),
+        ("teapot", {"up": (0, 0, 0)}, "up [0, 0, 0]: not a direction; "),
         ("teapot", {"lights": [{"position": 3}]}, "lights: [1].position, 3 is not three numbers; "),
         ("teapot", {"lights": [{}]}, "lights: [1].direction, is missing; "),
         (
             "teapot",
             {"position": (1, 2, 3), "view": (1, 2, 3)},
-            "view 1,2,3: the camera has a position, too; ",
+            "view 1,2,3: the camera also has a position; ",
         ),
         ("teapot", {"target": (1, 2, 3)}, "target 1,2,3: the camera has no position; "),
         (
@@ -212,7 +212,7 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
             "operand cosine: method angular finds no normals",
         ),
         ("teapot", {"viewer": "near"}, "method quotient: point lights and a near viewer need "),
-        ("teapot", {"pipes": 3}, "pipes 3: no such number; give one of 1, 2, 4, 8"),
+        ("teapot", {"pipes": 3}, "pipes 3: not one of the choices; give one of 1, 2, 4, 8"),
         ("teapot", {"pipes": 16}, "pipes 16: out of range; give one of 1, 2, 4, 8"),
         ("teapot", {"pipes": 8, "size": (40, 7)}, "pipes 8: the picture has 7 rows; give at most one for "),
         ("teapot", {"pipes": 2, "geometry": "hardware"}, "geometry hardware: triangles go to one pipeline; "),
@@ -240,7 +240,7 @@ def test_bad_input_is_one_line(source, options, line):
 def test_other_refusals(tmp_path):
     with pytest.raises(OptionError, match=r"^lights 17: out of range"):
         blysk.design(lights=17)
-    with pytest.raises(OptionError, match=r"^name 1up: no Verilog name"):
+    with pytest.raises(OptionError, match=r"^name 1up: not a Verilog name"):
         blysk.verilog(name="1up")
     with pytest.raises(OptionError, match=r"^pipes 4: triangles go to one pipeline"):
         blysk.verilog(geometry="hardware", pipes=4)
@@ -250,5 +250,7 @@ def test_other_refusals(tmp_path):
         blysk.design(shine=3)
     path = tmp_path / "a.toml"
     path.write_text("[mesh]\nfile = 'teapot'\n[camera]\nview = [1, 0, 0]\nposition = [1, 0, 0]\n")
-    with pytest.raises(blysk.InputError, match=re.escape(f"{path}, camera.view: the camera has a position")):
+    with pytest.raises(
+        blysk.InputError, match=re.escape(f"{path}, camera.view: the camera also has a position")
+    ):
         blysk.scene(path)

@@ -51,7 +51,7 @@ def test_ports_of_geometry_alone(method):
         (["--top", "cpu"], "--top cpu", "unknown core; use one of shader, geometry, render"),
         (["--top", "shader", "--geometry", "hardware"], "--top shader", "it takes spans"),
         (["--bus", "axi", "--pipes", "2"], "--pipes 2", "a core on axi has one pipeline"),
-        (["--bus", "axi", "-o", "core.txt"], "-o core.txt", "let the name end in .v"),
+        (["--bus", "axi", "-o", "core.txt"], "-o core.txt", "use a name that ends in .v"),
         (["--bus", "axi", "--testbench", "bench"], "--testbench", "not --bus axi"),
         (["--top", "render", "--method", "chord-local"], "--top render", "chord-local takes values"),
     ],

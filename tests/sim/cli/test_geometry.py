@@ -169,12 +169,12 @@ UNKNOWN = "use one of software, hardware"
         ((*RENDER, *HARDWARE, "--size", "4095x4095"), "--geometry hardware at 4095x4095", "2,097,152 pixels"),
         # The remedy is not one that is refused, too.
         ((*RENDER, *HARDWARE, "--short-words"), "--short-words", "leave it out"),
-        ((*RENDER, "--coarse"), "--coarse", "give geometry hardware, too"),
-        ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "give geometry hardware, too"),
+        ((*RENDER, "--coarse"), "--coarse", "also give geometry hardware"),
+        ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "also give geometry hardware"),
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
         # It would send spans.
         ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
-        ((*VERILOG, "--coarse", "64x48"), "--coarse", "give --top render, too"),
+        ((*VERILOG, "--coarse", "64x48"), "--coarse", "also give --top render"),
         ((*VERILOG, "--setups", "2"), "--setups 2", NO_SETUP + "use top geometry or render"),
         ((*VERILOG, "--setups", "3"), "--setups 3", "give one of 1, 2"),
     ],

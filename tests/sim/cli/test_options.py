@@ -18,7 +18,7 @@ def test_bad_mesh(refused):
     Path("a.obj").write_bytes(CORNERS + b"v nan 0 0\nf 1 2 4\n")
     refused("render", "a.obj", "-o", "out.png", "--json", "out.json", thing="a.obj", says="NaN or infinite")
     refused("render", "nowhere.obj", thing="nowhere.obj", says="there is no such file")
-    refused("render", "", thing="MESH ''", says="is no file's name")
+    refused("render", "", thing="MESH ''", says="is not a file name")
     refused("render", "/", thing="MESH '/'")
 
 
@@ -48,7 +48,7 @@ KNOWN_LOBES = f"use one of {', '.join(LOBES)}, "
         (["--triangles", "63"], "--triangles 63", "from 64 to 4000000"),
         (["--crease", "181"], "--crease 181", "0 to 180"),
         (["--crease", "sharp"], "--crease sharp", "not a number"),
-        (["--view", "0,0,0"], "--view 0,0,0", "no direction"),
+        (["--view", "0,0,0"], "--view 0,0,0", "not a direction"),
         (["--view", "1,2"], "--view 1,2", "not a direction; give X,Y,Z"),
         (["--view", "1,nan,2"], "--view 1,nan,2", "out of range"),
         (["--light", "0,0,0"], "--light 0,0,0", "a direction other than 0"),
@@ -65,8 +65,8 @@ KNOWN_LOBES = f"use one of {', '.join(LOBES)}, "
         (["--setup-interval", "0"], "--setup-interval 0", "from 1 to 46"),
         (["--frames", "0"], "--frames 0", "from 1 to 9999"),
         (["--frames", "2", "--jobs", "0"], "--jobs 0", "from 1 to 1024"),
-        (["--jobs", "2"], "--jobs", "give --frames, too"),
-        (["--cluster", ""], "--cluster", "give --frames, too"),
+        (["--jobs", "2"], "--jobs", "also give --frames"),
+        (["--cluster", ""], "--cluster", "also give --frames"),
         (["--frames", "2", "--cluster", ""], "--cluster ", "as tcp://host:8786"),
         (["--frames", "2", "--cluster", "a:1", "--jobs", "2"], "--jobs", "leave out --jobs or --cluster"),
         (["--frames", "2", "--compare", "a.png"], "--compare a.png", "is for one frame"),
@@ -150,7 +150,7 @@ def test_wrong_suffix_of_picture(refused):
 
 
 def test_output_over_the_mesh_or_another_output(refused):
-    says = "is another output, too; choose another file"
+    says = "is also another output; choose another file"
     refused("render", *TINY, "-o", "a.png", "--compare", "./a.png", thing="./a.png", says=says)
     refused("render", *TINY, "--json", "a", "--vcd", "a", thing="a", says=says)
     Path("link.png").symlink_to("a.png")

@@ -37,7 +37,7 @@ def test_specialised_pipeline_says_what_it_leaves_out(folder, capsys):
     assert re.search(
         r"^specialised +[\d,]+ of [\d,]+ cells, \d+ of \d+ multipliers, .* cycles$", output, re.M
     )
-    assert re.search(r"^ +the frame is that of the full pipeline, to the bit$", output, re.M)
+    assert re.search(r"^ +the frame equals that of the full pipeline, to the bit$", output, re.M)
     fit = json.loads(Path("a.json").read_text())["specialisation"]
     assert (fit["largest_difference"], fit["different_pixels"]) == (0, 0)
     for name, count in fit["specialised"].items():
@@ -143,8 +143,8 @@ def test_repairs_are_counted(capsys):
     output, _ = capsys.readouterr()
     counts = json.loads(Path("a.json").read_text())["counts"]
     assert (counts["repaired_normals"], counts["dropped_faces"]) == (2, 1)
-    assert re.search(r"^counted +stored normals repaired: 2$", output, re.MULTILINE)
-    assert re.search(r"^counted +faces without area dropped: 1$", output, re.MULTILINE)
+    assert re.search(r"^counted +stored normals that were repaired: 2$", output, re.MULTILINE)
+    assert re.search(r"^counted +faces without area, dropped: 1$", output, re.MULTILINE)
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ OVER_THE_CENTRE = "camera.position = [0, 9, 0]\ncamera.target = [0, 0, 0]"
     [
         ("mesh.file = 'no.obj'", [], "mesh.file", "no.obj, there is no such file"),
         ("mesh.file = 'b.toml'", [], "mesh.file", "unknown mesh type '.toml'"),
-        ("mesh.file = '.'", [], "mesh.file", "is no file's name"),
+        ("mesh.file = '.'", [], "mesh.file", "is not a file name"),
         ("mesh.file = 'empty.obj'", [], "mesh.file", "empty.obj, the file is empty"),
         ("mesh.file = 'teapot'\nexponent = 3", [], "exponent", "unknown key"),
         ("pipeline = {method = 'angular', operand = 'cosine'}", [], "pipeline.operand", "leave it out"),
@@ -181,7 +181,7 @@ def test_bad_options_of_a_scene(refused):
     refused("render", "a.toml", "--triangles", "100", thing="--triangles 100", says="leave it out")
     refused("render", "a.toml", "--json", "a.toml", thing="a.toml", says="is a file that this run reads")
     Path("a.toml").write_text("size = ]")
-    refused("render", "a.toml", thing="a.toml", says="is no TOML")
+    refused("render", "a.toml", thing="a.toml", says="is not TOML")
 
 
 @pytest.mark.long

@@ -77,9 +77,9 @@ def test_few_colours_come_back_from_gif(tmp_path):
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("a.xyz", "the suffix .xyz is no picture format"),
+        ("a.xyz", "the suffix .xyz is not a picture format"),
         ("a", "the name has no suffix"),
-        ("a.fli", "the suffix .fli is no picture format"),  # Pillow reads it only
+        ("a.fli", "the suffix .fli is not a picture format"),  # Pillow reads it only
     ],
 )
 def test_suffix(tmp_path, name, reason):

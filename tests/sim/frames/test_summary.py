@@ -85,7 +85,7 @@ def test_what_the_error_leaves_out_is_told(lines):
 def test_a_warning_has_number_reason_and_remedy():
     given = {**figures("blinn", "blinn"), "counts": {"missed_pieces": 1234, "sliver_triangles": 5}}
     noticed = [line for line in short_lines(given) if line.startswith("noticed")]
-    reason = "spans that this method misses by over 0.25 LSB, as lengths of their normals differ"
+    reason = "spans over 0.25 LSB off with this method, as their normals differ in length"
     remedy = "use geometry software, or smaller triangles"
     assert noticed == [f"noticed     {reason}: 1,234; {remedy}; see -v"]
     given["counts"]["out_of_range_spans"] = 7
