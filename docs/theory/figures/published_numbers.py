@@ -134,7 +134,7 @@ def _figure_sentences() -> list[str]:
     ratios = {claim.name: claim.published for claim in CLAIMS}
     return [
         f"f2 is off by {values['f2']['absolute']:.4f} at most, fQ2 by {values['fQ2']['absolute']:.4f}",
-        ", ".join(f"{name}: {value} times" for name, value in ratios.items()),
+        *(f"{name}: {value} times" for name, value in ratios.items()),
     ]
 
 
