@@ -89,7 +89,7 @@ MODEL_LINES: dict[str, str] = {
     **{lobe.name: f"{lobe.model.summary}, from a table" for lobe in LOBES.values()},
     **{name: unit.model.summary for name, unit in MODELS.items()},
     "blinn_product": f"{BLINN.summary}, by repeated squaring",
-    PHONG.name: f"{PHONG.summary}, from a table; of the method quotient",
+    PHONG.name: f"{PHONG.summary}, from a table; needs the method quotient",
 }
 """A line about each reflection model, for the help of the command line."""
 

@@ -115,7 +115,7 @@ def _operand_error(normaliser: AdaptiveNormaliser, beyond_45_degrees: bool) -> f
     return float(np.sqrt(3) * error + threshold + 2.0**-19 + 0.017 * (8.1 * threshold) ** 1.5)
 
 
-METHODS = {BisectionInterpolator(): "spans halved until straight lines will do"}
+METHODS = {BisectionInterpolator(): "spans halved until straight lines are exact enough"}
 """The method of this module, and a line about it."""
 
 PUBLISHED = {

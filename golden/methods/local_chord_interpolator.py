@@ -331,6 +331,6 @@ class LocalChordInterpolator(Interpolator):
 
 
 METHODS = {
-    LocalChordInterpolator(): "no normals: 1 - N.H is nearly a quadratic; for point lights, a near viewer"
+    LocalChordInterpolator(): "no normals: N.L and 1 - N.H as quadratics; for point lights, a near viewer"
 }
 """The method of this module, and a line about it."""

@@ -110,7 +110,5 @@ class RenormaliseInterpolator(NormalInterpolator):
         return normals, np.bincount(span, too_short, len(length)) > 0
 
 
-METHODS = {
-    RenormaliseInterpolator(): "the true line between normals, each divided by its length; hardly ever cut"
-}
+METHODS = {RenormaliseInterpolator(): "the true line of normals, each divided by its length; rarely cut"}
 """The method of this module, and a line about it."""

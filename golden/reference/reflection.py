@@ -333,17 +333,17 @@ REFLECTION_MODELS: dict[str, ReflectionModel] = {
         PHONG,
         BLINN,
         COSQUAD,
-        PolynomialModel("cosquad7", "[T] figure 3.7", "the same with the slope 7/16 n", a=7 / 16),
+        PolynomialModel("cosquad7", "[T] figure 3.7", "cosquad with the slope 7/16 n", a=7 / 16),
         PolynomialModel(
             "cosquad_q",
             "[C]",
-            "the same with the slope that meets Blinn's power exactly at a level",
+            "cosquad with the slope that meets Blinn's power exactly at one level",
             curve=_level_slope,
         ),
         PolynomialModel(
             "cosquad_lin",
             "[C]",
-            "the same with a slope that is a line in n, as printed",
+            "cosquad with a slope linear in n, as printed",
             lambda n: 0.214 * (0.807 + n),
             a=0.448,
             b=0.099,
@@ -352,7 +352,7 @@ REFLECTION_MODELS: dict[str, ReflectionModel] = {
         PolynomialModel(
             "cosquad_lin_refitted",
             "own fit",
-            "the same with a line fitted to that of cosquad_q",
+            "cosquad with a slope linear in n, fitted to cosquad_q",
             a=0.44813,
             b=0.10235,
         ),
@@ -367,10 +367,20 @@ REFLECTION_MODELS: dict[str, ReflectionModel] = {
             b=0.2457,
         ),
         PolynomialModel(
-            "lyon2_refitted", "own fit", "a fourth power, fitted", a=0.2113, b=0.1468, squarings=2
+            "lyon2_refitted",
+            "own fit",
+            "a fourth power of a line in N.H, fitted",
+            a=0.2113,
+            b=0.1468,
+            squarings=2,
         ),
         PolynomialModel(
-            "lyon3_refitted", "own fit", "an eighth power, fitted", a=0.1150, b=0.0799, squarings=3
+            "lyon3_refitted",
+            "own fit",
+            "an eighth power of a line in N.H, fitted",
+            a=0.1150,
+            b=0.0799,
+            squarings=3,
         ),
         AngleCosine("coscos2", "[T] 3.1", "a squared cosine of a multiple of the angle"),
         AngleCosine("coscos4", "[T] 3.1", "a fourth power of a cosine of a multiple of the angle", power=4),
@@ -387,7 +397,7 @@ REFLECTION_MODELS: dict[str, ReflectionModel] = {
             power=4,
             rule="integral",
         ),
-        Exponential("exp", "own", "exp(-n (1 - N.H)), to which Blinn's power tends"),
+        Exponential("exp", "own", "exp(-n (1 - N.H)), the limit of Blinn's power"),
     )
 }
 """Every reflection model, by name; the only place of their coefficients."""
