@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image
 
 from blysk.bench.accuracy import scene_for
+from blysk.bench.surfaces import sphere
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
@@ -36,7 +36,6 @@ __all__ = [
     "map_of_errors",
     "pictures",
     "slopes",
-    "sphere",
 ]
 
 
@@ -237,18 +236,6 @@ def map_of_errors(model: str, size: int) -> dict[str, Any]:
         "exponents": exponents.tolist(),
         "error": np.round(error, 5).tolist(),
     }
-
-
-def sphere(segments: int) -> Mesh:
-    """A sphere of radius 1 with exact normals, of ``2 segments`` by ``segments`` quadrilaterals."""
-    height, around = np.meshgrid(
-        np.linspace(0, np.pi, segments + 1), np.linspace(0, 2 * np.pi, 2 * segments + 1), indexing="ij"
-    )
-    points = np.stack([np.sin(height) * np.sin(around), np.cos(height), np.sin(height) * np.cos(around)], -1)
-    index = np.arange(height.size).reshape(height.shape)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    points = points.reshape(-1, 3)
-    return Mesh(points, np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3), normalise(points))
 
 
 def pictures(body: str, exponent: int, width: int, height: int) -> dict[str, Any]:

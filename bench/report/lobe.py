@@ -14,9 +14,9 @@ import numpy as np
 from blysk.bench.accuracy import scene_for
 from blysk.bench.colors import style_of
 from blysk.bench.labels import Label, place_labels
-from blysk.bench.report.cosine_quadratic_figures import sphere
 from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.store import Task
+from blysk.bench.surfaces import grid, sphere
 from blysk.bench.svg import panels, svg
 from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame
@@ -172,10 +172,7 @@ def mesh_of(name: str) -> Mesh:
         points = np.stack([x, height, -z], -1)
         normals = np.stack([-slope, np.ones_like(x), -0.9 * np.sin(7 * x) * np.sin(6 * z)], -1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    index = np.arange(around.size).reshape(around.shape)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
-    return Mesh(points.reshape(-1, 3), faces, normals.reshape(-1, 3))
+    return grid(points, normals)
 
 
 def frame_errors(

@@ -12,9 +12,9 @@ from PIL import Image
 from scipy.optimize import brentq
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.cosine_quadratic_figures import sphere
 from blysk.bench.report.placed import placed
 from blysk.bench.report.section import Drawing, Table
+from blysk.bench.surfaces import sphere
 from blysk.bench.svg import panels, svg
 from blysk.bench.tools.families import DEVICE
 from blysk.golden.frames.compare import compare

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from blysk.bench import accuracy
-from blysk.bench.report.cosine_quadratic_figures import sphere
+from blysk.bench.surfaces import sphere
 from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import (
     FIELDS_OF_A_FRAME,

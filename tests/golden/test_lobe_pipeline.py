@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.cosine_quadratic_figures import sphere
+from blysk.bench.surfaces import sphere
 from blysk.golden.frame_constants import (
     BANK_ADDRESS,
     LOBE_ADDRESS,

@@ -9,9 +9,9 @@ import numpy as np
 from markdown import table
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.cosine_quadratic_figures import sphere
 from blysk.bench.report.errata import ERRATA
 from blysk.bench.report.lobe import CASES, errors_of_size
+from blysk.bench.surfaces import sphere
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.compare import compare_image
 from blysk.golden.frames.frame import model_frame

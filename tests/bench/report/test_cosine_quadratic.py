@@ -20,7 +20,6 @@ from blysk.bench.report.cosine_quadratic_figures import (
     map_of_errors,
     pictures,
     slopes,
-    sphere,
 )
 
 
@@ -112,18 +111,6 @@ def test_map_of_errors():
     for n, row in zip(found["exponents"], found["error"], strict=True):
         expected = [fq2(g, n) - math.cos(g) ** n for g in np.radians(found["degrees"])]
         assert row == pytest.approx(expected, abs=1e-5)
-
-
-def test_sphere():
-    """Closed, of unit radius, faces anticlockwise from outside, and as large as a sphere but for chords."""
-    mesh = sphere(24)
-    np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1)
-    np.testing.assert_allclose(mesh.normals, mesh.vertices, atol=1e-15)
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    across = np.cross(b - a, c - a)
-    assert (np.einsum("ij,ij->i", across, a + b + c) >= -1e-12).all()
-    assert np.linalg.norm(across, axis=1).sum() / 2 == pytest.approx(4 * math.pi, rel=0.01)
-    assert np.einsum("ij,ij->i", across, a).sum() / 6 == pytest.approx(4 / 3 * math.pi, rel=0.01)
 
 
 def test_pictures():
