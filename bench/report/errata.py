@@ -1,47 +1,34 @@
-"""The report's section on errata: the documents' statements, what comes out, and computed evidence."""
+"""Errata of the documents: statements that do not come out, or that our units replace, with evidence."""
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
-from blysk.bench.report.cosine_quadratic_figures import ZONE
-from blysk.bench.report.errata_evidence import (
-    Evidence,
-    arccos_at_one,
-    arccos_claim,
-    energy,
-    extrapolated_end,
-    factor_claim,
-    flat_picture,
-    held_root,
-    inverted_test,
-    mirror,
-    misprint,
-    octaves,
-    order,
-    quadratic_length,
-    recurrence,
-    root_claim,
-    root_least,
-    scaled_in_place,
-    second_lobe,
-    shortcut,
-    undefined_zone,
-    worked_example,
-    wrong_variable,
-    zone_bounds,
-)
-from blysk.bench.report.section import Section, Table
-from blysk.bench.store import Task
+import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import linprog
+
+from blysk.bench.accuracy import scene_for
+from blysk.bench.report.claims import Claim, ClaimTable, Document
+from blysk.bench.report.cosine_quadratic import ZONE
+from blysk.golden.cosines.arccos import PUBLISHED_COEFFICIENTS, SEGMENT_BOUNDS, Arccos
+from blysk.golden.cosines.recurrence import Recurrence, shortcut_cosine
+from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax, reciprocal_root
+from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.lighting import Light, Material, intensity
+from blysk.golden.reference.metrics import mnse_published, nmse
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.renderer import Thresholds, gouraud_triangles
+from blysk.sim.meshes.teapot import teapot
 
 __all__ = [
-    "ERRATA",
+    "CLAIMS",
+    "FACTOR_PUBLISHED",
     "KINDS",
-    "OWN",
-    "Erratum",
-    "Unmatched",
-    "evidence",
+    "ROOT_PUBLISHED",
+    "chebyshev",
+    "factor_quadratics",
     "matters",
+    "second_lobe",
     "section",
     "tasks",
 ]
@@ -56,348 +43,449 @@ KINDS = {
 }
 """What an entry is, and what it is not."""
 
+ROOT_PUBLISHED = {1: (0.64, -0.07), 2: (0.681, -0.119, 0.014)}
+"""[T] 2.1: ``1/sqrt(2 + z)`` in ascending powers of z, by degree."""
 
-@dataclass(frozen=True)
-class Erratum:
-    """A statement of a document that does not come out, or that the units replace; and evidence.
+FACTOR_PUBLISHED = (0.707, -0.341, 0.193, -0.059)
+"""[T] 2.2: ``h(r) = 1/sqrt(2 (1 + r))`` in ascending powers of r."""
 
-    Parameters
-    ----------
-    place : str
-        Document and place.
-    kind : str
-        One of `KINDS`.
-    published, right : str
-        The published statement, and what comes out or replaces it.
-    quantity : str
-        Name of the computed quantity, with its unit.
-    evidence : callable
-        Computes the quantity twice: by the published and by the right statement.
-    matter : str, optional
-        What entries about the same matter share; an entry without is a matter of its own.
+_ROOT_DOMAIN = (math.sqrt(2), 2.0)
+
+Pair = tuple[float, float]
+"""A quantity by the document's statement, and as it comes out."""
+
+
+def _by_cosine(r: np.ndarray) -> np.ndarray:
+    return half_angle_factor(1 - r)
+
+
+def _row_error(coefficients: Sequence[float], x: np.ndarray) -> float:
+    found = np.polynomial.polynomial.polyval(x, coefficients)
+    return float(np.abs(found - np.arccos(x)).max())
+
+
+def misprint() -> Pair:
+    """Error in rad of the last row of the arccos table at x = 0.96: as published, and corrected."""
+    return tuple(_row_error(Arccos(table).coefficients[4], 0.96) for table in ("as_published", "corrected"))
+
+
+def order() -> Pair:
+    """Largest error in rad of the first row of the arccos table: coefficients read downwards, and upwards."""
+    x = np.linspace(0, 0.5, 501)
+    return _row_error(PUBLISHED_COEFFICIENTS[0][::-1], x), _row_error(PUBLISHED_COEFFICIENTS[0], x)
+
+
+def arccos_rows() -> float:
+    """Largest relative error of the first four rows of the arccos table."""
+    return max(
+        largest_error(np.arccos, PUBLISHED_COEFFICIENTS[k], *SEGMENT_BOUNDS[k : k + 2])[1] for k in range(4)
+    )
+
+
+def arccos_at_one() -> Pair:
+    """Largest error in rad near x = 1: of a quadratic in x, and of a quadratic times the root of 1 - x."""
+    x = 1 - np.geomspace(1e-12, 0.04, 4001)
+    error = np.polynomial.polynomial.polyval(x, Arccos("corrected").coefficients[4]) - np.arccos(x)
+    # The well-posed form, over the same x.
+    root = np.sqrt(1 - x) * np.polynomial.polynomial.polyval(x, [1.5702117, -0.20212057, 0.04670706])
+    return float(np.abs(error).max()), float(np.abs(root - np.arccos(x)).max())
+
+
+def root_error(degree: int, relative: bool) -> float:
+    """Largest absolute or relative error of the published polynomial for ``1/sqrt(2 + z)``."""
+    return largest_error(reciprocal_root, np.array(ROOT_PUBLISHED[degree]), *_ROOT_DOMAIN)[relative]
+
+
+def root_least() -> float:
+    """Least largest error of a line for ``1/sqrt(2 + z)``."""
+    line = minimax(reciprocal_root, *_ROOT_DOMAIN, 1)
+    return largest_error(reciprocal_root, line, *_ROOT_DOMAIN)[0]
+
+
+def chebyshev(
+    function: Callable[[np.ndarray], np.ndarray], low: float, high: float, degree: int
+) -> np.ndarray:
+    """Coefficients, in ascending order, of the polynomial through the values at Chebyshev's nodes."""
+    fit = np.polynomial.Chebyshev.interpolate(function, degree, [low, high])
+    return fit.convert(kind=np.polynomial.Polynomial).coef
+
+
+def factor_quadratics() -> dict[str, tuple[float, float]]:
+    """Largest absolute and relative error of three quadratics for the factor of the middle normal.
+
+    ``"nodes"``: through the values at Chebyshev's nodes; ``"relative"``: of the least largest relative error;
+    ``"within"``: the same among those with an absolute error of 0.002 at most.
     """
-
-    place: str
-    kind: str
-    published: str
-    right: str
-    quantity: str
-    evidence: Callable[[], Evidence]
-    matter: str = ""
-
-
-@dataclass(frozen=True)
-class Unmatched:
-    """A figure stated for the project that cannot be reproduced, or not to all of its digits.
-
-    Parameters
-    ----------
-    what : str
-        The figure.
-    stated : str
-        The figure as stated.
-    found : str
-        The finding, in words.
-    values : callable
-        Computes the figure as stated, and another that explains it.
-    """
-
-    what: str
-    stated: str
-    found: str
-    values: Callable[[], Evidence]
+    x = (1 - np.cos(np.linspace(0, np.pi, 4001))) / 2
+    exact = _by_cosine(x)
+    powers = np.vander(x, 3, increasing=True)
+    relative = powers / exact[:, np.newaxis]
+    found = {"nodes": chebyshev(_by_cosine, 0, 1, 2)}
+    for name, limit in (("relative", 1.0), ("within", 0.002)):
+        one, none = np.ones((len(x), 1)), np.zeros((len(x), 1))
+        fit = linprog(
+            [0, 0, 0, 1],
+            A_ub=np.block([[relative, -one], [-relative, -one], [powers, none], [-powers, none]]),
+            b_ub=np.concatenate([one[:, 0], -one[:, 0], exact + limit, limit - exact]),
+            bounds=[(None, None)] * 4,
+        )
+        found[name] = fit.x[:3]
+    return {name: largest_error(_by_cosine, fit, 0, 1) for name, fit in found.items()}
 
 
-ERRATA = {
-    "arccos-misprint": Erratum(
+def factor_error() -> float:
+    """Largest error of the published factor of the middle normal."""
+    return largest_error(_by_cosine, np.array(FACTOR_PUBLISHED), 0, 1)[0]
+
+
+def second_lobe() -> Pair:
+    """Term at 60 degrees and n = 20: of the parabola alone, and with the comparator."""
+    cosine = math.cos(math.radians(60))
+    return (20 / 2 * (cosine - 1) + 1) ** 2, float(REFLECTION_MODELS["cosquad"].reflect(cosine, 20))
+
+
+def shortcut(degrees: float) -> Pair:
+    """Ratio of ``1 - cos d`` by the published shortcut to the exact value, for a span's angle; and 1."""
+    angle, steps = math.radians(degrees), 1000
+    exact = 2 * math.sin(angle / steps / 2) ** 2
+    return float((1 - shortcut_cosine(angle, steps)) / exact), 1.0
+
+
+def recurrence(pixels: int, degrees: float, bits: int) -> Pair:
+    """Worst error of a recurrence over a span, with its peak at 0.79: as drawn, and in Reinsch's form."""
+    angle = math.radians(degrees)
+    step = angle / (pixels - 1)
+    exact = np.cos(0.79 * angle - step * np.arange(pixels))
+    worst = []
+    for form in ("direct", "reinsch"):
+        unit = Recurrence(form, fraction_bits=bits, guard_bits=20)
+        one = np.ones(1)
+        coefficient, shift = unit.coefficient(step * one)
+        states = unit.states(*unit.start(one, 0.79 * angle * one, step * one), coefficient, shift, pixels)
+        found = states.values[:, 0]
+        worst.append(float(np.abs(found - exact).max()))
+    return worst[0], worst[1]
+
+
+def worked_example() -> float:
+    """[B] 5 at ``N = V = (0, 0, 1)``, ``L = (1, 1, 1)/sqrt 3``, n = 10, in one channel."""
+    axis = np.array([0.0, 0, 1])
+    # I_d = 0.8 and I_s = 1: two lights, one without a highlight and one that is nothing else.
+    dull = Material((0.1,) * 3, (0.7,) * 3, (0,) * 3, 10)
+    glossy = Material((0,) * 3, (0,) * 3, (0.5,) * 3, 10)
+    total = intensity(
+        axis, dull, [Light((1, 1, 1), (0.8,) * 3)], (0.2,) * 3, axis, REFLECTION_MODELS["phong"]
+    )
+    total = total + intensity(axis, glossy, [Light((1, 1, 1))], (0, 0, 0), axis, REFLECTION_MODELS["phong"])
+    return float(total[0])
+
+
+def flat_picture() -> Pair:
+    """Share of the values of a flat picture where MNSE as published is defined; whether NMSE is."""
+    reference = np.full((8, 8), 100.0)
+    reference[0, 0] = 200
+    reference[0, 1] = 0
+    image = reference + 1
+    # The mean is 100: all but two values are at it.
+    return mnse_published(image, reference)[1], float(np.isfinite(nmse(image, reference)))
+
+
+def inverted_test() -> Pair:
+    """Share of triangles of a teapot that take Gouraud shading: by the test as published, and inverted."""
+    scene = scene_for(teapot(1_000), 50, 160, 120)
+    every = len(scene.mesh.faces)
+    # Highlight and diffuse tests aside, which the inversion does not touch.
+    close = int(gouraud_triangles(scene, Thresholds(highlight=math.inf, diffuse=math.inf)).sum())
+    return (every - close) / every, close / every
+
+
+def extrapolated_end() -> Pair:
+    """Error of the last normal of a span of 10 degrees and 6 pixels, by [T] appendix Г and with N_l added."""
+    angle, pixels = math.radians(10), 6
+    left, right = np.array([0.0, 0, 1]), np.array([math.sin(angle), 0, math.cos(angle)])
+    power = 1 << (pixels - 2).bit_length()
+    published, right_end = (start + power / (pixels - 1) * (right - left) for start in (np.zeros(3), left))
+    return tuple(
+        float(np.linalg.norm(normalise((1 - t) * left + t * end) - right))
+        for end in (published, right_end)
+        for t in [(pixels - 1) / power]
+    )
+
+
+def scaled_in_place() -> Pair:
+    """Error of the last normal of the same span: with ``dN`` itself times i/5 at each pixel i, and a copy."""
+    angle, pixels = math.radians(10), 6
+    left, right = np.array([0.0, 0, 1]), np.array([math.sin(angle), 0, math.cos(angle)])
+    shares = np.arange(pixels) / (pixels - 1)
+    return tuple(
+        float(np.linalg.norm(left + scale * (right - left) - right)) for scale in (shares.prod(), shares[-1])
+    )
+
+
+def wrong_variable() -> Pair:
+    """Largest error of ``P0 x + P1 y + P2`` at three corners: with ``P1 x`` for ``P1 y``, and right."""
+    corners = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
+    values = np.array([0.2, 0.4, 0.9])
+    plane = np.linalg.solve(corners, values)
+    wrong = plane[0] * corners[:, 0] + plane[1] * corners[:, 0] + plane[2]
+    return tuple(float(np.abs(found - values).max()) for found in (wrong, corners @ plane))
+
+
+def energy(model: str, exponent: int) -> Pair:
+    """Reflected energy, ideally 1: with the published energy factor, and with the right one."""
+    half = 2 if model == "blinn" else 1
+    reflected = quad(
+        lambda t: math.cos(t / half) ** exponent * math.cos(t) * math.sin(t), 0, math.pi / 2, epsabs=1e-13
+    )[0]
+    n = exponent
+    published = {"phong": (n + 2) / (2 * n), "blinn": (n + 2) * (n + 4) / (8 * n * (2 ** (n / 2) + n))}
+    return tuple(
+        2 * math.pi * factor * reflected
+        for factor in (published[model], REFLECTION_MODELS[model].energy_factor(n))
+    )
+
+
+def mirror() -> Pair:
+    """Length of R for L at 54.7 degrees: by vector products, as published, and by scalar products."""
+    normal, light = np.array([0.0, 0, 1]), normalise(np.array([1.0, 1, 1]))
+    published = 2 * np.cross(np.cross(light, normal), normal) - light
+    right = 2 * (light @ normal) * normal - light
+    return float(np.linalg.norm(published)), float(np.linalg.norm(right))
+
+
+def zone_error() -> float:
+    """Largest relative error of f2 where Blinn's model is at least `ZONE`, for n from 2 to 1000."""
+    exponents = np.arange(2, 1001)
+    base = exponents / 2 * np.expm1(math.log(ZONE) / exponents) + 1
+    return float(np.max(1 - base**2 / ZONE))
+
+
+CLAIMS = (
+    Claim(
         "[T] table 3.1, last row",
-        "slip",
         "74.547",
-        "74.457",
         "error of the polynomial at x = 0.96, rad",
         misprint,
+        ours="74.457",
+        kind="slip",
     ),
-    "arccos-order": Erratum(
+    Claim(
         "[T] table 3.1, columns A, B, C",
-        "unclear",
         "columns A, B, C, which A x^2 + B x + C would fit, too",
-        "A + B x + C x^2",
         "largest error on [0, 0.5], rad",
         order,
+        ours="A + B x + C x^2",
+        kind="unclear",
     ),
-    "arccos-claim": Erratum(
+    Claim(
         "[T] table 3.1, error",
-        "figure",
         "0.2 %, read as that of every row",
-        "more on [0.75, 0.96], by its own digits",
         "largest relative error on [0, 0.96]",
-        arccos_claim,
+        arccos_rows,
+        printed="0.002",
+        ours="more on [0.75, 0.96], by its own digits",
+        kind="figure",
     ),
-    "arccos-one": Erratum(
+    Claim(
         "[T] 3.2",
-        "form",
         "a quadratic on [0.96, 1]",
-        "sqrt(1 - x) times a polynomial, or the half chord: arccos has a root's slope at 1",
         "largest error on [0.96, 1], corrected, rad",
         arccos_at_one,
+        ours="sqrt(1 - x) times a polynomial, or the half chord: arccos has a root's slope at 1",
+        kind="form",
     ),
-    "root-1": Erratum(
+    Claim(
         "[T] 2.1, degree 1",
-        "figure",
         "0.64 - 0.07 z: 0.12 %",
-        "0.12 % is that of the coefficients before they were rounded",
         "largest relative error on [sqrt 2, 2]",
-        lambda: root_claim(1, 0.0012, relative=True),
-        "digits-2.1",
+        root_error,
+        {"degree": 1, "relative": True},
+        printed="0.0012",
+        ours="0.12 % is that of the coefficients before they were rounded",
+        kind="figure",
+        matter="digits-2.1",
     ),
-    "root-1-least": Erratum(
+    Claim(
         "[T] 2.1, degree 1",
-        "figure",
         "0.0005",
-        "no line has less than 6.1e-4",
         "largest error on [sqrt 2, 2]",
         root_least,
-        "digits-2.1",
+        printed="0.0005",
+        ours="no line has less than 6.1e-4",
+        kind="figure",
+        matter="digits-2.1",
     ),
-    "root-2": Erratum(
+    Claim(
         "[T] 2.1, degree 2",
-        "figure",
         "0.014 z^2 - 0.119 z + 0.681: 2e-5, 0.004 %",
-        "both are those of the coefficients before they were rounded",
         "largest error on [sqrt 2, 2]",
-        lambda: root_claim(2, 2e-5),
-        "digits-2.1",
+        root_error,
+        {"degree": 2, "relative": False},
+        printed="0.00002",
+        ours="both are those of the coefficients before they were rounded",
+        kind="figure",
+        matter="digits-2.1",
     ),
-    "factor-3": Erratum(
+    Claim(
         "[T] 2.2, h of degree 3",
-        "figure",
         "0.00038, 0.054 %",
-        "both are those of the coefficients before they were rounded",
         "largest error, r from 0 to 1",
-        factor_claim,
+        factor_error,
+        printed="0.00038",
+        ours="both are those of the coefficients before they were rounded",
+        kind="figure",
     ),
-    "second-lobe": Erratum(
+    Claim(
         "[T] figure 3.6",
-        "slip",
         "the comparator is behind the square",
-        "compare the base, before it is squared",
         "highlight at n = 20, gamma = 60 degrees",
         second_lobe,
+        ours="compare the base, before it is squared",
+        kind="slip",
     ),
-    "shortcut-10": Erratum(
-        "[T] 3.3",
-        "form",
-        "cos(psi/m) = (cos psi - 1)/m^2 + 1, near for small psi",
-        "4 sin^2(psi/2m)/2 for 1 - cos(psi/m)",
-        "1 - cos(psi/m) over the exact one, psi = 10 degrees",
-        lambda: shortcut(10),
-        "shortcut",
+    *(
+        Claim(
+            "[T] 3.3",
+            "cos(psi/m) = (cos psi - 1)/m^2 + 1, near for small psi",
+            f"1 - cos(psi/m) over the exact one, psi = {degrees} degrees",
+            shortcut,
+            {"degrees": degrees},
+            ours="4 sin^2(psi/2m)/2 for 1 - cos(psi/m)",
+            kind="form",
+            matter="shortcut",
+        )
+        for degrees in (10, 60)
     ),
-    "shortcut-60": Erratum(
-        "[T] 3.3",
-        "form",
-        "cos(psi/m) = (cos psi - 1)/m^2 + 1, near for small psi",
-        "4 sin^2(psi/2m)/2 for 1 - cos(psi/m)",
-        "1 - cos(psi/m) over the exact one, psi = 60 degrees",
-        lambda: shortcut(60),
-        "shortcut",
+    *(
+        Claim(
+            "[T] figure 3.5",
+            "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
+            f"worst error: {pixels} pixels, {degrees} degrees, {bits} fraction bits",
+            recurrence,
+            {"pixels": pixels, "degrees": degrees, "bits": bits},
+            ours="Reinsch's form",
+            kind="form",
+            matter="recurrence",
+        )
+        for pixels, degrees, bits in ((64, 10, 16), (256, 60, 16), (4095, 60, 24))
     ),
-    "recurrence-64": Erratum(
-        "[T] figure 3.5",
-        "form",
-        "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
-        "Reinsch's form",
-        "worst error: 64 pixels, 10 degrees, 16 fraction bits",
-        lambda: recurrence(64, 10, 16),
-        "recurrence",
-    ),
-    "recurrence-256": Erratum(
-        "[T] figure 3.5",
-        "form",
-        "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
-        "Reinsch's form",
-        "worst error: 256 pixels, 60 degrees, 16 fraction bits",
-        lambda: recurrence(256, 60, 16),
-        "recurrence",
-    ),
-    "recurrence-4095": Erratum(
-        "[T] figure 3.5",
-        "form",
-        "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
-        "Reinsch's form",
-        "worst error: 4095 pixels, 60 degrees, 24 fraction bits",
-        lambda: recurrence(4095, 60, 24),
-        "recurrence",
-    ),
-    "worked-example": Erratum(
+    Claim(
         "[T] 4.1, worked example",
-        "slip",
         "0.3445, with 0.0015 for the highlight, as 0.577^10 = 0.003 would give",
-        "0.577^10 is 0.0041",
         "intensity",
         worked_example,
+        printed="0.3445",
+        ours="0.577^10 is 0.0041",
+        kind="slip",
     ),
-    "mnse": Erratum(
+    Claim(
         "[T] 4.1, MNSE",
-        "form",
         "each error divided by its own pixel's distance from the mean",
-        "sum of errors over sum of distances (NMSE)",
         "share of a flat picture's values with a defined figure",
         flat_picture,
+        ours="sum of errors over sum of distances (NMSE)",
+        kind="form",
     ),
-    "inverted": Erratum(
+    Claim(
         "[T] appendix В",
-        "slip",
         "Phong where normals are close",
-        "Gouraud where they are close",
         "share of the triangles of a teapot of 992 that the test of normals gives to Gouraud",
         inverted_test,
+        ours="Gouraud where they are close",
+        kind="slip",
     ),
-    "extrapolated": Erratum(
+    Claim(
         "[T] appendix Г, NormalVector",
-        "slip",
         "the end is extrapolated without the start vector",
-        "N_l + g (N_r - N_l)",
         "error of the last normal, 10 degrees, 6 pixels",
         extrapolated_end,
+        ours="N_l + g (N_r - N_l)",
+        kind="slip",
     ),
-    "scaled": Erratum(
+    Claim(
         "[T] appendix Г, NormalVector",
-        "slip",
         "dN is scaled in place at every pixel, from i = 0 on; read as by i/(m - 1)",
-        "a scaled copy, dN itself kept",
         "error of the last normal, 10 degrees, 6 pixels",
         scaled_in_place,
+        ours="a scaled copy, dN itself kept",
+        kind="slip",
     ),
-    "variable": Erratum(
+    Claim(
         "[T] appendix Д",
-        "slip",
         "P[1]*x in green",
-        "P[1]*y",
         "error of green at a corner whose value is given, intensities 0.2, 0.4, 0.9",
         wrong_variable,
+        ours="P[1]*y",
+        kind="slip",
     ),
-    "energy-phong": Erratum(
+    Claim(
         "[C], Phong's normalising coefficient",
-        "reading",
         "(n+2)/2n",
-        "(n+2)/(2 pi)",
         "reflected energy at n = 10, to be 1",
-        lambda: energy("phong", 10),
-        "normalising",
+        energy,
+        {"model": "phong", "exponent": 10},
+        ours="(n+2)/(2 pi)",
+        kind="reading",
+        matter="normalising",
     ),
-    "energy-blinn": Erratum(
+    Claim(
         "[C], Blinn's normalising coefficient",
-        "reading",
         "((n+2)(n+4))/(8n(2^(n/2)+n))",
-        "((n+2)(n+4))/(8 pi (2^(-n/2)+n))",
         "reflected energy at n = 10, to be 1",
-        lambda: energy("blinn", 10),
-        "normalising",
+        energy,
+        {"model": "blinn", "exponent": 10},
+        ours="((n+2)(n+4))/(8 pi (2^(-n/2)+n))",
+        kind="reading",
+        matter="normalising",
     ),
-    "mirror": Erratum(
+    Claim(
         "[C], mirror direction",
-        "reading",
         "R = 2 (L x N) x N - L",
-        "R = 2 (L·N) N - L: products are scalar",
         "length of R, to be 1",
         mirror,
+        ours="R = 2 (L·N) N - L: products are scalar",
+        kind="reading",
     ),
-    "zone": Erratum(
+    Claim(
         "[C], epicentre zone",
-        "unclear",
         "7.924 %, of a zone that is not defined",
-        f"where Blinn's model is at least {ZONE}",
         "largest relative error of f2 in the zone",
-        undefined_zone,
+        zone_error,
+        printed="0.07924",
+        ours=f"where Blinn's model is at least {ZONE}",
+        kind="unclear",
     ),
-}
-"""What the documents print, by name."""
-
-OWN = {
-    "octaves": Unmatched(
-        "arccos in octaves of 1 - x, largest error, rad",
-        "1.7e-4",
-        "quadratics give the first, cubics the second",
-        octaves,
-    ),
-    "zone": Unmatched(
-        "[C]'s zone, 7.924 %: Blinn at least",
-        "0.594",
-        "0.594 gives the first; the second is the bound of 7.924 %",
-        zone_bounds,
-    ),
-    "quadratic-length": Unmatched(
-        "length error of a quadratic normal at 45 degrees",
-        "7.3e-4",
-        "the first, at the place in the span that is the second",
-        quadratic_length,
-    ),
-    "held-root": Unmatched(
-        "1/sqrt(2+z) exact at angle 0, 3 terms, largest error",
-        "7.9e-7",
-        "the coefficients shown give the first, the best ones the second",
-        held_root,
-    ),
-}
-"""Stated figures that do not come out, by name."""
+)
+"""What the documents print."""
 
 
 def matters() -> dict[str, int]:
-    """Number of different matters of `ERRATA` of each kind, in the order of `KINDS`."""
-    found = {(erratum.kind, erratum.matter or name) for name, erratum in ERRATA.items()}
+    """Number of different matters of `CLAIMS` of each kind, in the order of `KINDS`."""
+    found = {(claim.kind, claim.matter or (claim.source, claim.stated)) for claim in CLAIMS}
     return {kind: sum(one == kind for one, _ in found) for kind in KINDS}
 
 
-def evidence(own: bool) -> dict[str, list[float]]:
-    """Compute the evidence of each entry.
-
-    Parameters
-    ----------
-    own : bool
-        Whether of `OWN`, else of `ERRATA`.
-
-    Returns
-    -------
-    dict
-        By name, two figures: see `Erratum` and `Unmatched`.
-    """
-    if own:
-        return {name: list(figure.values()) for name, figure in OWN.items()}
-    return {name: list(erratum.evidence()) for name, erratum in ERRATA.items()}
-
-
-def tasks(quick: bool) -> list[Task]:
-    """Measurements of the section: the same whether quick or not."""
-    return [Task(evidence, {"own": own}) for own in (False, True)]
-
-
-def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section from the results of its tasks."""
-    documents, own = results
-    errata = Table(
-        "errata",
-        "Errata of the documents",
-        ("place", "kind", "published", "right", "computed", "as published", "as it should be"),
-        [[e.place, e.kind, e.published, e.right, e.quantity, *documents[name]] for name, e in ERRATA.items()],
-        "Kinds: "
-        + "; ".join(f"{kind}, {meaning}" for kind, meaning in KINDS.items())
-        + ". Both figures are computed by this report, but for those that a document claims itself (an "
-        "error, an intensity), which stand as published. Listings of [T] are as docs/theory/errata.md "
-        "describes them.",
-    )
-    figures = Table(
-        "errata-stated",
-        "Figures stated for this project that do not come out",
-        ("figure", "stated", "found", "first", "second"),
-        [[figure.what, figure.stated, figure.found, *own[name]] for name, figure in OWN.items()],
-        "Computed in float64.",
-    )
-    counted = matters()
-    text = [
-        f"{sum(counted.values())} matters in {len(ERRATA)} entries, each with a figure that anyone can "
-        "compute again: from what is published, and from what comes out or replaces it. Not every entry is "
-        f"an error: {counted['form']} matters are forms that are good in their range. The units keep the "
+_DOCUMENT = Document(
+    "errata",
+    "Errata of the documents",
+    [
+        f"{sum(matters().values())} matters in {len(CLAIMS)} entries. Each has a quantity that anyone can "
+        "compute again: by the printed statement, and as it comes out or is replaced. Not every entry is an "
+        f"error: {matters()['form']} matters are forms that are good in their range. The units keep the "
         "published constants as named variants, so that their effect shows in the other sections.",
-    ]
-    return Section("errata", "Errata of the documents", text, [errata, figures], appendix=True)
+    ],
+    [
+        ClaimTable(
+            "errata",
+            "What the documents print, and what comes out",
+            lambda quick: CLAIMS,
+            "Kinds: "
+            + "; ".join(f"*{kind}*, {meaning}" for kind, meaning in KINDS.items())
+            + ". Printed: a value "
+            "that the document prints with its digits, or one that is computed from the printed statement. "
+            "docs/theory/errata.md describes the listings of [T].",
+        )
+    ],
+)
+
+tasks, section = _DOCUMENT.tasks, _DOCUMENT.section

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from blysk.bench.report.errata_evidence import FACTOR_PUBLISHED, ROOT_PUBLISHED
+from blysk.bench.report.errata import FACTOR_PUBLISHED, ROOT_PUBLISHED
 
 __all__ = [
     "CLAIMS",

@@ -8,7 +8,7 @@ import numpy as np
 from markdown import table
 from numpy.polynomial.polynomial import polyval
 
-from blysk.bench.report.errata_evidence import FACTOR_PUBLISHED, ROOT_PUBLISHED
+from blysk.bench.report.errata import FACTOR_PUBLISHED, ROOT_PUBLISHED
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.arccos import SEGMENT_BOUNDS, Arccos
 from blysk.golden.cosines.half_chord import HalfChord

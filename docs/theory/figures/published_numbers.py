@@ -6,9 +6,10 @@ from collections.abc import Callable
 from markdown import table
 
 from blysk.bench.report import phong_blinn
-from blysk.bench.report.cosine_quadratic import PUBLISHED, coefficients, errors, slopes
-from blysk.bench.report.errata import ERRATA, KINDS, evidence, matters
-from blysk.bench.report.errata_evidence import factor_quadratics
+from blysk.bench.report.claims import measured
+from blysk.bench.report.cosine_quadratic import PUBLISHED, errors
+from blysk.bench.report.errata import CLAIMS as ERRATA
+from blysk.bench.report.errata import KINDS, factor_quadratics, matters
 from blysk.bench.report.phong_blinn_hardware import half_angle
 from blysk.bench.report.thesis import CLAIMS, software
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax
@@ -23,37 +24,25 @@ def _number(value: float) -> str:
 
 def _errata(document: str) -> Callable[[], str]:
     def made() -> str:
-        found = evidence(own=False)
         rows = []
-        for name, erratum in ERRATA.items():
-            if erratum.place.startswith(f"[{document}]"):
-                place = erratum.place.removeprefix(f"[{document}]").lstrip(", ")
-                numbers = (_number(value) for value in found[name])
-                words = (erratum.kind, erratum.published, erratum.right, erratum.quantity)
-                rows.append([place, *words, *numbers])
-        head = [
-            "place",
-            "kind",
-            "printed",
-            "what comes out, or our form",
-            "quantity",
-            "as printed",
-            "as it comes out",
-        ]
-        return table(head, rows, 5)
+        for claim in ERRATA:
+            if claim.source.startswith(document):
+                place = claim.source.removeprefix(document).lstrip(", ")
+                numbers = (_number(float(value)) for value in claim.values(claim.task.run()))
+                rows.append([place, claim.kind, claim.stated, claim.ours, claim.quantity, *numbers])
+        head = ["place", "kind", "printed", "what comes out, or our form", "quantity", "as printed"]
+        return table([*head, "as it comes out"], rows, 5)
 
     return made
 
 
 def _cosine_quadratic() -> str:
-    found = {model: errors(model) for model in ("cosquad", "cosquad_q", "cosquad_lin")}
-    found |= {"slopes": slopes(), "coefficients": coefficients()}
     rows = []
-    for figure in PUBLISHED:
-        value = found[figure.key[0]][figure.key[1]] * (100 if figure.percent else 1)
-        digits = len(figure.published.partition(".")[2])
-        same = "yes" if f"{value:.{digits}f}" == figure.published else "no"
-        rows.append([figure.what, figure.published, f"{value:.{digits + 1}f}", same])
+    for claim, result in zip(PUBLISHED, measured(PUBLISHED), strict=True):
+        printed, value = claim.values(result)
+        digits = len(printed.partition(".")[2]) + 1
+        same = "yes" if claim.verdict(result) else "no"
+        rows.append([claim.quantity, printed, f"{value:.{digits}f}", same])
     return table(["figure", "printed", "computed", "to the digits printed"], rows)
 
 
@@ -139,9 +128,8 @@ def _figure_sentences() -> list[str]:
 
 
 TABLES: dict[str, Callable[[], str]] = {
-    "errata-thesis": _errata("T"),
-    "errata-cosine-quadratic": _errata("C"),
-    "errata-phong-blinn": _errata("P"),
+    "errata-thesis": _errata("[T]"),
+    "errata-cosine-quadratic": _errata("[C]"),
     "cosine-quadratic": _cosine_quadratic,
     "line-models": _line_models,
     "operations": _operations,

@@ -9,7 +9,7 @@ import numpy as np
 from markdown import table
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.errata import ERRATA
+from blysk.bench.report.errata import second_lobe
 from blysk.bench.report.lobe import CASES, errors_of_size
 from blysk.bench.surfaces import sphere
 from blysk.golden.frame_constants import FrameConstants
@@ -233,7 +233,7 @@ def _sharp_lobes() -> str:
 
 def _sentences() -> list[str]:
     squared = 20 / 2 * (math.cos(math.radians(60)) - 1) + 1
-    assert squared**2 == ERRATA["second-lobe"].evidence()[0]
+    assert squared**2 == second_lobe()[0]
     widest = math.degrees(math.acos(1 - 2 / 10))
     largest = Intensity.COLOR_FORMAT.max_code * Intensity.COLOR_FORMAT.step
     difference = arc_maximum_error()

@@ -11,7 +11,7 @@ from amaranth.hdl import Fragment
 
 from blysk.bench.accuracy import scene_for
 from blysk.bench.report import thesis, thesis_figures, thesis_ways
-from blysk.bench.report.errata_evidence import FACTOR_PUBLISHED, ROOT_PUBLISHED
+from blysk.bench.report.errata import FACTOR_PUBLISHED, ROOT_PUBLISHED
 from blysk.bench.report.thesis import section, tasks
 from blysk.bench.report.thesis_figures import (
     UNITS,
