@@ -13,7 +13,6 @@ from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants, by_mater
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.gate import Gate
-from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.highlight_operand import MAX_EXPONENT, HighlightOperand
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe, LobeTable
@@ -236,7 +235,7 @@ class Design:
     def highlight_gate(self) -> Gate:
         """Bit-accurate model of the gate."""
         assert self.specular is not None
-        return self.interpolator.gate(self.specular, HighlightGate)
+        return self.interpolator.gate(self.specular)
 
     @property
     def has_threshold(self) -> bool:

@@ -10,18 +10,15 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import Design
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
-from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
-from blysk.hdl.lighting.light import SPECULAR_KINDS, LightUnit
+from blysk.hdl.lighting.light import LightUnit, kind_of
 from blysk.hdl.lighting.lobe import LobeMemory
-from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 
@@ -154,7 +151,7 @@ class ShadingPipelineUnit(wiring.Component):
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
         self._tables = None
         self.direction = Signal(normal_shape(), name="first_direction")
-        self.setup_interval = self.cycles_per_pixel = 1
+        self.setup_interval = self._shortest_interval = self.cycles_per_pixel = 1
         self.latency = LATE_FIFO_LATENCY + self._assembler.coordinates_latency
         if p.lights:
             self._make_units()
@@ -171,11 +168,6 @@ class ShadingPipelineUnit(wiring.Component):
             product_interval = p.intensity.channels
             if setup_interval is None:
                 setup_interval = max(method.setup_intervals(p.interpolator), default=None)
-        value_gate = None
-        if p.gate and isinstance(p.highlight_gate, ValueGate):
-            value_gate = ValueGateUnit(
-                p.highlight_gate, p.lights, exponent=p.build.exponent, takes_threshold=p.loads_tables
-            )
         self._interpolator = method(
             p.interpolator,
             p.lights,
@@ -183,25 +175,20 @@ class ShadingPipelineUnit(wiring.Component):
             highlights=p.specular is not None,
             length_bits=p.length_bits,
             product_interval=product_interval,
-            gate=value_gate,
+            gate=method.gate_inside(p) if p.gate else None,
             takes_threshold=p.has_threshold,
             factors=p.factors,
         )
         self.setup_interval = self._interpolator.setup_interval
+        self._shortest_interval = self._interpolator.shortest_interval
         self._lights = self._light_units(compact)
         self._intensity = (CompactIntensityUnit if compact else IntensityUnit)(p.intensity)
         slowest = max(self._lights, key=lambda light: light.latency)
         chain = (self._interpolator, slowest, self._intensity, self._assembler)
         self.latency = sum(unit.latency for unit in chain)
-        if p.gate and value_gate is None:
-            interval = min(self.setup_interval, 3 + 12 * p.lights)
-            self._gate = HighlightGateUnit(
-                p.highlight_gate,
-                p.lights,
-                initiation_interval=interval,
-                exponent=p.build.exponent,
-                takes_threshold=p.loads_tables,
-            )
+        if p.gate:
+            self._gate = method.gate_beside(p, self.setup_interval)
+        if self._gate is not None:
             # A FIFO before the gate, and one after it.
             decided = self._gate.latency + 2 * FIFO_LATENCY
             self.latency += max(decided - self._interpolator.latency, 0)
@@ -217,7 +204,7 @@ class ShadingPipelineUnit(wiring.Component):
         exponent, diffuse = p.build.exponent, Diffuse(p.interpolator.COSINE_FORMAT)
         if p.specular is None:
             return [DiffuseUnit(diffuse) for _ in range(p.lights)]
-        kind = SPECULAR_KINDS[type(p.specular)]
+        kind = kind_of(p.specular)
         if exponent is None and kind.slope_unit:
             self._slope = kind.slope_unit(p.specular)
         if p.loads_tables:
@@ -246,8 +233,7 @@ class ShadingPipelineUnit(wiring.Component):
     @property
     def _waiting_spans(self) -> int:
         """Depth of the FIFOs parallel to interpolator and lights: all spans that may be inside these."""
-        interval = getattr(self._interpolator, "shortest_interval", None) or self.setup_interval
-        return max(-(-self.latency // interval) + UNCOUNTED, 17)
+        return max(-(-self.latency // self._shortest_interval) + UNCOUNTED, 17)
 
     @property
     def spans_inside(self) -> int:
@@ -267,7 +253,7 @@ class ShadingPipelineUnit(wiring.Component):
         )
         sinks = [self._carry_coordinates(m)]
         if p.lights:
-            if p.takes_vectors and p.mirror:
+            if p.mirror:
                 m.d.comb += self.direction.eq(frame.constants.lights[0].direction)
             sinks += self._shade(m, frame)
         else:
@@ -294,7 +280,7 @@ class ShadingPipelineUnit(wiring.Component):
         """Accept spans and writes; whether a span of a pixel or more is accepted on this cycle.
 
         A span is accepted if every sink is ready, and then by all of them on the same cycle; writes, while no
-        span is inside. An interpolator that takes the words of a span in turns has `begun` it before.
+        span is inside. An interpolator that takes the words of a span in turns `has_begun` it before.
 
         Parameters
         ----------
@@ -310,7 +296,8 @@ class ShadingPipelineUnit(wiring.Component):
         idle, write_waits = Signal(name="idle", init=1), self.write.valid
         hold = ~idle
         has_pixels = self.i.payload.length != 0
-        if (begun := getattr(self._interpolator, "begun", None)) is not None:
+        begun = None if self._interpolator is None else self._interpolator.has_begun
+        if begun is not None:
             hold, write_waits = hold | begun, write_waits & ~begun
             # The payload stays: no path leads from the length then.
             has_pixels |= begun
@@ -474,8 +461,7 @@ class ShadingPipelineUnit(wiring.Component):
         pixel, last = Signal(p.length_bits), Signal()
         moves = operands.valid & operands.ready
         m.d.comb += [
-            waiting.payload.normal_left.eq(span.normal_left),
-            waiting.payload.normal_right.eq(span.normal_right),
+            *(waiting.payload[name].eq(span[name]) for name in waiting.payload.shape().members),
             lengths.w_data.eq(span.length),
             decisions.w_data.eq(gate.o.payload),
             decisions.w_en.eq(gate.o.valid),
@@ -490,10 +476,9 @@ class ShadingPipelineUnit(wiring.Component):
         ]
         for index in range(p.lights):
             m.d.comb += gate.constants.halfway[index].eq(frame.constants.lights[index].halfway)
-        if gate.takes_threshold:
-            m.d.comb += gate.constants.threshold.eq(frame.constants.threshold)
-        elif p.build.exponent is None:
-            m.d.comb += gate.constants.exponent.eq(frame.constants.exponent)
+        for name in ("threshold", "exponent"):
+            if name in gate.constants.shape().members:
+                m.d.comb += gate.constants[name].eq(frame.constants[name])
         with m.If(moves):
             m.d.sync += pixel.eq(Mux(last, 0, pixel + 1))
         return operands, ~decisions.r_data

@@ -8,13 +8,33 @@ from blysk.golden.beats import Spans
 from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import Interpolator
-from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 
-__all__ = ["HighlightGate"]
+__all__ = ["GateLimits", "HighlightGate"]
+
+
+@dataclass(frozen=True)
+class GateLimits:
+    """What a highlight gate relies on, of a method: bounds for its spans up to an angle.
+
+    With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of `ONE_SQUARED`,
+    no pixel has an N·H over ``c + excess``, or a 1 - N·H under ``shortest (1 - c) - excess``.
+
+    Parameters
+    ----------
+    excess : float
+        Bound of the excess of N·H over that of the great circle.
+    shortest : float
+        Least length of a normal on the method's curve; 1 without chords to H.
+    angle : float
+        Largest angle of a span, in degrees, for which both hold, up to 45.
+    """
+
+    excess: float
+    shortest: float
+    angle: float
 
 
 @dataclass(frozen=True)
@@ -27,7 +47,7 @@ class HighlightGate(Gate):
     ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``, in which nothing cancels for psi tending to 0, and the condition
     is ``max(a, b) u > |d|``. A span is lit if
 
-    - it is wider than 45 degrees or than the method's `Interpolator.MAX_ANGLE`, or
+    - it is wider than 45 degrees or than `GateLimits.angle`, or
     - ``max(a, b)^2 >= T``, or
     - ``max(a, b) u > |d|`` and ``d^2 >= u w``, with ``w = 2 T - 2 a b - T u``: that is ``M^2 >= T``.
 
@@ -73,7 +93,7 @@ class HighlightGate(Gate):
     4. *The comparison.* T and w are cut, everything else is exact, so a span that is not lit has ``m^2 < T``,
        also if m is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
     5. *The pipeline.* Each method states a bound by which its pixels may exceed m
-       (`Interpolator.highlight_excess`, from the errors of its units; 4.4 steps of 2^-17 for quadratic
+       (`GateLimits.excess`, from the errors of its units; 4.4 steps of 2^-17 for quadratic
        normals): no N·H is over ``m + excess``, no 1 - N·H is under ``shortest (1 - m) - excess``. Let x be
        the largest argument for which the specular unit may give a term over 0, in steps of 2^-25; it follows
        from the PROM in integers (`HighlightOperand.last_lit_arguments`). tau is chosen so that
@@ -92,12 +112,12 @@ class HighlightGate(Gate):
 
     Parameters
     ----------
+    limits : GateLimits
+        Bounds of the method that computes the operands of the pixels.
     specular : Specular or Power
         Model of the unit that is gated.
     fraction_bits : int
         F, 5 to 17.
-    interpolator : Interpolator
-        Method that computes the operands of the pixels.
 
     Raises
     ------
@@ -107,9 +127,9 @@ class HighlightGate(Gate):
     Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.
     """
 
+    limits: GateLimits
     specular: HighlightOperand = field(default_factory=Specular)
     fraction_bits: int = 17
-    interpolator: Interpolator = field(default_factory=QuadraticInterpolator)
 
     def __post_init__(self) -> None:
         if not 5 <= self.fraction_bits <= 17:
@@ -118,7 +138,7 @@ class HighlightGate(Gate):
     @property
     def margin(self) -> float:
         """Excess of the method, rounded up to whole steps of 2^-17."""
-        return float(np.ceil(self.interpolator.highlight_excess * 2.0**17) * 2.0**-17)
+        return float(np.ceil(self.limits.excess * 2.0**17) * 2.0**-17)
 
     @property
     def component_format(self) -> Format:
@@ -148,8 +168,8 @@ class HighlightGate(Gate):
 
     @property
     def widest(self) -> Fixed:
-        """Largest cut ``u`` for which the exact u is surely less than u of the method's `gate_angle`."""
-        limit = self.one_squared.values * (1 - np.cos(np.radians(self.interpolator.gate_angle)))
+        """Largest cut ``u`` for which the exact u is surely less than u of `GateLimits.angle`."""
+        limit = self.one_squared.values * (1 - np.cos(np.radians(self.limits.angle)))
         return Fixed(self.angle_format, int(limit / self.angle_format.step) - 1)
 
     @property
@@ -160,7 +180,7 @@ class HighlightGate(Gate):
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
         """T from the largest arguments with a term over 0, in steps of 2^-25; see `LobeTable`, too."""
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25
-        level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.interpolator.shortest_normal
+        level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.limits.shortest
         # In steps of 2^-34; one less, as the quotient is not exact.
         steps = np.floor(level * 2.0**34).astype(np.int64) - 1
         # Squares of 34 bits outgrow an int64.

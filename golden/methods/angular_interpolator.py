@@ -8,7 +8,8 @@ import numpy as np
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
-from blysk.golden.methods.interpolator import Interpolator, Operands
+from blysk.golden.methods.interpolator import Operands
+from blysk.golden.methods.normal_interpolator import EndNormalInterpolator
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT
@@ -17,7 +18,7 @@ __all__ = ["METHODS", "PUBLISHED", "AngularInterpolator"]
 
 
 @dataclass(frozen=True)
-class AngularInterpolator(Interpolator):
+class AngularInterpolator(EndNormalInterpolator):
     """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
 
     Formats and error bounds are those of `AngularSetup` and `HighlightCosine`. N·L is 1 minus the

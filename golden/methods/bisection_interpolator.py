@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from blysk.golden.methods.interpolator import NormalInterpolator
+from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE

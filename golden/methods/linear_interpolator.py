@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.methods.frame_steps import SpanCutter
-from blysk.golden.methods.interpolator import NormalInterpolator, difference_rounding
+from blysk.golden.methods.normal_interpolator import NormalInterpolator, difference_rounding
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ

@@ -1,6 +1,6 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -12,7 +12,6 @@ from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.factor import Factor
-from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
@@ -135,7 +134,12 @@ class LocalChordInterpolator(Interpolator):
         """The method with the scale that suits sharp lobes, see `Lobe.scale_of`."""
         return replace(self, scale=lobe.scale_of(parameters))
 
-    def gate(self, specular: HighlightOperand, by_normals: Callable[..., Gate]) -> ValueGate:
+    @property
+    def serves_gate(self) -> bool:
+        """``True``: a `ValueGate`."""
+        return True
+
+    def gate(self, specular: HighlightOperand) -> ValueGate:
         """Model of the gate by values of u."""
         return ValueGate(specular)
 
@@ -197,17 +201,6 @@ class LocalChordInterpolator(Interpolator):
         slope, curvature = np.asarray(0.5), np.asarray(0.125)
         errors = (f(slope, curvature) for f in (self.setup.highlight_error, self.setup.diffuse_error))
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step
-
-    def compute(
-        self,
-        normal_left: Fixed,
-        normal_right: Fixed,
-        length: np.ndarray,
-        direction: Fixed,
-        halfway: Fixed,
-    ) -> Operands:
-        """Raise `ValueError`: the normals of a span do not give its position."""
-        raise ValueError("the local chord method takes values of its spans, not normals; see compute_values")
 
     def compute_values(
         self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None

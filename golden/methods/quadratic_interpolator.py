@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from blysk.golden.methods.interpolator import NormalInterpolator, difference_rounding
+from blysk.golden.methods.normal_interpolator import NormalInterpolator, difference_rounding
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ

@@ -15,7 +15,7 @@ from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
-from blysk.golden.number.fixed import Fixed, Format
+from blysk.golden.number.fixed import Format
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.reference.light_frame import light_frames
 from blysk.golden.reference.raster import Raster
@@ -69,11 +69,6 @@ class QuotientInterpolator(Interpolator):
     def highlight_format(self) -> Format:
         """Format of a place in a lobe's table."""
         return Quotient(self.spans(1, True)).place_format
-
-    @property
-    def serves_gate(self) -> bool:
-        """``False``: a gate takes unit normals, or values at three places."""
-        return False
 
     @property
     def takes_line(self) -> bool:
@@ -156,17 +151,6 @@ class QuotientInterpolator(Interpolator):
         pixels = spans.compute(vectors, length, direction[:, ::2])
         cosine, place, too_small = Quotient(spans).compute(pixels)
         return Operands(cosine, place, np.bincount(pixels_of(length)[0], too_small, len(length)) > 0)
-
-    def compute(
-        self,
-        normal_left: Fixed,
-        normal_right: Fixed,
-        length: np.ndarray,
-        direction: Fixed,
-        halfway: Fixed,
-    ) -> Operands:
-        """Raise `ValueError`: spans carry vectors, not normals."""
-        raise ValueError("the quotient method takes vectors of its spans, not normals; see compute_vectors")
 
     def errors(self, vectors: SpanVectors, length: np.ndarray) -> "QuotientErrors":
         """Bounds of the errors of spans, see `QuotientErrors`."""

@@ -9,7 +9,8 @@ import numpy as np
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import Interpolator, Operands
+from blysk.golden.methods.interpolator import Operands
+from blysk.golden.methods.normal_interpolator import EndNormalInterpolator
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR
@@ -18,7 +19,7 @@ __all__ = ["METHODS", "PUBLISHED", "RecurrenceInterpolator"]
 
 
 @dataclass(frozen=True)
-class RecurrenceInterpolator(Interpolator):
+class RecurrenceInterpolator(EndNormalInterpolator):
     """``cos gamma(t) = cos beta cos(lambda - t psi)`` by the recurrence, for L and H of each light.
 
     Formats and error bounds are those of `RecurrenceSetup` and `Recurrence`, whose results have 25 fraction

@@ -8,7 +8,8 @@ import numpy as np
 from blysk.golden.beats import Spans
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
-from blysk.golden.methods.interpolator import NormalInterpolator, Operand
+from blysk.golden.methods.interpolator import Operand
+from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.line_setup import LineSetup
 from blysk.golden.normals.renormaliser import Renormaliser

@@ -67,14 +67,14 @@ class HighlightGateUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: HighlightGate | None = None,
+        parameters: HighlightGate,
         lights: int = 1,
         *,
         initiation_interval: int | None = None,
         exponent: int | None = None,
         takes_threshold: bool = False,
     ):
-        self.parameters = p = parameters or HighlightGate()
+        self.parameters = p = parameters
         if exponent is not None and not 1 <= exponent <= MAX_EXPONENT:
             raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
         if exponent is not None and takes_threshold:

@@ -9,6 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.factor import Factor
+from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
@@ -22,7 +23,7 @@ from blysk.hdl.lighting.lobe import LobeUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
 
-__all__ = ["SPECULAR_KINDS", "LightUnit", "SpecularKind"]
+__all__ = ["SPECULAR_KINDS", "LightUnit", "SpecularKind", "kind_of"]
 
 
 class SpecularKind(NamedTuple):
@@ -71,6 +72,20 @@ SPECULAR_KINDS: dict[type, SpecularKind] = {
     Power: SpecularKind(_power_unit, lambda parameters, exponent: 42),
 }
 """Kinds of specular units, by the classes of their bit-accurate models."""
+
+
+def kind_of(parameters: HighlightOperand) -> SpecularKind:
+    """The kind of specular unit that a bit-accurate model describes.
+
+    Raises
+    ------
+    TypeError
+        If there is no unit for the model.
+    """
+    model = type(parameters)
+    if model not in SPECULAR_KINDS:
+        raise TypeError(f"{model.__name__} has no unit: SPECULAR_KINDS of {__name__} needs an entry for it")
+    return SPECULAR_KINDS[model]
 
 
 class LightUnit(wiring.Component):
@@ -134,7 +149,7 @@ class LightUnit(wiring.Component):
         fades: bool | None = None,
     ):
         self.parameters = p = parameters or Specular()
-        self._specular = SPECULAR_KINDS[type(p)].unit(
+        self._specular = kind_of(p).unit(
             p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
         )
         self.exponent = exponent

@@ -7,10 +7,13 @@ from amaranth.hdl import Module, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
+from blysk.golden.methods.interpolator import Interpolator
+from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
+from blysk.golden.pipeline import Design
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
-from blysk.hdl.core.stream import connect
+from blysk.hdl.core.stream import PipelinedUnit, connect
+from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
 
@@ -85,11 +88,11 @@ class InterpolatorUnit(wiring.Component):
     product_interval : int
         Least cycles from a pixel to the next in the products with L and H, for methods that find normals.
     gate : ValueGateUnit or None
-        Decides which spans have no highlight, for ``chord-local``; operands then have ``gated``.
+        From `gate_inside`: decides which spans have no highlight; operands then have ``gated``.
     takes_threshold : bool
         Whether a threshold tells where highlights end, in place of the exponent; see `Design.threshold_of`.
     factors : sequence of int
-        Indices of the lights that fade, for methods with `TAKES_VALUES`; see `Design`.
+        Indices of the lights that fade, for methods that serve them; see `Design`.
 
     Members
     -------
@@ -98,7 +101,7 @@ class InterpolatorUnit(wiring.Component):
     o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
         Operands of the pixels.
     constants : :py:`In(light_vectors_shape(lights))`
-        L and H of each light; constant while spans are inside. Not for methods with `TAKES_VALUES`.
+        L and H of each light; constant while spans are inside. See `constant_members`.
     out_of_range : :py:`Out(1)`
         High for one cycle for each span whose angle the method does not serve.
 
@@ -116,9 +119,6 @@ class InterpolatorUnit(wiring.Component):
     DEFAULT_INTERVAL = 4
     """Largest `setup_interval` that is taken where none is given."""
 
-    shortest_interval: int | None = None
-    """Least cycles from a span to the next, where a short one takes fewer than `setup_interval`."""
-
     def __init_subclass__(cls, *, parameters: type[Interpolator] | None = None, **options):
         super().__init_subclass__(**options)
         if parameters is not None:
@@ -129,14 +129,55 @@ class InterpolatorUnit(wiring.Component):
         """Setup intervals that the method can be built for; empty where it has no choice."""
         return ()
 
+    @classmethod
+    def gate_inside(cls, design: Design) -> ValueGateUnit | None:
+        """The gate that decides inside this unit, of a design with a gate; ``None``: there is none inside."""
+        return None
+
+    @classmethod
+    def gate_beside(cls, design: Design, setup_interval: int) -> PipelinedUnit | None:
+        """The gate that decides beside this unit, from the same spans; ``None``: there is none beside.
+
+        Parameters
+        ----------
+        design : Design
+            A design with a gate.
+        setup_interval : int
+            Cycles from a span to the next in this unit; the gate takes spans as often.
+        """
+        return HighlightGateUnit(
+            design.highlight_gate,
+            design.lights,
+            initiation_interval=min(setup_interval, 3 + 12 * design.lights),
+            exponent=design.build.exponent,
+            takes_threshold=design.loads_tables,
+        )
+
+    @property
+    def shortest_interval(self) -> int:
+        """Least cycles from any span to the next; a short one may take fewer than `setup_interval`."""
+        return self.setup_interval
+
+    @property
+    def has_begun(self) -> Value | None:
+        """Whether words of the span that is offered were taken already: payload and constants have to stay.
+
+        ``None`` where a unit takes all words of a span at once.
+        """
+        return None
+
+    def constant_members(self) -> dict[str, wiring.Member]:
+        """Ports for the constants that the method reads: by default L and H of each light."""
+        return {"constants": In(light_vectors_shape(self.lights))}
+
     def further_members(self) -> dict[str, wiring.Member]:
-        """Further ports of a method; one with the name of a common port replaces it."""
+        """Further ports of a method."""
         return {}
 
     @property
     def light_vectors(self) -> data.View | tuple:
-        """L and H of each light, from the constants; empty for methods with `TAKES_VALUES`."""
-        return () if self.parameters.TAKES_VALUES else self.constants
+        """Where L and H of each light go; empty for a method that does not read them."""
+        return self.constants
 
     @property
     def exponent(self) -> Value | None:
@@ -207,10 +248,7 @@ class InterpolatorUnit(wiring.Component):
             ),
             "out_of_range": Out(1),
         }
-        if not parameters.TAKES_VALUES:
-            members["constants"] = In(light_vectors_shape(lights))
-        members |= self.further_members()
-        super().__init__(members)
+        super().__init__(members | self.constant_members() | self.further_members())
 
 
 class NormalInterpolatorUnit(InterpolatorUnit):

@@ -9,6 +9,7 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
 from blysk.hdl.cosines.chord_setup import span_operands_shape
+from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 
@@ -41,7 +42,10 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
     Source: docs/theory/chord.md#local-lights.
     """
 
-    shortest_interval = 1
+    @property
+    def shortest_interval(self):
+        """1: that of spans of one pixel."""
+        return 1
 
     @classmethod
     def setup_intervals(cls, parameters):
@@ -103,16 +107,41 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         for index in range(len(self.factors)):
             yield f"factor_{index}", *(span.factors[index] for span in spans)
 
-    def further_members(self):
-        """Exponent or threshold of a gate."""
+    @classmethod
+    def gate_inside(cls, design):
+        """The gate by values, which reads those of the spans here."""
+        return ValueGateUnit(
+            design.highlight_gate,
+            design.lights,
+            exponent=design.build.exponent,
+            takes_threshold=design.loads_tables,
+        )
+
+    @classmethod
+    def gate_beside(cls, design, setup_interval):
+        """``None``: the gate is inside."""
+        return None
+
+    def constant_members(self):
+        """Exponent or threshold of a gate; spans bring what L and H would serve for."""
         return {} if self.gate is None else self.gate.ports
+
+    @property
+    def light_vectors(self):
+        """None."""
+        return ()
+
+    @property
+    def _of_gate(self):
+        """Exponent or threshold of a gate, if it is a port; else ``None``."""
+        return self.constants if "constants" in self.signature.members else None
 
     @property
     def exponent(self):
         """Exponent of a gate, if it is a port."""
-        return None if self.takes_threshold else getattr(self, "constants", None)
+        return None if self.takes_threshold else self._of_gate
 
     @property
     def threshold(self):
         """Threshold of a gate, if it is a port."""
-        return getattr(self, "constants", None) if self.takes_threshold else None
+        return self._of_gate if self.takes_threshold else None

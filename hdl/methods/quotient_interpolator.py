@@ -39,8 +39,6 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
     Source: docs/theory/quotient.md.
     """
 
-    shortest_interval = 1
-
     @classmethod
     def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, mirror=False):
         """Vectors in the frames of the lights at the first pixel, their step, and the length."""
@@ -50,6 +48,16 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
     def span_options(cls, parameters):
         """Whether y is multiplied by cos a."""
         return {"mirror": parameters.mirror}
+
+    @property
+    def shortest_interval(self):
+        """1: that of spans of one pixel."""
+        return 1
+
+    @property
+    def has_begun(self):
+        """``begun``."""
+        return self.begun
 
     def further_members(self):
         """``begun``, for the pipeline."""

@@ -7,11 +7,14 @@ import pytest
 
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import MAX_EXPONENT, Specular
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.sim.engines.simulate import simulate
 
 pytestmark = pytest.mark.prove
+
+LIMITS = QuadraticInterpolator().gate_limits
 
 
 def one_of(gate):
@@ -107,7 +110,7 @@ def stopped(gate, left, right, halfways):
 )
 def test_no_span_that_reaches_a_threshold_is_stopped(bits, spans, cases):
     """Words of 5 or 6 fraction bits, all cases; at each of the words that the PROM has."""
-    gate = HighlightGate(fraction_bits=bits)
+    gate = HighlightGate(LIMITS, fraction_bits=bits)
     left, right, halfways = spans(gate)
     assert len(left) * len(halfways) == cases
     assert 0.5 < stopped(gate, left, right, halfways) < 0.9
@@ -126,7 +129,7 @@ def shades_nothing_under(gate):
 @pytest.mark.parametrize("bits", [5, 6, 17])
 def test_nothing_is_shaded_under_a_threshold(bits):
     """At any exponent, the term of the largest N.H under its threshold is 0; none is larger farther down."""
-    shades_nothing_under(HighlightGate(fraction_bits=bits))
+    shades_nothing_under(HighlightGate(LIMITS, fraction_bits=bits))
 
 
 BUGS = {
@@ -151,7 +154,7 @@ BUGS = {
 def test_bugs_are_found(inject, bug):
     """Injected in the unit, each stops a span that reaches its threshold."""
     inject(HighlightGateUnit, *BUGS[bug])
-    gate = HighlightGate(fraction_bits=6)
+    gate = HighlightGate(LIMITS, fraction_bits=6)
     with pytest.raises(AssertionError, match=r"^lost highlights"):
         stopped(gate, *off_the_plane(gate))
 
@@ -159,7 +162,7 @@ def test_bugs_are_found(inject, bug):
 def test_bug_of_spans_out_of_range_is_found(inject):
     """Taken as others, they reach their thresholds where they are stopped."""
     inject(HighlightGateUnit, "_lit_by", "out_of_range | bright", "bright")
-    gate = HighlightGate(fraction_bits=5)
+    gate = HighlightGate(LIMITS, fraction_bits=5)
     with pytest.raises(AssertionError, match=r"^lost highlights"):
         stopped(gate, *in_a_plane(gate))
 
@@ -167,7 +170,7 @@ def test_bug_of_spans_out_of_range_is_found(inject):
 @pytest.mark.parametrize(("bits", "steps"), [(5, 1), (6, 1), (17, 12)])
 def test_bug_of_thresholds_is_found(monkeypatch, bits, steps):
     """Words of the PROM too high: by a step, or by more than the margin for the pixels' errors."""
-    gate = HighlightGate(fraction_bits=bits)
+    gate = HighlightGate(LIMITS, fraction_bits=bits)
     codes = gate.thresholds.codes
     high = np.minimum(codes + steps * (codes > 0), gate.level_format.max_code)
     monkeypatch.setitem(vars(gate), "thresholds", Fixed(gate.level_format, high))
@@ -179,4 +182,4 @@ def test_bug_of_the_cutoff_is_found(inject):
     """The specular unit shades as far as its parabola goes."""
     inject(Specular, "compute", "lit &= shifted <= self.boundaries[exponent]", "pass")
     with pytest.raises(AssertionError, match=r"^lit under the threshold"):
-        shades_nothing_under(HighlightGate())
+        shades_nothing_under(HighlightGate(LIMITS))

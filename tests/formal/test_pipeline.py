@@ -4,6 +4,7 @@ import pytest
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 
 import blysk.hdl.lighting.light
+import blysk.hdl.methods.interpolator
 import blysk.hdl.pipeline
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
@@ -84,7 +85,7 @@ def stubs(monkeypatch):
             (blysk.hdl.lighting.light, DiffuseUnit, diffuse, 2, 1),
             (blysk.hdl.lighting.light, SpecularUnit, specular, 2, longer),
             (blysk.hdl.pipeline, IntensityUnit, colors, interval, interval),
-            (blysk.hdl.pipeline, HighlightGateUnit, decisions, 2, 2),
+            (blysk.hdl.methods.interpolator, HighlightGateUnit, decisions, 2, 2),
         )
         compact = short(IntensityUnit, colors, interval, interval)
         monkeypatch.setattr(blysk.hdl.pipeline, "CompactIntensityUnit", compact)

@@ -218,7 +218,7 @@ def test_gated_spans_have_no_highlight(method, operand, model):
             halfway = quantise(normalise(rng.normal(size=3)))
             count = 400
             level = 1 - last + last * 10.0 ** rng.uniform(-5, -0.3, count) * rng.choice([-1, 1], count)
-            angle = np.radians(rng.uniform(0, gate.interpolator.gate_angle, count))
+            angle = np.radians(rng.uniform(0, gate.limits.angle, count))
             angle[::7] = 0
             level = np.clip(level, -1, 1)
             codes = spans_near_a_highlight(rng, halfway / np.linalg.norm(halfway), level, angle)

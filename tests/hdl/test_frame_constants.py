@@ -219,7 +219,7 @@ class Driver:
         for clock in range(cycles):
             if late and clock == late[0]:
                 queue += words_of(unit.write, late[1])
-                begun = getattr(unit._interpolator, "begun", None)
+                begun = unit._interpolator.has_begun
                 self.begun = 0 if begun is None else ctx.get(begun)
             writing = len(write_cycles) < len(queue)
             ctx.set(unit.write.valid, writing)

@@ -9,6 +9,7 @@ import pytest
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import with_tables
 from blysk.golden.lighting.highlight_gate import HighlightGate
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.presets import preset
@@ -76,7 +77,7 @@ def test_a_frame_loads_its_own_tables():
 
 def test_gate_by_threshold():
     """As the model decides, for any T; there is no PROM."""
-    p = HighlightGate()
+    p = HighlightGate(QuadraticInterpolator().gate_limits)
     unit = HighlightGateUnit(p, takes_threshold=True)
     assert cost_of(unit).rom_bits == 0
     assert unit.latency == HighlightGateUnit(p).latency

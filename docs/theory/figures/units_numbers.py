@@ -78,7 +78,7 @@ def _thresholds() -> str:
     exponents = (1, 2, 3, 10, 100, 1000)
     rows = []
     for name in ("cosquad", "lyon3_refitted", "exp", "blinn_product"):
-        gate = HighlightGate(MODELS[name], interpolator=METHODS["quadratic"])
+        gate = HighlightGate(METHODS["quadratic"].gate_limits, MODELS[name])
         level = np.sqrt(gate.thresholds.values[list(exponents)])
         angle = np.degrees(np.arccos(np.minimum(level, 1)))
         rows.append(
@@ -238,7 +238,7 @@ def _sentences() -> list[str]:
     largest = Intensity.COLOR_FORMAT.max_code * Intensity.COLOR_FORMAT.step
     difference = arc_maximum_error()
     assert difference < 1e-6
-    margin = HighlightGate(Specular(), interpolator=METHODS["quadratic"]).margin * 2**17
+    margin = HighlightGate(METHODS["quadratic"].gate_limits).margin * 2**17
     entries = _largest_amplification()
     return [
         f"n = 20 and gamma = 60° the square is {squared**2:.0f}",

@@ -28,10 +28,13 @@ from blysk.sim.units.record import Case, Decisions, Record, Stimulus, Variant
 
 __all__ = ["RECORD", "spans_about"]
 
+_METHOD = QuadraticInterpolator()
+_GATE = HighlightGate(_METHOD.gate_limits)
+
 
 def _measure(rng, count):
     """Whether a span is let through, and whether any of its pixels has a term."""
-    gate, interpolator = HighlightGate(), QuadraticInterpolator()
+    gate, interpolator = _GATE, _METHOD
 
     def samples():
         for exponent, share in exponents(rng, count):
@@ -159,7 +162,7 @@ def _variants():
     yield (
         "conservative",
         Variant(
-            HighlightGateUnit,
+            partial(HighlightGateUnit, _GATE),
             _measure,
             "spans to 45 degrees, 1 to 16 pixels, N_l within twice the highlight's radius of H, n 1 to 1000",
             "rate",
@@ -167,15 +170,15 @@ def _variants():
         ),
     )
     for interval in (1, 2, 3, 5, 8, 15):
-        unit = partial(HighlightGateUnit, initiation_interval=interval)
+        unit = partial(HighlightGateUnit, _GATE, initiation_interval=interval)
         yield f"interval {interval}", Variant(unit, long=True)
-    p = HighlightGate(Specular(REFLECTION_MODELS["lyon2"]))
+    p = HighlightGate(_METHOD.gate_limits, Specular(REFLECTION_MODELS["lyon2"]))
     yield "lyon2, interval 4", Variant(partial(HighlightGateUnit, p, initiation_interval=4), long=True)
     for bits in (5, 6, 9):
-        p = HighlightGate(fraction_bits=bits)
+        p = HighlightGate(_METHOD.gate_limits, fraction_bits=bits)
         yield f"{bits} fraction bits", Variant(partial(HighlightGateUnit, p), long=bits != 6)
     for lights, exponent, interval in ((2, 60, 27), (3, None, 4), (1, 60, 6)):
-        unit = partial(HighlightGateUnit, None, lights, initiation_interval=interval, exponent=exponent)
+        unit = partial(HighlightGateUnit, _GATE, lights, initiation_interval=interval, exponent=exponent)
         name = f"{lights} lights, interval {interval}" + f", exponent {exponent}" * (exponent is not None)
         yield name, Variant(unit, long=lights != 2)
 

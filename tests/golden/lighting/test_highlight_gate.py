@@ -19,7 +19,9 @@ from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 
 EXPONENTS = (2, 3, 5, 10, 30, 100, 300, 500, 1000)
 
-MARGIN = HighlightGate().margin
+METHOD = QuadraticInterpolator()
+LIMITS = METHOD.gate_limits
+MARGIN = HighlightGate(LIMITS).margin
 
 
 def arc_maximum(a, b, angle, shares=513):
@@ -35,7 +37,7 @@ def arc_maximum(a, b, angle, shares=513):
 
 @pytest.mark.parametrize("bits", [5, 6])
 def test_every_decision_at_reduced_width(bits):
-    gate = HighlightGate(fraction_bits=bits)
+    gate = HighlightGate(LIMITS, fraction_bits=bits)
     codes = np.arange(1 << bits)
     a, b = codes[:, np.newaxis, np.newaxis], codes[:, np.newaxis]
     lit_of_all = []
@@ -59,7 +61,7 @@ def test_every_decision_at_reduced_width(bits):
 def test_every_pair_of_unit_codes_at_reduced_width():
     """All vectors of about unit length on a grid, half-way vectors of an octant, all spans to 45 degrees."""
     bits = 5
-    gate = HighlightGate(fraction_bits=bits)
+    gate = HighlightGate(LIMITS, fraction_bits=bits)
     one = (1 << bits) - 1
     axis = np.arange(-one, one + 1)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -105,14 +107,14 @@ def largest_cosine(interpolator, left, right, halfway, length):
     return Fixed(cosine.format, np.maximum.reduceat(cosine.codes, np.flatnonzero(pixel == 0)))
 
 
-def check_spans(gate, rng, count, shaded_share=1 / 20):
+def check_spans(gate, rng, count, shaded_share=1 / 20, method=METHOD):
     """Run so many spans; most are decided by the last bits of the comparison."""
     dark, shaded = 0, 0
     for exponent in EXPONENTS:
         left, right, halfway = random_spans(rng, count // len(EXPONENTS), exponent, gate)
         length = rng.choice([1, 2, 3, 5, 8, 16], len(left), p=[0.1, 0.3, 0.3, 0.2, 0.08, 0.02])
         lit = gate.compute(*component_words(left, right, halfway), exponent)
-        cosine = largest_cosine(gate.interpolator, left, right, halfway, length)
+        cosine = largest_cosine(method, left, right, halfway, length)
         # The specular term falls with N·H: that of the largest is the largest.
         term = gate.specular.compute(cosine, np.zeros(len(lit), bool), exponent)
         assert not term.codes[~lit].any()
@@ -123,21 +125,22 @@ def check_spans(gate, rng, count, shaded_share=1 / 20):
 
 
 def test_no_pixel_is_suppressed():
-    check_spans(HighlightGate(), np.random.default_rng(1), 100_000)
+    check_spans(HighlightGate(LIMITS), np.random.default_rng(1), 100_000)
 
 
 @pytest.mark.parametrize("model", ["cosquad7", "lyon3", "exp"])
 def test_no_pixel_is_suppressed_in_other_models(model):
-    check_spans(HighlightGate(Specular(REFLECTION_MODELS[model])), np.random.default_rng(2), 20_000)
+    check_spans(HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model])), np.random.default_rng(2), 20_000)
 
 
 def test_no_pixel_is_suppressed_with_other_middle_normals():
     steps = {}
     for fit in MIDDLE_NORMAL_FITS:
-        gate = HighlightGate(interpolator=QuadraticInterpolator(middle_normal=MiddleNormal(fit)))
+        method = QuadraticInterpolator(middle_normal=MiddleNormal(fit))
+        gate = HighlightGate(method.gate_limits)
         steps[fit] = gate.margin * 2**17
         # With a wide margin, spans about the threshold are seldom visible.
-        check_spans(gate, np.random.default_rng(10), 20_000, shaded_share=1 / 100)
+        check_spans(gate, np.random.default_rng(10), 20_000, shaded_share=1 / 100, method=method)
     assert steps["exact"] * 2.0**-17 == MARGIN
     others = sorted(steps.values())[1:]
     assert (others[0], others[-1]) == (135, 875)
@@ -145,7 +148,7 @@ def test_no_pixel_is_suppressed_with_other_middle_normals():
 
 def test_margin_of_the_default_fit_is_not_enough_for_others():
     """With a normal that is 0.38 % too long the default's margin would lose highlights."""
-    gate, other = HighlightGate(), QuadraticInterpolator(middle_normal=MiddleNormal("minimax_2"))
+    gate, other = HighlightGate(LIMITS), QuadraticInterpolator(middle_normal=MiddleNormal("minimax_2"))
     rng = np.random.default_rng(11)
     left, right, halfway = random_spans(rng, 20_000, 300, gate)
     cosine = largest_cosine(other, left, right, halfway, np.full(20_000, 5))
@@ -157,17 +160,17 @@ def test_margin_of_the_default_fit_is_not_enough_for_others():
 def test_no_pixel_of_ten_million_spans_is_suppressed():
     rng = np.random.default_rng(3)
     for _ in range(50):
-        check_spans(HighlightGate(), rng, 200_007)
+        check_spans(HighlightGate(LIMITS), rng, 200_007)
 
 
 def test_long_spans():
     """The differences' rounding is largest at pixel 4095."""
-    gate, rng = HighlightGate(), np.random.default_rng(4)
+    gate, rng = HighlightGate(LIMITS), np.random.default_rng(4)
     for exponent in (10, 1000):
         left, right, halfway = random_spans(rng, 150, exponent, gate)
         length = np.full(150, 4095)
         lit = gate.compute(*component_words(left, right, halfway), exponent)
-        cosine = largest_cosine(gate.interpolator, left, right, halfway, length)
+        cosine = largest_cosine(METHOD, left, right, halfway, length)
         assert not gate.specular.compute(cosine, np.zeros(150, bool), exponent).codes[~lit].any()
         assert 10 < np.count_nonzero(lit) < 140
 
@@ -221,7 +224,7 @@ def test_step_3_of_the_proof():
     for grown in (largest(a + more[0], b, psi), largest(a, b + more[1], psi), largest(a, b, psi + more[2])):
         assert np.all(grown >= base * (1 - 1e-9))
     # u by its word: what is cut off and the square of the code of length 1 take under 2.2 of 3 steps.
-    gate = HighlightGate()
+    gate = HighlightGate(LIMITS)
     omega = gate.one_squared.codes.item()
     exact = rng.integers(0, int(omega * (1 - np.cos(np.radians(45)))), count)
     word = (exact >> 16) + 3
@@ -234,13 +237,13 @@ def test_step_3_of_the_proof():
     assert np.all((level >= dot.values) | (level == gate.level_format.max_code * gate.level_format.step))
     top = (gate.level_format.max_code * gate.level_format.step) ** 2
     for model in SPECULAR_MODELS + FURTHER_MODELS:
-        assert HighlightGate(Specular(REFLECTION_MODELS[model])).thresholds.values.max() < top
+        assert HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model])).thresholds.values.max() < top
 
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
 def test_the_term_is_0_everywhere_below(model):
     """No second lobe: the unit shades nothing from N.H = -1 up to the threshold and its margin."""
-    gate, rng = HighlightGate(Specular(REFLECTION_MODELS[model])), np.random.default_rng(9)
+    gate, rng = HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model])), np.random.default_rng(9)
     for exponent in (2, 3, 5, 10, 20, 100, 500, 1000):
         # T was cut, so the root is under tau.
         tau = np.sqrt(gate.thresholds.values[exponent])
@@ -262,11 +265,11 @@ def test_margin_covers_the_pipeline():
         np.sqrt(3) * 2.0**-18,
     ]
     assert 4.2 * 2.0**-17 < sum(terms) < 4.45 * 2.0**-17 < MARGIN
-    rng, gate = np.random.default_rng(5), HighlightGate()
+    rng, gate = np.random.default_rng(5), HighlightGate(LIMITS)
     worst = 0
     for exponent in (10, 1000):
         left, right, halfway = random_spans(rng, 20_000, exponent, gate)
-        cosine = largest_cosine(gate.interpolator, left, right, halfway, rng.integers(1, 20, len(left)))
+        cosine = largest_cosine(METHOD, left, right, halfway, rng.integers(1, 20, len(left)))
         one = ONE_SQUARED.values
         a, b = (np.einsum("ij,ij->i", end, halfway) * 2.0**-34 for end in (left, right))
         r = np.einsum("ij,ij->i", left, right) * 2.0**-34 / one
@@ -281,7 +284,7 @@ def test_margin_covers_the_pipeline():
 @pytest.mark.long
 def test_thresholds_lie_under_what_the_unit_shades():
     for model in SPECULAR_MODELS + FURTHER_MODELS:
-        gate = HighlightGate(Specular(REFLECTION_MODELS[model]))
+        gate = HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model]))
         lowest = gate.thresholds.values
         for exponent in (1, 2, 3, 10, 100, 500, 999, 1000):
             # The largest N·H that is shaded 0, by halving.
@@ -303,7 +306,7 @@ def test_thresholds_lie_under_what_the_unit_shades():
 
 def test_stiff_spans():
     """Equal and opposite normals, spans out of range, corners of the words, a highlight inside one span."""
-    gate, rng = HighlightGate(), np.random.default_rng(6)
+    gate, rng = HighlightGate(LIMITS), np.random.default_rng(6)
 
     def lit(left, right, halfway, exponent):
         return gate.compute(*component_words(*map(np.asarray, (left, right, halfway))), exponent)
@@ -333,10 +336,10 @@ def test_stiff_spans():
 def test_bad_arguments_are_refused():
     for bits in (4, 18):
         with pytest.raises(ValueError, match=rf"^fraction_bits must be 5 to 17, not {bits}$"):
-            HighlightGate(fraction_bits=bits)
+            HighlightGate(LIMITS, fraction_bits=bits)
     zero = Fixed(COMPONENT, [[0, 0, 0]])
     for exponent in (0, 1001):
         with pytest.raises(ValueError, match=r"^exponents must be 1 to 1000$"):
-            HighlightGate().compute(zero, zero, zero, exponent)
+            HighlightGate(LIMITS).compute(zero, zero, zero, exponent)
     with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 17\) and SQ\(1, 17\), not "):
-        HighlightGate().compute(zero, Fixed(MiddleNormal.FORMAT, [[0, 0, 0]]), zero, 10)
+        HighlightGate(LIMITS).compute(zero, Fixed(MiddleNormal.FORMAT, [[0, 0, 0]]), zero, 10)

@@ -6,7 +6,8 @@ import pytest
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import NormalInterpolator
+from blysk.golden.methods.normal_interpolator import NormalInterpolator
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
@@ -17,12 +18,14 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.sim.units.lighting.highlight_gate import spans_about
 from blysk.sim.units.operands import component_words, pairs_at, sphere, unit_codes
 
+LIMITS = QuadraticInterpolator().gate_limits
+
 
 def suppressed(model, left, right, halfway, length, exponent, method="quadratic", operand=None):
     """Which spans are not lit, and which of these have a term other than 0 in the pipeline of a method."""
     pipeline = preset(method, model, operand=operand)
     interpolator = pipeline.interpolator
-    gate = HighlightGate(pipeline.specular, interpolator=interpolator)
+    gate = HighlightGate(interpolator.gate_limits, pipeline.specular)
     left, right, halfway = component_words(left, right, halfway)
     lit = gate.compute(left, right, halfway, exponent)
     span, _ = pixels_of(length)
@@ -85,7 +88,10 @@ def test_stiff_normals_of_wrong_length(exponent):
     is step 5. G and P stay in their words up to a length of 1.075. Before that, a component of the middle
     normal over 1 saturates, for ends over 1 alone: see `test_stiff_normals_too_long`.
     """
-    rng, threshold = np.random.default_rng(exponent), np.sqrt(HighlightGate().thresholds.values[exponent])
+    rng, threshold = (
+        np.random.default_rng(exponent),
+        np.sqrt(HighlightGate(LIMITS).thresholds.values[exponent]),
+    )
     dark = 0
     for low, high in ((1 - 1 / 256, 1 - 1 / 256), (1 - 1 / 256, 1 + 1 / 256), (0.5, 1.0)):
         spans = spans_of_length(rng, 20_000, low, high, threshold)
@@ -111,7 +117,7 @@ def test_stiff_normals_of_wrong_length_by_other_methods(method):
     """As the quadratic method by differences, where N.H is taken of normals that follow the ends' lengths."""
     rng = np.random.default_rng(13)
     for exponent in (2, 10, 100, 1000):
-        threshold = np.sqrt(HighlightGate().thresholds.values[exponent])
+        threshold = np.sqrt(HighlightGate(LIMITS).thresholds.values[exponent])
         for low, high in ((1 - 1 / 256, 1 + 1 / 256), (0.5, 1.0)):
             spans = spans_of_length(rng, 3000, low, high, threshold)
             not_lit, lost = suppressed("cosquad", *spans, rng.choice([3, 5], 3000), exponent, method)
@@ -137,7 +143,7 @@ def test_stiff_normals_of_wrong_length_lose_highlights(method, operand, short, l
     """
     # One call a span costs more than arithmetic.
     count = 120 if method in ("angular", "recurrence") else 4000
-    threshold = np.sqrt(HighlightGate().thresholds.values[100])
+    threshold = np.sqrt(HighlightGate(LIMITS).thresholds.values[100])
     for scale, loses in ((1 - 1 / 256, short), (1.0, False), (1 + 1 / 256, long)):
         rng = np.random.default_rng(14)
         spans = spans_of_length(rng, count, scale, scale, threshold)
@@ -171,7 +177,7 @@ def test_stiff_normals_too_long(model, exponent):
 
     Where the middle normal saturates, the three wide models with the lowest threshold over 0 suffer first.
     """
-    threshold = np.sqrt(HighlightGate(Specular(REFLECTION_MODELS[model])).thresholds.values[exponent])
+    threshold = np.sqrt(HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model])).thresholds.values[exponent])
     assert 0 < threshold < 0.07
     rng = np.random.default_rng(12)
     for excess, safe in ((1 / 256, True), (1 / 128, True), (1 / 16, False)):

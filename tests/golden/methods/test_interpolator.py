@@ -6,8 +6,8 @@ import pytest
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.interpolator import Interpolator, NormalInterpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
+from blysk.golden.methods.normal_interpolator import EndNormalInterpolator, NormalInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.normals.renormaliser import Renormaliser
@@ -210,7 +210,7 @@ def test_refuses():
     with pytest.raises(ValueError, match=r"'spline'"):
         QuadraticInterpolator(form="spline")
     with pytest.raises(NotImplementedError):
-        Interpolator().compute(None, None, None, None, None)
+        EndNormalInterpolator().compute(None, None, None, None, None)
     wrong = Fixed(SQ(2, 16), np.zeros((1, 3), int))
     with pytest.raises(ValueError, match=r"^operands? must be "):
         METHODS["quadratic"].compute(wrong, wrong, np.array([2]), wrong, wrong)

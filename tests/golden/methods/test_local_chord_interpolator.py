@@ -226,8 +226,3 @@ def test_total_error(exponent, opposite):
     assert np.count_nonzero(terms[1] > 0.1) > 500
     assert 0.02 < diffuse.max() <= METHOD.DIFFUSE_BUDGET
     assert 0.02 < specular.max() <= METHOD.HIGHLIGHT_BUDGET
-
-
-def test_refuses_normals():
-    with pytest.raises(ValueError, match=r"^the local chord method takes values of its spans, not normals"):
-        METHOD.compute(None, None, np.array([2]), None, None)

@@ -184,11 +184,3 @@ def test_vectors_through_0_are_flagged():
     vectors = SpanVectors.quantise(ends, -ends, np.array([9, 9]))
     codes = np.array([[0, 0, spans.ONE]])
     assert method.compute_vectors(spans, vectors, np.array([9, 9]), codes).out_of_range.all()
-
-
-def test_normals_are_refused():
-    with pytest.raises(
-        ValueError,
-        match=r"^the quotient method takes vectors of its spans, not normals; see compute_vectors$",
-    ):
-        QuotientInterpolator().compute(None, None, None, None, None)

@@ -8,6 +8,8 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.sim.units.lighting.highlight_gate import RECORD
 
+GATE = RECORD.variants[RECORD.default].unit().parameters
+
 
 @pytest.mark.parametrize("variant", RECORD.variants)
 def test_spans_of_the_record_are_decided_both_ways(variant):
@@ -21,7 +23,7 @@ def test_spans_of_the_record_are_decided_both_ways(variant):
 @pytest.mark.long
 @pytest.mark.parametrize(("lights", "exponent", "interval"), [(2, 60, 27), (3, None, 4), (1, 60, 6)])
 def test_multipliers_and_tables_of_several_lights(lights, exponent, interval):
-    cost = cost_of(HighlightGateUnit(None, lights, initiation_interval=interval, exponent=exponent))
+    cost = cost_of(HighlightGateUnit(GATE, lights, initiation_interval=interval, exponent=exponent))
     assert cost.multiplier_count == -(-(3 + 12 * lights) // interval)
     assert cost.rom_bits == (1024 * 17 if exponent is None else 0)
 
@@ -29,4 +31,4 @@ def test_multipliers_and_tables_of_several_lights(lights, exponent, interval):
 def test_refusals():
     for exponent in (0, 1001):
         with pytest.raises(ValueError, match=rf"^exponent must be 1 to 1000, not {exponent}$"):
-            HighlightGateUnit(exponent=exponent)
+            HighlightGateUnit(GATE, exponent=exponent)

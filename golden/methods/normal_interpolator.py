@@ -1,0 +1,229 @@
+"""Methods whose spans carry normals at their ends, and those of them that find the normal of each pixel."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blysk.golden.beats import Spans
+from blysk.golden.cosines.chord import Chord
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.lighting.gate import Gate
+from blysk.golden.lighting.highlight_gate import GateLimits, HighlightGate
+from blysk.golden.lighting.highlight_operand import HighlightOperand
+from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.frame_steps import ExactShading, SpanCutter, SpanFiller
+from blysk.golden.methods.interpolator import Interpolator, Operand, Operands
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT
+from blysk.golden.reference.raster import Raster
+
+__all__ = ["EndNormalInterpolator", "NormalInterpolator", "difference_rounding"]
+
+
+def difference_rounding(pixel: int) -> float:
+    """Bound of the rounding error of a normal by forward differences: of the result and of both differences.
+
+    ``sqrt(3) (2^-18 + 2^-42 (k + k^2/2))`` at pixel k, as derived in `DifferenceSetup`.
+
+    Parameters
+    ----------
+    pixel : int
+        Index k of the pixel, from 0 on.
+    """
+    return float(np.sqrt(3) * (2.0**-18 + 2.0**-42 * (pixel + pixel**2 / 2)))
+
+
+@dataclass(frozen=True)
+class EndNormalInterpolator(Interpolator):
+    """A method whose spans carry normals at both ends; `compute` is its bit-accurate model.
+
+    Its spans are cut until the curve keeps its tolerance, and filled with unit normals. Triangles give them.
+    A `HighlightGate` can foresee its highlights.
+    """
+
+    @property
+    def serves_gate(self) -> bool:
+        """``True``: the method has a bound of `highlight_excess`."""
+        return True
+
+    @property
+    def gate_angle(self) -> float:
+        """Largest angle of a span, in degrees, for `highlight_excess`: 45, or `MAX_ANGLE` if less."""
+        return min(self.MAX_ANGLE, MAX_SPAN_ANGLE)
+
+    @property
+    def highlight_excess(self) -> float:
+        """Bound of the excess of N·H over that of the great circle, for spans up to `gate_angle`.
+
+        With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
+        `ONE_SQUARED`, no pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under ``shortest_normal
+        (1 - c) - highlight_excess``. A highlight gate relies on it.
+        """
+        raise NotImplementedError
+
+    @property
+    def shortest_normal(self) -> float:
+        """Least length of a normal on the curve, for spans up to `gate_angle`; 1 without chords to H."""
+        return 1.0
+
+    @property
+    def gate_limits(self) -> GateLimits:
+        """What a highlight gate relies on: `highlight_excess`, `shortest_normal` and `gate_angle`."""
+        return GateLimits(self.highlight_excess, self.shortest_normal, self.gate_angle)
+
+    def gate(self, specular: HighlightOperand) -> Gate:
+        """Model of the gate by unit normals, see `Interpolator.gate`."""
+        return HighlightGate(self.gate_limits, specular) if self.serves_gate else super().gate(specular)
+
+    def operands(self, spans: Spans, constants: FrameConstants, highlights: bool) -> Operands:
+        """Bit-accurate operands by `compute`, from the normals of spans, see `Interpolator.operands`."""
+        left, right = (Fixed(self.END_FORMAT, codes) for codes in (spans.normal_left, spans.normal_right))
+        vectors = [Fixed(COMPONENT, codes) for codes in (constants.direction, constants.halfway)]
+        return self.compute(left, right, np.asarray(spans.length), *vectors)
+
+    def geometry(self, lights: int) -> Geometry:
+        """Geometry that makes unit normals."""
+        return Geometry()
+
+    def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
+        """Spans cut until the curve keeps its tolerance."""
+        return cutter.by_error()
+
+    def filled(self, filler: SpanFiller) -> Spans:
+        """Spans with unit normals."""
+        return filler.with_normals()
+
+    def exact_frame(self, shading: ExactShading) -> np.ndarray:
+        """A frame by the normals of the curve, in exact arithmetic."""
+        return shading.by_normals()
+
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
+        """Bit-accurate operands of every pixel, in the order of the spans.
+
+        Parameters
+        ----------
+        normal_left, normal_right : Fixed, shape (spans, 3), SQ(1, 17)
+            Unit normals of the first and last pixel centre.
+        length : int array, shape (spans,)
+            Pixels, 1 to 4095.
+        direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
+            Unit vectors L and H of each light.
+        """
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class NormalInterpolator(EndNormalInterpolator):
+    """A method that computes normals, and the products of these with L and H.
+
+    Parameters
+    ----------
+    operand : str
+        ``"cosine"``: the operand of the specular unit is N·H. ``"one_minus_cosine"``: it is half the squared
+        chord, ``|N - H|^2 / 2`` of `Chord`, in which the length of N counts only at second order.
+
+    Raises
+    ------
+    ValueError
+        If the operand is neither.
+    """
+
+    operand: Operand = "cosine"
+
+    def __post_init__(self) -> None:
+        if self.operand not in ("cosine", "one_minus_cosine"):
+            raise ValueError(f"operand must be 'cosine' or 'one_minus_cosine', not {self.operand!r}")
+
+    def with_operand(self, operand: Operand) -> "NormalInterpolator":
+        """The method with another operand of the specular unit."""
+        return replace(self, operand=operand)
+
+    @property
+    def uses_chord(self) -> bool:
+        """Whether ``operand`` is ``"one_minus_cosine"``."""
+        return self.operand == "one_minus_cosine"
+
+    @property
+    def normal_error(self) -> float:
+        """Largest distance of a normal from the method's curve; the curve stays inside the unit circle."""
+        raise NotImplementedError
+
+    @property
+    def shortest_length(self) -> float:
+        """Least length of a normal on the method's curve, for spans to `gate_angle`."""
+        return 1.0
+
+    @property
+    def highlight_excess(self) -> float:
+        """`normal_error`; with half the squared chord, as ``|N - H| <= 2``, twice the error, and the cut.
+
+        On a curve of length r, where c is the cosine to H, half the squared chord is ``(1 - r)^2/2 + r (1 -
+        c)``, which is at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from 1.
+        """
+        if not self.uses_chord:
+            return self.normal_error
+        return 2 * (self.normal_error + 2 * CODE_LENGTH_ERROR) + Specular.ARGUMENT_FORMAT.step
+
+    @property
+    def shortest_normal(self) -> float:
+        """`shortest_length` if the operand is half the squared chord, else 1."""
+        return self.shortest_length if self.uses_chord else 1.0
+
+    def normals(
+        self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
+    ) -> tuple[Fixed, np.ndarray]:
+        """Bit-accurate normals of every pixel, and which spans are out of range.
+
+        Parameters
+        ----------
+        normal_left, normal_right, length
+            As for `compute`.
+
+        Returns
+        -------
+        normals : Fixed, shape (pixels, 3), SQ(1, 17)
+        out_of_range : bool array, shape (spans,)
+        """
+        raise NotImplementedError
+
+    def products(self, normals: Fixed, direction: Fixed, halfway: Fixed) -> tuple[Fixed, Fixed]:
+        """N·L, exact, and the operand of the specular unit.
+
+        This is N·H, exact, or half the squared chord, cut to 25 fraction bits.
+
+        Parameters
+        ----------
+        normals : Fixed, shape (pixels, 3), SQ(1, 17)
+            Normal of each pixel.
+        direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
+            L and H of each light.
+
+        Returns
+        -------
+        cosine, highlight : Fixed, shape (pixels, lights)
+        """
+        normals = Fixed(COMPONENT, normals.codes[:, np.newaxis])
+        product = Chord().operand if self.uses_chord else DotProduct().compute
+        return DotProduct().compute(normals, direction), product(normals, halfway)
+
+    def compute(
+        self,
+        normal_left: Fixed,
+        normal_right: Fixed,
+        length: np.ndarray,
+        direction: Fixed,
+        halfway: Fixed,
+    ) -> Operands:
+        """Bit-accurate operands: products of the normals."""
+        normals, out_of_range = self.normals(normal_left, normal_right, length)
+        return Operands(*self.products(normals, direction, halfway), out_of_range)
