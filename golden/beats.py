@@ -20,7 +20,7 @@ class Spans:
     x, y : int arrays, shape (spans,)
         First pixel of each span, 0 to 4095, or the largest coordinate of the pipeline.
     length : int array, shape (spans,)
-        Number of pixels, 0 to 4095. A span of length 0 gives no pixel; after the largest x, x goes on from 0.
+        Number of pixels, 0 to 4095. A span of length 0 gives no pixel. After the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
         Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or the vectors that the
         method takes, codes of its `Interpolator.END_FORMAT`.
@@ -29,7 +29,7 @@ class Spans:
     values : SpanValues, optional
         Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
     factors : int64 array, shape (spans, factors, 3), optional
-        With values: codes of the factors, in the format of N·L, of the lights in `Design.factors`.
+        For spans with values: codes of the factors of the lights in `Design.factors`, in the format of N·L.
     vectors : SpanVectors, optional
         Vectors at the first pixel and their step, for methods with `Interpolator.TAKES_VECTORS`, which read
         no normals.
@@ -77,7 +77,7 @@ class Pixels:
     last : bool array, shape (pixels,)
         Whether a pixel is the last of its span.
     out_of_range_spans : int
-        Number of spans with a larger angle than the method serves; their pixels have no error bound.
+        Number of spans with a larger angle than the method serves. Their pixels have no error bound.
     """
 
     x: np.ndarray

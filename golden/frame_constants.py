@@ -1,4 +1,4 @@
-"""Frame constants: the words that a pipeline is given before a frame, and their addresses."""
+"""Frame constants: the words that a pipeline gets before a frame, and their addresses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,10 +38,10 @@ FIELDS_OF_A_LIGHT = {"direction": (0, 3), "halfway": (3, 3), "diffuse": (6, 3), 
 """First address, from ``(light + 1) * LIGHT_STRIDE`` on, and number of words of each field of a light."""
 
 MATERIAL_ADDRESS = 4
-"""Address of the index of a material, in a pipeline with several; the constants written next belong to it."""
+"""Address of the index of a material, in a pipeline with several. Later constants belong to this material."""
 
 LOBE_ADDRESS = 5
-"""Address by which tables of lobes are loaded, see `LobeTable.writes`; bit 17 of the data is ``begins``."""
+"""Address that loads tables of lobes, see `LobeTable.writes`; bit 17 of the data is ``begins``."""
 
 THRESHOLD_ADDRESS = 6
 """Address of a material's threshold, see `Design.threshold_of`, in a pipeline that loads tables."""
@@ -50,9 +50,9 @@ BANK_ADDRESS = 7
 """Address of the bank of a material's table, in a pipeline with several banks."""
 
 AXES_ADDRESS = 256
-"""Address from which on further lights have the axes of their frames, `LIGHT_STRIDE` addresses each.
+"""First address of the axes of further lights' frames, `LIGHT_STRIDE` addresses a light.
 
-For hardware that makes their components of a vector in the frame of the first light, see `LightAdapter`.
+Hardware turns vectors from the frame of the first light into these frames, see `LightAdapter`.
 """
 
 AXIS_STRIDE = 4
@@ -88,13 +88,13 @@ class FrameConstants:
     lobe : LobeTable, optional
         Table of the lobe, for a design whose specular unit has tables; see `prepare.constants_of`.
     bank : int
-        Bank of that table.
+        Bank of this table.
     threshold : int, optional
-        Threshold of that table, see `Design.threshold_of`, for a design with a gate.
+        Threshold of this table, see `Design.threshold_of`, for a design with a gate.
     axes : int array, shape (lights - 1, rows, 3), optional
-        Axes of the frame of each further light, in the frame of the first: x, y, z, or with highlights of R·V
-        x, ``y cos a``, z, or without highlights z alone; ``SQ(1, 17)``. For a renderer of triangles whose
-        method takes vectors.
+        Axes of the frame of each further light, in the frame of the first light, ``SQ(1, 17)``. The rows are
+        x, y, z; with highlights of R·V x, ``y cos a``, z; without highlights z alone. For a renderer of
+        triangles whose method takes vectors.
     """
 
     exponent: int
@@ -137,17 +137,19 @@ class FrameConstants:
     ) -> "FrameConstants":
         """Constants of a scene and one of its materials, for a pipeline with ``lights`` lights.
 
-        Lights that the scene does not have are black. A light straight behind the surface that faces the
-        viewer (``L = -V``) has no half-way vector, and no specular light but that of R·V. With point lights
-        or a near viewer L and H are not constants of a frame: both are 0. A light that is off has vectors and
-        colours of 0: its terms are 0, and the compact style spends no cycle on them. Fresnel's reflection of
-        a distant light and viewer is a constant, and part of the specular colour.
+        - Lights that the scene does not have are black.
+        - A light straight behind the surface that faces the viewer (``L = -V``) has no half-way vector. It
+          has specular light only by R·V.
+        - With point lights or a near viewer L and H change within a frame: both are 0.
+        - A light that is off has vectors and colours of 0. So its terms are 0, and the compact style spends
+          no cycle on them.
+        - Fresnel's reflection of a distant light and viewer is a constant, and part of the specular colour.
 
-        With ``energy`` the highlight is that of the energy-normalised form: the factor of
-        `ReflectionModel.energy_factor` multiplies k_s here, once a frame, and the specular unit stays as it
-        is. The factor multiplies the unit's error, too. A colour operand holds ``k_s I_i`` times the factor
-        up to 8, which with ``k_s I_i = 1`` allows exponents up to 48 (``phong``), 195 (``blinn``) and 36
-        (``cosquad_lin``); higher ones need a darker k_s.
+        With ``energy`` the highlight has the energy-normalised form: `ReflectionModel.energy_factor`
+        multiplies k_s here, once a frame. The specular unit stays as it is. The factor multiplies the unit's
+        error, too. A colour operand holds ``k_s I_i`` times the factor up to 8. With ``k_s I_i = 1`` this
+        allows exponents up to 48 (``phong``), 195 (``blinn``) and 36 (``cosquad_lin``). Higher exponents need
+        a darker k_s.
 
         Parameters
         ----------
@@ -161,7 +163,7 @@ class FrameConstants:
         index : int
             Index of the material.
         mirror : bool
-            Whether the highlight is one of R·V.
+            Whether the highlight is of R·V.
 
         Raises
         ------
@@ -243,7 +245,7 @@ class FrameConstants:
 def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
     """Beats for the write port, from the constants of each material; see `FrameConstants.writes`.
 
-    A table that several materials have is loaded once.
+    A table of several materials is loaded once.
     """
     if len(constants) == 1:
         return constants[0].writes()
@@ -268,11 +270,11 @@ VECTOR_MEANINGS = {
     "vectors": {"direction": "sin a, 0, cos a of the light's frame", "halfway": "not read"},
     "values": {"direction": "not read", "halfway": "not read"},
 }
-"""What the vectors of a light are, by what a span brings, see `Design.span_members`."""
+"""Meanings of the vectors of a light, by the kind of span, see `Design.span_members`."""
 
 
 def by_material(constants: FrameConstants | Sequence[FrameConstants]) -> list[FrameConstants]:
-    """Constants of each material, from those of the only material or of each."""
+    """Constants of each material, from the constants of the only material or of each material."""
     return [constants] if isinstance(constants, FrameConstants) else list(constants)
 
 
@@ -298,7 +300,7 @@ def address_table(
     loads_tables : bool
         Whether tables are loaded.
     members : str
-        What a span brings, see `Design.span_members`.
+        Kind of span, see `Design.span_members`.
     axes : sequence of str
         Names of the axes that each further light has, see `FrameConstants.axes`.
     """

@@ -18,9 +18,10 @@ class Gpu:
     Parameters
     ----------
     drawing : Drawing
-        What is drawn; its picture has the size of the display.
+        The drawing unit. Its picture has the size of the display.
     buffer : BandBuffer
-        Band buffer: display mode, lines of a band, as many as of the drawing, colours, background.
+        Band buffer: display mode, lines of a band, colours, background. A band has as many lines as a band of
+        the drawing.
 
     Raises
     ------

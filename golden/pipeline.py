@@ -38,7 +38,7 @@ class Build:
     style : {"throughput", "compact"}
         One pixel a cycle, or few multipliers.
     setup_interval : int or None
-        Least number of cycles from a span to the next, for methods with that choice: a smaller number needs
+        Least number of cycles from a span to the next, for methods with this choice. A smaller number needs
         more multipliers. ``None``: the largest up to 4 (``renormalise``: 3), or the largest of all in the
         compact style.
     exponent : int or None
@@ -82,25 +82,28 @@ class Design:
         Whether a gate decides which spans have no highlight; it changes no pixel. ``chord-local``
         has a `ValueGate`, methods of unit normals a `HighlightGate`.
     grey : bool
-        Whether there is one channel in place of three: it uses the colour operands of red, and the pixel
+        Whether there is one channel in place of three. It uses the colour operands of red, and the pixel
         repeats it three times.
     x_bits, y_bits, length_bits : int
         Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
     factors : tuple of int
-        Indices, in ascending order, of the lights that fade by their distance or as a spot: the specular term
-        of each is multiplied by a factor. For methods that take values, with specular light. Other lights
-        need no hardware for it.
+        Indices, in ascending order, of the lights that fade by their distance or as a spot. A factor
+        multiplies the specular term of each. For methods that take values, with specular light. Other lights
+        need no hardware for a factor.
     build : Build
-        How it is built.
+        Build options.
 
     Raises
     ------
     ValueError
-        If the number of lights or materials or a number of bits is out of range; a gate is asked for without
-        specular light, or with a method that has no error bound or no normals; an exponent is fixed
-        with a lobe, or a lobe takes 1 - N·H with other than 25 fraction bits; the method has a scale and
-        there is no lobe; or factors are not different lights in order, or lack specular light or a method
-        that takes values.
+        In one of these cases:
+
+        - the number of lights or materials or a number of bits is out of range;
+        - there is a gate, and no specular light, or the method has no error bound or no normals;
+        - an exponent is fixed with a lobe;
+        - a lobe takes 1 - N·H with other than 25 fraction bits;
+        - the method has a scale, and there is no lobe;
+        - factors are not different lights in order, or lack specular light or a method that takes values.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -177,8 +180,8 @@ class Design:
         materials : sequence of Material
             Materials of the scene.
         scaled : bool
-            Whether ``chord-local`` may have a scale for sharp lobes, see `Lobe.scale_of`: for spans that are
-            cut for the design.
+            Whether ``chord-local`` may have a scale for sharp lobes, see `Lobe.scale_of`. The spans then have
+            to be cut for this design.
         """
         specular, interpolator = self.specular, self.interpolator
         if self.loads_tables and self.lobe.fixed is None:
@@ -218,7 +221,7 @@ class Design:
 
     @property
     def mirror(self) -> bool:
-        """Whether the highlight is one of R·V, not of N·H."""
+        """Whether the highlight is of R·V in place of N·H."""
         return self.specular is not None and self.specular.model.MIRROR
 
     @property
@@ -284,7 +287,7 @@ class Design:
         spans : Spans
             Spans to shade.
         constants : FrameConstants or sequence of FrameConstants
-            Constants of the only material, or of each material; L and H of the first one are used.
+            Constants of the only material, or of each material. L and H come from the first.
 
         Raises
         ------

@@ -78,9 +78,10 @@ LOBES: dict[str, Lobe] = {
         Lobe(GGX),
     )
 }
-"""Specular units with a table that is written for each frame, by name; every method serves each. At their
-size (704 words for ``phong_coplanar``, 336 for the others) the largest error of a table found at any
-exponent is 0.06 LSB against its model; for roughness see `Lobe`."""
+"""Specular units with a table that is written for each frame, by name; every method serves each. A table has
+704 words for ``phong_coplanar``, 336 for the others. At any exponent its largest error found is 0.06 LSB
+against its model; for roughness see `Lobe`.
+"""
 
 MIRROR_LOBES: dict[str, Lobe] = {PHONG.name: QuotientLobe(PHONG)}
 """Specular units of models of R·V, by name; the method ``quotient`` serves each."""
@@ -102,10 +103,15 @@ def default_method(
 ) -> str:
     """The method of a design that names none.
 
-    It is ``quotient``; models of R·V need it. ``renormalise``, the most exact method of normals, serves what
-    ``quotient`` lacks: a model of `MODELS`, which has a unit of its own in place of a table; an operand; a
-    setup interval. It has no bound for a highlight gate. A gate gets ``quadratic``: of the documents' methods
-    none is more exact, or takes fewer cycles.
+    It is ``quotient``, which models of R·V need. Three options, which ``quotient`` lacks, get
+    ``renormalise``, the most exact method of normals:
+
+    - a model of `MODELS`, which has a unit of its own in place of a table;
+    - an operand;
+    - a setup interval.
+
+    A gate gets ``quadratic``, because ``renormalise`` has no bound for a highlight gate. No method of the
+    documents is more exact, or takes fewer cycles.
 
     Parameters
     ----------
@@ -136,10 +142,10 @@ def preset(
     Parameters
     ----------
     method : str, optional
-        One of `METHODS` or `PUBLISHED`; by default that of `default_method`.
+        One of `METHODS` or `PUBLISHED`; by default `default_method`.
     model : str or ReflectionModel or None
-        One of `MODELS`, `LOBES` or, of the method ``quotient``, `MIRROR_LOBES`; or a reflection model of N·H,
-        such as a `TabulatedModel`, for which the design has a table; ``None``: no specular light.
+        One of `MODELS`, `LOBES` or, for the method ``quotient``, `MIRROR_LOBES`. Or a reflection model of
+        N·H, such as a `TabulatedModel`; the design then has a table. ``None``: no specular light.
     lights : int
         Number of lights, 0 to 16.
     operand : {"cosine", "one_minus_cosine"}, optional
@@ -147,7 +153,7 @@ def preset(
     style, setup_interval
         See `Build`.
     exponent, roughness : optional
-        Fixed at build time: `Build.exponent`, or that of a lobe's table (`Lobe.fixed`).
+        Parameter fixed at build time: `Build.exponent`, or the parameter of a lobe's table (`Lobe.fixed`).
     **options
         Further fields of `Design`, of the lobe, or of the method; ``None``: the default. A lobe has as many
         ``banks`` as there are materials, at most `Lobe.MAX_BANKS`.

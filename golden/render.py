@@ -25,7 +25,7 @@ _OF_THE_METHOD = Geometry()
 
 @dataclass(frozen=True)
 class DrawnPixels:
-    """Pixels in the order in which they are drawn, with those that a nearer pixel overwrites later.
+    """Pixels in the order of drawing. A nearer pixel may overwrite a pixel later.
 
     Parameters
     ----------
@@ -38,10 +38,10 @@ class DrawnPixels:
     triangle : int64 array, shape (P,)
         Index of the triangle.
     spans : TrueSpans, LineSpans or VectorSpans
-        What was shaded.
+        The shaded spans.
     counts : dict of str to int
-        `COUNTERS` of geometry; numbers of ``spans`` and ``pixels`` that were shaded; number of these pixels
-        that were ``hidden``; number of pixels of spans that were ``dropped`` before shading.
+        `COUNTERS` of geometry; numbers of shaded ``spans`` and ``pixels``; number of ``hidden`` pixels among
+        them; number of pixels of spans ``dropped`` before shading.
     out_of_range_spans : int
         Number of spans with a larger angle than the method serves.
     """
@@ -71,12 +71,11 @@ class Renderer:
     design : Design
         The shading pipeline, of a method that takes normals or vectors.
     geometry : Geometry
-        The part that makes spans of triangles, with ``lines`` for a method that takes true lines, with
-        ``vectors`` for one that takes vectors, and ``rotates``, too, if there are several lights. By
-        default the geometry that suits the method.
+        The part that makes spans of triangles. It has ``lines`` for a method that takes true lines, and
+        ``vectors`` for a method that takes vectors; with several lights ``rotates``, too. By default the
+        geometry suits the method.
     coarse : CoarseDepth, optional
-        Depth test that drops spans, before they are shaded, if all of their pixels are hidden; the picture is
-        the same.
+        Depth test that drops a span before shading if all of its pixels are hidden. The picture is the same.
 
     Raises
     ------
@@ -100,7 +99,7 @@ class Renderer:
 
     @property
     def mirrors(self) -> bool:
-        """Whether vectors of geometry get the components of R·V, by `MirrorAdapter`."""
+        """Whether `MirrorAdapter` adds the components of R·V to the vectors of geometry."""
         return self.design.takes_vectors and self.design.mirror and self.design.lights > 0
 
     @property

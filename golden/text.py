@@ -22,8 +22,9 @@ def is_wide(data: bytes) -> bool:
 def plain_text(data: bytes, errors: str = "strict") -> str:
     r"""The text of a file's bytes: UTF-8, or in the encoding of its byte order mark.
 
-    Each line ends with ``\n``, also where the file has ``\r\n`` or a lone ``\r``. Marks are removed wherever
-    they stand, as joined files have them inside; so are the bytes 0 and 26 that old programs put at the end.
+    Each line ends with ``\n``, also where the file has ``\r\n`` or a lone ``\r``. Byte order marks are
+    removed everywhere, because joined files have them inside. The bytes 0 and 26, which old programs put at
+    the end, are removed, too.
 
     Parameters
     ----------

@@ -106,7 +106,10 @@ def markdown(text: str) -> str:
                 k += 1
                 body.append(lines[k].strip())
             entry = f"- {names}" + (f" ({kind})" if kind else "")
-            found.append(f"{entry}: {inline(' '.join(body))}" if body else entry)
+            # A list inside the text stays a list.
+            parts = re.split(r"\n+- ", "\n".join(body))
+            found.append(f"{entry}: {inline(' '.join(parts[0].split()))}" if body else entry)
+            found += [f"  - {inline(' '.join(part.split()))}" for part in parts[1:]]
         else:
             if line.startswith("Source:"):
                 in_section = False

@@ -1,9 +1,9 @@
 """Fixed-point formats and NumPy arrays of fixed-point numbers.
 
-A format is ``SQ(i, f)`` (two's complement, the sign bit counted in ``i``) or ``UQ(i, f)`` (unsigned),
-with ``i`` integer bits and ``f`` fraction bits. A number is its integer *code* times ``2**-f``. Either
-count may be negative as long as the width ``i + f`` is 1 to 63 bits: ``UQ(-3, 20)`` has 17 bits, for numbers
-less than one eighth.
+A format is ``SQ(i, f)`` (two's complement, the sign bit counted in ``i``) or ``UQ(i, f)`` (unsigned), with
+``i`` integer bits and ``f`` fraction bits. A number is its integer *code* times ``2**-f``. The width
+``i + f`` is 1 to 63 bits. Either count may be negative: ``UQ(-3, 20)`` has 17 bits, for numbers less than one
+eighth.
 
 Every operation is exact: its result has a format that holds every outcome. Only four operations lose bits:
 `Fixed.truncate`, `Fixed.round_half_up`, `Fixed.saturate`, `Fixed.wrap`. `blysk.hdl.core.fixed` has the same
@@ -79,7 +79,7 @@ class Format:
         return 2.0**-self.fraction_bits
 
     def wrap(self, codes: np.ndarray) -> np.ndarray:
-        """Codes with the same low bits as integers of any size; int64 sums may have overflowed."""
+        """Codes with the low bits of integers of any size; an int64 sum may have overflowed."""
         low = codes & ((1 << self.width) - 1)
         return low - ((low >> (self.width - 1)) << self.width) if self.signed else low
 
@@ -325,7 +325,7 @@ class Fixed:
         return Fixed._exact(format, np.clip(self.codes, format.min_code, format.max_code))
 
     def wrap(self, format: Format) -> "Fixed":
-        """Keep the low bits: the value modulo ``2**integer_bits`` of a format with the same fraction bits.
+        """Keep the low bits: the value modulo ``2**integer_bits``, in a format with the same fraction bits.
 
         Raises
         ------

@@ -104,7 +104,7 @@ def minimax_quantised(
 ) -> np.ndarray:
     """Minimax coefficients in hardware formats, rounded and fitted again one after the other.
 
-    Each coefficient, lowest power first, is rounded to its format and held; the others are fitted again and
+    Each coefficient, lowest power first, is rounded to its format and held. The others are fitted again, and
     compensate most of its rounding error.
 
     Parameters

@@ -17,9 +17,9 @@ RECIPROCAL_FORMAT = UQ(0, 17)
 def reciprocal_table(format: Format = RECIPROCAL_FORMAT) -> Fixed:
     """Table of ``1/f``, f in [1, 2): ``1/(1 + k/2048)`` at address k, rounded half up.
 
-    The word at address 0 is 1/2, as the format does not hold 1; `reciprocal_address` shifts it by one bit
-    less. The error of a word is at most half a step of the format, with F fraction bits at most a relative
-    ``2^-F``.
+    The format does not hold 1, so the word at address 0 is 1/2. `reciprocal_address` shifts this word by one
+    bit less. The error of a word is at most half a step of the format. With F fraction bits this is at most a
+    relative ``2^-F``.
 
     Parameters
     ----------
@@ -42,8 +42,7 @@ def reciprocal_table(format: Format = RECIPROCAL_FORMAT) -> Fixed:
 def reciprocal_address(steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Address in `reciprocal_table`, and the shift s of ``1/steps = 2 reciprocal 2^-s``.
 
-    ``steps`` is ``f 2^p`` with f in [1, 2); the address is the fraction of f, and s is p if f is 1, else
-    p + 1.
+    ``steps`` is ``f 2^p`` with f in [1, 2). The address is the fraction of f. s is p if f is 1, else p + 1.
 
     Parameters
     ----------

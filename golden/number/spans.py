@@ -49,7 +49,8 @@ def pixels_of(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def runs_of(length: np.ndarray, most: int = 1 << 18) -> Iterator[slice]:
-    """Slices of consecutive spans with at most ``most`` pixels, or of one longer span; this bounds memory.
+    """Slices of consecutive spans with at most ``most`` pixels, or of a single longer span. They bound the
+    memory.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ class Camera:
         -------
         float64 array, shape (..., 4)
             ``X, Y, W, depth``: the pixel is ``X / W`` to the right of the picture's left edge and ``Y / W``
-            below its top edge, so that pixel (i, j) has its centre at (i + 1/2, j + 1/2). ``W`` is 1
+            below its top edge. So pixel (i, j) has its centre at (i + 1/2, j + 1/2). ``W`` is 1
             (orthographic) or the depth (perspective).
         """
         right, up, depth = np.moveaxis(self.view(points), -1, 0)

@@ -16,17 +16,19 @@ def interpolate(curve: str, normal_left: np.ndarray, normal_right: np.ndarray, t
     With ``r = N_l·N_r`` and ``psi = arccos r``:
 
     - ``linear``: ``(1-t) N_l + t N_r``;
-    - ``normalised``: the same, divided by its length; of unit ends it is not the true curve of a surface
-      (docs/theory/interpolation.md#true-spans);
+    - ``normalised``: the line divided by its length. Between unit ends it differs from the true curve of a
+      surface (docs/theory/interpolation.md#true-spans);
     - ``slerp``: ``(sin((1-t) psi) N_l + sin(t psi) N_r) / sin psi`` ([T] 2.1), computed as
       ``cos(t psi) N_l + sin(t psi) U``, with the unit vector U at right angles to N_l in the plane of both;
     - ``quadratic``: ``G t^2 + P t + Q`` through N_l, ``N_c = (N_l + N_r) / sqrt(2 (1 + r))`` at ``t = 1/2``
       and N_r: ``G = 2 (N_l - 2 N_c + N_r)``, ``P = 4 N_c - 3 N_l - N_r``, ``Q = N_l`` ([T] 2.2).
 
-    Equal normals give that normal everywhere. Opposite normals (``r = -1`` to within 1e-12) have no plane
-    and no middle: ``normalised`` jumps from N_l to N_r and is 0 at ``t = 1/2``; ``quadratic`` takes
-    ``N_c = 0``, which makes it ``linear``; ``slerp`` passes through the vector at right angles to N_l and to
-    the axis of N_l's smallest component.
+    Equal normals give this normal everywhere. Opposite normals (``r = -1`` to within 1e-12) have no plane and
+    no middle:
+
+    - ``normalised`` jumps from N_l to N_r, and is 0 at ``t = 1/2``;
+    - ``quadratic`` takes ``N_c = 0``, which makes it ``linear``;
+    - ``slerp`` passes through the vector at right angles to N_l and to the axis of N_l's smallest component.
 
     Parameters
     ----------

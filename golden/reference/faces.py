@@ -22,13 +22,14 @@ def face_normals(mesh: Mesh) -> np.ndarray:
     Returns
     -------
     float64 array, shape (F, 3)
-        Where a triangle has no area but by rounding: along the sum of its vertex normals, and 0 if that is 0.
+        A triangle without area (up to rounding) has the unit vector along the sum of its vertex normals, or 0
+        if the sum is 0.
     """
     return planes_of(mesh)[0]
 
 
 def planes_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """`face_normals`, and the indices of the triangles that have no area but by rounding."""
+    """`face_normals`, and the indices of the triangles without area (up to rounding)."""
     first, second, third = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
     left, right = second - first, third - first
     cross = np.cross(left, right)

@@ -86,14 +86,14 @@ def normalise(vectors: ArrayLike) -> np.ndarray:
 
 
 def any_component(vectors: np.ndarray) -> np.ndarray:
-    """Whether vectors along the last axis, of three components, are not 0; a fifth of the time of ``any``."""
+    """Whether vectors of three components along the last axis are not 0; five times as fast as ``any``."""
     x, y, z = np.moveaxis(vectors, -1, 0)
     found: np.ndarray = (x != 0) | (y != 0) | (z != 0)
     return found
 
 
 def sum_of_components(vectors: np.ndarray) -> np.ndarray:
-    """Sums along the last axis of three, to the bit as by ``sum``, in a tenth of its time."""
+    """Sums of three components along the last axis, equal to ``sum`` to the bit, in a tenth of its time."""
     x, y, z = np.moveaxis(vectors, -1, 0)
     found: np.ndarray = x + y + z
     return found

@@ -17,7 +17,7 @@ Triple = tuple[float, float, float]
 def triple(
     name: str, value: Sequence[float] | str, least: float = -math.inf, most: float = math.inf
 ) -> Triple:
-    """Three numbers as finite floats in [least, most]; else a `ValueError` that names them.
+    """Three numbers, checked, as finite floats in [least, most].
 
     A text has commas between the numbers: ``"0,1,0.5"``.
 
@@ -33,7 +33,7 @@ def triple(
     Raises
     ------
     ValueError
-        If there are not three numbers, or one is not finite or out of range.
+        If there are not three numbers, or a number is not finite or out of range. The message has the name.
     """
     return _triple(name, value, numbers_of_text, "three finite numbers", least, most)
 
@@ -41,7 +41,7 @@ def triple(
 def color_triple(
     name: str, value: Sequence[float] | float | str, least: float = 0.0, most: float = math.inf
 ) -> Triple:
-    """A colour as `triple`: three numbers, one for all channels, or a text of `color_of_text`.
+    """A colour as `triple`: three numbers, one number for all channels, or a text of `color_of_text`.
 
     Parameters
     ----------
@@ -82,28 +82,35 @@ class Light:
     Parameters
     ----------
     direction : three floats, optional
-        Vector *to* the light, any length but 0; stored as a unit vector. Three numbers may be a text, too:
-        ``"0,1,0"``.
+        Vector *to* the light, of any length but 0, stored as a unit vector. A text may hold the three
+        numbers: ``"0,1,0"``.
     color : three floats, float or str
-        Intensity I_i of each channel, at least 0; or of all, or ``"#rrggbb"``. Stored as three floats.
+        Intensity I_i, at least 0: of each channel, one number for all channels, or ``"#rrggbb"``. Stored as
+        three floats.
     position : three floats, optional
         Position of a point light, in the mesh's units, in place of ``direction``.
     attenuation : three floats
-        ``(k_0, k_1, k_2)`` of a point light, at least 0, see `factor`; ``(1, 0, 0)``: as bright at every
+        ``(k_0, k_1, k_2)`` of a point light, at least 0, see `factor`. ``(1, 0, 0)`` is as bright at every
         distance.
     spot : three floats, optional
-        Axis of a spot light's cone, from the light, any length but 0; stored as a unit vector. ``None``: the
-        light shines to all sides.
+        Axis of a spot light's cone, from the light, of any length but 0, stored as a unit vector. ``None``:
+        the light shines to all sides.
     cone : two floats, optional
-        Inner and outer angle from the axis, in degrees: full light up to the inner angle, none from the outer
-        angle on. The default for a spot is 20 and 30.
+        Inner and outer angle from the axis, in degrees. The light is full up to the inner angle, and 0 from
+        the outer angle on. The default for a spot is 20 and 30.
 
     Raises
     ------
     ValueError
-        If a number is not finite, a direction is 0, a channel or a coefficient is negative, there is not
-        exactly one of direction and position, or the cone's angles are not ``0 <= inner < outer <= 180``;
-        if a directional light has an attenuation or a spot, or a cone has no axis.
+        In one of these cases:
+
+        - a number is not finite;
+        - a direction is 0;
+        - a channel or a coefficient is negative;
+        - both or none of direction and position are given;
+        - the cone's angles are not ``0 <= inner < outer <= 180``;
+        - a directional light has an attenuation or a spot;
+        - a cone has no axis.
 
     Source: docs/theory/models.md#lighting, docs/theory/chord.md#local-lights.
     """
@@ -154,15 +161,15 @@ class Light:
 
     @property
     def fades(self) -> bool:
-        """Whether the light's factor depends on the place: it has an attenuation, or it is a spot."""
+        """Whether the light's factor depends on the place, by an attenuation or a spot."""
         return self.spot is not None or self.attenuation != (1.0, 0.0, 0.0)
 
     def factor(self, points: np.ndarray | None = None) -> np.ndarray | np.float64:
-        """Factor a of the light that reaches points, 0 to 1: the product of those of distance and cone.
+        """Factor a of the light that reaches points, 0 to 1: factor of the distance times factor of the cone.
 
-        ``a = min(1 / (k_0 + k_1 d + k_2 d^2), 1) s^2 (3 - 2 s)`` with the distance d; s is linear in the
-        cosine of the angle from the axis, 0 at the outer angle of the cone, 1 at the inner one, and limited
-        to 0 to 1.
+        ``a = min(1 / (k_0 + k_1 d + k_2 d^2), 1) s^2 (3 - 2 s)`` with the distance d. s is linear in the
+        cosine of the angle from the axis. It is 0 at the outer angle of the cone and 1 at the inner angle,
+        and limited to 0 to 1.
 
         Parameters
         ----------

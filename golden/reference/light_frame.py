@@ -70,8 +70,9 @@ def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
 def squared_sine(vector: np.ndarray, frame: LightFrame, mirror: bool = False) -> np.ndarray:
     """Squared sine of the highlight's angle from vectors of any length, as an exact quotient.
 
-    ``sin^2 gamma = (x^2 + y^2)/q`` with ``cos gamma = N·H``; with ``mirror`` the sine of half the angle of
-    ``cos psi = R·V``: ``sin^2 (psi/2) = (x^2 + cos^2 a y^2)/q``. ``q = x^2 + y^2 + z^2``.
+    ``sin^2 gamma = (x^2 + y^2)/q`` with ``cos gamma = N·H``; with ``mirror``
+    ``sin^2 (psi/2) = (x^2 + cos^2 a y^2)/q``, of half the angle of ``cos psi = R·V``. In both
+    ``q = x^2 + y^2 + z^2``.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def squared_sine(vector: np.ndarray, frame: LightFrame, mirror: bool = False) ->
     frame : LightFrame
         The frame.
     mirror : bool
-        Whether the angle is that of R and V.
+        Whether the angle is psi, between R and V.
 
     Source: docs/theory/quotient.md#identities.
     """
@@ -90,7 +91,7 @@ def squared_sine(vector: np.ndarray, frame: LightFrame, mirror: bool = False) ->
 
 
 def light_frames(scene: Scene, lights: int) -> list[LightFrame]:
-    """Frames of a pipeline's lights; those that the scene lacks have the frame of the viewer."""
+    """Frames of a pipeline's lights. A light that the scene lacks has the frame of the viewer."""
     viewer = scene.camera.viewer
     directions = [np.asarray(light.direction) for light in scene.lights] + [viewer] * lights
     return [light_frame(direction, viewer) for direction in directions[:lights]]

@@ -60,18 +60,19 @@ class Material:
     Parameters
     ----------
     ambient, diffuse, specular : three floats, float or str, each
-        k_a, k_d, k_s of each channel, at least 0; or of all, or ``"#rrggbb"``. Stored as three floats. Their
-        sum may exceed 1: the intensity saturates.
+        k_a, k_d, k_s, at least 0: of each channel, one number for all channels, or ``"#rrggbb"``. Stored as
+        three floats. Their sum may exceed 1: the intensity saturates.
     exponent : int
         Exponent n of the highlight, 1 to 1000.
     roughness : float, optional
         Roughness r of microfacets, greater than 0 and at most 1. By default it follows from the exponent, see
         `lobes.roughness_of_exponent`.
     fresnel : three floats, float or str, optional
-        F_0, a colour in the same forms, 0 to 1: k_s is multiplied by `schlick`, see `reflection`. ``None``:
-        it is not.
+        F_0, a colour in the same forms, 0 to 1. `schlick` multiplies k_s, see `reflection`. ``None``: k_s
+        stays.
     two_sided : bool
-        Whether a scene that leaves out back faces draws those of this material, with negated normals.
+        Whether back faces of this material are drawn, with negated normals, in a scene that leaves out back
+        faces.
 
     Raises
     ------
@@ -107,8 +108,8 @@ class Material:
         """Material of glTF's base colour, metallic and roughness factors.
 
         ``k_d = (1 - metallic) base``; ``F_0 = 0.04 (1 - metallic) + metallic base`` for `schlick`; the
-        exponent is that of the roughness, rounded and limited to 1 to 1000. A roughness under
-        `LEAST_ROUGHNESS` is replaced by it, so that the error of a lobe's table stays small.
+        exponent follows from the roughness, rounded and limited to 1 to 1000. `LEAST_ROUGHNESS` replaces a
+        smaller roughness, so that the error of a lobe's table stays small.
 
         With ``alpha = roughness^2``, k_s is ``1/(4 alpha^2)``. This is the factor of F in the ratio of glTF's
         specular term at its peak, ``F D / 4`` with ``D = 1/(pi alpha^2)``, and diffuse term, ``k_d / pi``. A
@@ -151,8 +152,8 @@ class Material:
         Parameters
         ----------
         cosine : float, optional
-            V·H of a light, a constant of the frame if light and viewer are distant. ``None``: it changes from
-            point to point, and F_0, the value of F at V·H = 1, is used for F.
+            V·H of a light, a constant of the frame if light and viewer are distant. ``None``: V·H changes
+            from point to point, and F is F_0, its value at V·H = 1.
         """
         if self.fresnel is None:
             return np.array(self.specular)
@@ -160,7 +161,7 @@ class Material:
         return found
 
     def parameter(self, model: ReflectionModel) -> float | None:
-        """Exponent or roughness, by `ReflectionModel.PARAMETER` of a model; ``None`` without a parameter."""
+        """Exponent or roughness, as `ReflectionModel.PARAMETER` of a model says; ``None`` if it has none."""
         if model.PARAMETER == "roughness" and self.roughness is None:
             return roughness_of_exponent(self.exponent)
         return None if model.PARAMETER is None else getattr(self, model.PARAMETER)
@@ -184,7 +185,7 @@ def halfway_vector(light_direction: ArrayLike, viewer: ArrayLike) -> np.ndarray:
 
 
 def distant_cosine(light: Light, viewer: ArrayLike | None) -> float | None:
-    """V·H of a distant light and viewer, 0 where ``L = -V``; ``None`` where one of them is near.
+    """V·H of a distant light and viewer, 0 where ``L = -V``; ``None`` if the light or the viewer is near.
 
     Parameters
     ----------
@@ -233,10 +234,12 @@ def intensity(
     """Intensity of every normal, not saturated.
 
     ``I = k_a I_a + sum_i a_i I_i (k_d max(N·L_i, 0) + k_s S(gamma_i))`` ([B] 4 and 5, [T] 6), where a_i is
-    `Light.factor`. The cosine of a mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``, that of
-    the other models N·H. A light with ``N·L <= 0`` has neither diffuse nor specular term; a light with
-    ``L = -V`` has no half-way vector, and no specular term but that of a mirror model. A point light has no
-    terms at the point where it is. k_s is `Material.reflection` at the V·H of a distant light and viewer.
+    `Light.factor`. The cosine of a mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``. The
+    cosine of the other models is N·H. k_s is `Material.reflection` at the V·H of a distant light and viewer.
+
+    - A light with ``N·L <= 0`` has neither diffuse nor specular term.
+    - A light with ``L = -V`` has no half-way vector. It has a specular term only by a mirror model.
+    - A point light has no terms at the point where it is.
 
     Parameters
     ----------
@@ -307,9 +310,9 @@ def intensity_of_cosines(
     Parameters
     ----------
     material, lights, ambient_light, model
-        As for `intensity`; only colours of lights are read, and directions for Fresnel's reflection.
+        As for `intensity`. Of lights only the colours are read, and the directions for Fresnel's reflection.
     cosine, highlight_cosine : arrays, shape (..., lights)
-        N·L, times its factor for a light that fades; and N·H.
+        N·L, for a light that fades times its factor; and N·H.
     viewer : array, shape (3,), optional
         Unit vector V to a distant viewer, for Fresnel's reflection.
     factor : array, shape (..., lights), optional

@@ -48,11 +48,11 @@ class CoplanarPhong(ReflectionModel):
     """``max(2 c^2 - 1, 0)^p``: Phong's model with exponent p as a lobe of c = N·H, for coplanar vectors.
 
     Where N, L and V are coplanar, the angle between R and V is twice the angle between N and H. Then
-    ``R·V = 2 c^2 - 1``, and this is Phong's model. Near its peak it is Blinn's model with an exponent of 4 p
-    (`exponent_ratio`).
+    ``R·V = 2 c^2 - 1``, and this is Phong's model. Near its peak this is Blinn's model with an exponent of 4
+    p (`exponent_ratio`).
 
-    It is not Phong's model where N, L and V are not coplanar: R·V is then no function of N·H. At grazing
-    light the highlight of this model, like Blinn's, is drawn out, while Phong's stays round.
+    Elsewhere R·V is no function of N·H, and this model differs from Phong's. At grazing light the highlight
+    of this model, like Blinn's, is drawn out. Phong's highlight stays round.
 
     Source: docs/theory/models.md#reflection-models; [P].
     """
@@ -71,9 +71,9 @@ class CoplanarPhong(ReflectionModel):
 class MicrofacetModel(ReflectionModel):
     """A distribution D of the normals of microfacets, divided by its largest value: ``S = D / peak``.
 
-    The parameter is the roughness r of glTF, greater than 0 and at most 1; the formulas have ``alpha = r^2``.
-    ``integral D(c) c = 1`` over the hemisphere, with c = N·H, and D is 0 for c <= 0. S is D alone: the
-    other factors of a microfacet model (Fresnel, masking and shadowing) are not in it.
+    The parameter is the roughness r of glTF, greater than 0 and at most 1. The formulas have ``alpha = r^2``.
+    ``integral D(c) c = 1`` over the hemisphere, with c = N·H, and D is 0 for c <= 0. S has no other factor of
+    a microfacet model (Fresnel, masking and shadowing).
 
     The energy factor is 1 divided by ``integral S(cos(t/2)) cos t`` over the hemisphere, with the viewer
     along the normal, as for ``blinn``. With ``w = c^2`` the integral is
@@ -91,7 +91,7 @@ class MicrofacetModel(ReflectionModel):
         return checked_roughness(parameter)
 
     def steepness(self, parameter: float | None) -> float:
-        """Of the curve itself, see `ReflectionModel.steepness`."""
+        """Steepness of the curve itself, see `ReflectionModel.steepness`."""
         return _steepness(self, parameter)
 
     def peak(self, roughness: float) -> float:
@@ -192,9 +192,9 @@ class TabulatedModel(ReflectionModel):
         Raises
         ------
         ValueError
-            If there are fewer than two points, a number is not finite, a value is not 0 to 1, a cosine is not
-            larger than the one before, or the cosines do not go from 0 to 1. The message names the first
-            wrong point, counted from 1.
+            If there are fewer than two points, or the cosines do not go from 0 to 1. If a number is not
+            finite, a value is not 0 to 1, or a cosine is not larger than the cosine before. The message names
+            the first wrong point, counted from 1.
         """
         cosines, values = (np.array(column, dtype=np.float64) for column in (cosines, values))
         if cosines.ndim != 1 or cosines.shape != values.shape:
@@ -232,8 +232,8 @@ class TabulatedModel(ReflectionModel):
         Raises
         ------
         ValueError
-            If the file is no text or has too many points, a line does not hold two numbers, or as for
-            `of_points`; the message names the file, and the line or the point.
+            If the file is no text or has too many points, or a line does not hold two numbers; and as for
+            `of_points`. The message names the file, and the line or the point.
         OSError
             If the file cannot be read.
         """
@@ -262,11 +262,11 @@ class TabulatedModel(ReflectionModel):
         return 0.0
 
     def steepness(self, parameter: float | None = None) -> float:
-        """Of the curve itself, see `ReflectionModel.steepness`."""
+        """Steepness of the curve itself, see `ReflectionModel.steepness`."""
         return _steepness(self, parameter)
 
     def reflect(self, cosine: npt.ArrayLike, parameter: float | None = None) -> np.ndarray:
-        """Brightness S, see `ReflectionModel.reflect`; any parameter is passed over."""
+        """Brightness S, see `ReflectionModel.reflect`; a parameter is ignored."""
         return super().reflect(cosine, parameter)
 
     def _lobe(self, cosine: np.ndarray, exponent: float) -> np.ndarray:

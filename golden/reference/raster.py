@@ -49,7 +49,7 @@ class Raster:
         Unit normals at the first and the last pixel centre: vertex normals interpolated
         perspective-correctly and normalised.
     magnitude_left, magnitude_right : float64 arrays, shape (S,)
-        Lengths of those normals before they were normalised, divided by W of `Camera.homogeneous`. With them
+        Lengths of these normals before they were normalised, divided by W of `Camera.homogeneous`. With them
         the normal between the ends is exactly ``normalise((1-t) m_l N_l + t m_r N_r)``.
     weights_left, weights_right : float64 arrays, shape (S, 3)
         Barycentric coordinates of the two ends in the triangle, divided by W; linear along the span.
@@ -65,13 +65,13 @@ class Raster:
         Whether the fragment is the nearest of its pixel; at equal depth the lowest triangle index counts as
         nearest.
     triangles : int
-        Number of triangles of the mesh. Each is either drawn (it has spans before the depth test) or counted
-        once in one of the next four counters.
+        Number of triangles of the mesh. A triangle is drawn if it has spans before the depth test. Else one
+        of the next four counters counts it once.
     degenerate : int
-        Triangles without area after rounding to 1/256 pixel. Without area in the world, but with some after
-        rounding, a triangle is drawn: it closes the seam between a side and its parts.
+        Triangles without area after rounding to 1/256 pixel. A triangle that gets its area only by rounding
+        is drawn: it closes the seam between a side and its parts.
     culled : int
-        Triangles clockwise after rounding, and left out because the scene asks for that.
+        Triangles that are clockwise after rounding, and that the scene leaves out.
     outside : int
         Triangles wholly outside the picture or nearer than the near plane.
     uncovered : int
@@ -79,7 +79,7 @@ class Raster:
     hidden_spans : int
         Spans that were left out because all of their pixels are hidden.
     repaired_normals : int
-        Ends of spans whose interpolated normal was 0, so that the face's normal was taken.
+        Ends of spans whose interpolated normal was 0. The face's normal takes its place.
     """
 
     x: np.ndarray
@@ -267,8 +267,8 @@ def rasterise(scene: Scene) -> Raster:
     """Spans and fragments of a scene.
 
     Triangles are clipped against the near plane, projected, and rounded to 1/256 pixel. A pixel belongs to a
-    triangle if its centre lies inside, or exactly on a left or top edge: with integer edge functions this is
-    exact, and no pixel of a shared edge is drawn twice or missed. Each scanline's interval comes from
+    triangle if its centre lies inside, or exactly on a left or top edge. Edge functions are integers. So the
+    test is exact, and no pixel of a shared edge is drawn twice or missed. Each scanline's interval comes from
     an exact floor division. Depth is interpolated in float64, linearly on the screen (1/W, or the depth
     itself in the orthographic projection).
 

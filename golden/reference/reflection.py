@@ -54,7 +54,7 @@ class ReflectionModel:
     Attributes
     ----------
     MIRROR : bool
-        Whether the cosine is R·V, with the mirror direction R; else it is N·H.
+        Whether the cosine is R·V, with the mirror direction R, in place of N·H.
     PARAMETER : str or None
         Name of the parameter: ``"exponent"``, ``"roughness"``, or ``None`` without a parameter.
     """
@@ -91,8 +91,8 @@ class ReflectionModel:
             N·H, or R·V for a model with `MIRROR`. Values above 1, from vectors that are not exactly of unit
             length, count as 1.
         parameter : float
-            Exponent n, greater than 0, that of Blinn's model for its approximations; or the roughness, see
-            `PARAMETER`.
+            Exponent n, greater than 0, or the roughness, see `PARAMETER`. Approximations of Blinn's model
+            take its exponent.
 
         Returns
         -------
@@ -107,9 +107,10 @@ class ReflectionModel:
         return self._lobe(np.minimum(np.asarray(cosine, dtype=np.float64), 1.0), self._checked(parameter))
 
     def steepness(self, parameter: float | None) -> float:
-        """Exponent at which Blinn's power is as steep at its steepest: it decides how fine spans must be.
+        """Exponent of the Blinn power with the same steepest slope. It decides how fine spans must be.
 
-        It is the exponent itself; for the models of `lobes` the largest ``|dS/dc|``, from 1 to 10,000.
+        For models with an exponent it is the exponent. For the models of `lobes` it is the largest
+        ``|dS/dc|``, from 1 to 10,000.
 
         Raises
         ------
@@ -132,8 +133,8 @@ class ReflectionModel:
         microfacets     see `MicrofacetModel`                integral of ``blinn`` with their S
         =============== ==================================== ==============================================
 
-        [C] integrates ``cosquad_lin`` over the angle itself, as for ``phong``, not over the half angle. Our
-        text of [C], read by a machine, has n for pi in the denominators and n/2 for the exponent -n/2.
+        [C] integrates ``cosquad_lin`` over the angle itself, as ``phong``. Our text of [C] was read by a
+        machine. It has n for pi in the denominators and n/2 for the exponent -n/2.
 
         Parameters
         ----------
@@ -169,9 +170,8 @@ class _MirrorPowerModel(PowerModel):
 class PolynomialModel(ReflectionModel):
     """``max(k (c - 1) + 1, 0)^(2^squarings)``, slope k: the cosine-quadratic family and Lyon's.
 
-    The base is compared with 0, never the power, so that the parabola's second lobe does not show. Lyon's
-    models are ``max(1 - x/2^j, 0)^(2^j)`` with ``x = n (1 - c)``, which tends to ``exp(-x)``; j = 1 is
-    ``cosquad``.
+    The base is compared with 0, so the parabola's second lobe does not show. Lyon's models are
+    ``max(1 - x/2^j, 0)^(2^j)`` with ``x = n (1 - c)``, which tends to ``exp(-x)``; j = 1 is ``cosquad``.
 
     Parameters
     ----------
@@ -180,12 +180,12 @@ class PolynomialModel(ReflectionModel):
     squarings : int
         How often the base is squared, 1 to 3: the power is 2, 4 or 8.
     curve : callable, optional
-        Slope by exponent, where it is no line: hardware then holds it in a table.
+        Slope by exponent, if it is no line. Hardware then holds it in a table.
 
     Raises
     ------
     ValueError
-        If there are other squarings.
+        If the number of squarings is not 1 to 3.
     """
 
     a: float = 0.0
@@ -275,8 +275,8 @@ def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
     Raises
     ------
     ValueError
-        If the exponent is not finite and positive, the power or the rule is unknown, or the exponent is
-        under 1/2 for equal integrals with k = 4: the lobe would then have to be wider than the sphere.
+        If the exponent is not finite and positive, the power or the rule is unknown, or the exponent is under
+        1/2 for equal integrals with k = 4. The lobe would then be wider than the sphere.
 
     Notes
     -----
@@ -308,7 +308,7 @@ def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
 
 
 def _level_slope(exponent: float, level: float = 0.64) -> float:
-    """Slope with which cosquad_q equals Blinn's power at a brightness; 0.64 is the best one of [C]."""
+    """Slope with which cosquad_q equals Blinn's power at a brightness; [C] finds 0.64 best."""
     return (math.sqrt(level) - 1) / math.expm1(math.log(level) / exponent)
 
 

@@ -73,23 +73,23 @@ class Frame:
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Limits of ``adaptive``: a triangle is shaded by its vertices alone if all differences are smaller.
+    """Limits of ``adaptive``. If all differences are smaller, a triangle is shaded by its vertices alone.
 
     Parameters
     ----------
     normal : float
-        Length of the difference of two vertex normals; 0.9 is an angle of 53.5 degrees. (If the 0.9 of the
-        document means a least cosine, 25.8 degrees, the length is 0.447.)
+        Length of the difference of two vertex normals. 0.9 is an angle of 53.5 degrees. (The 0.9 of the
+        document may mean a least cosine, 25.8 degrees. The length is then 0.447.)
     highlight : float
         Difference of N·H of two vertices, for every light.
     diffuse : float
-        Difference of N·L of two vertices, for every light; 0.008 is two steps of an 8-bit channel for a
-        white surface and one light.
+        Difference of N·L of two vertices, for every light. 0.008 is two steps of an 8-bit channel for a white
+        surface and one light.
 
     Raises
     ------
     ValueError
-        If a threshold is negative or NaN. Infinite ones are allowed: they make every triangle pass.
+        If a threshold is negative or NaN. Infinite thresholds let every triangle pass.
     """
 
     normal: float = NORMAL_THRESHOLD
@@ -111,8 +111,8 @@ def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.
     ``L = -V`` has no H and no highlight, and only its N·L counts. A change of N·H by e changes ``(N·H)^n`` by
     up to ``n e``: with large exponents the default thresholds allow visible errors.
 
-    The listing of [T] appendix В, as docs/theory/errata.md describes it, has the test of the normals
-    inverted: it returns Phong if they are close. It is corrected here.
+    The listing of [T] appendix В returns Phong if the normals are close, as docs/theory/errata.md describes.
+    Here the test is corrected.
 
     Parameters
     ----------
@@ -159,19 +159,19 @@ def render(
     - ``flat``: the intensity of each triangle's own normal, in its middle;
     - ``gouraud``: the intensity at the three vertices, saturated there, interpolated perspective-correctly;
     - ``quadratic_gouraud``: the second-degree polynomial through the intensities, saturated, at the three
-      vertices and at the middles of the three edges ([T] appendix Д), where the normal is that of
-      ``phong``, ``(N_a + N_b)/|N_a + N_b|``. In the perspective-correct barycentric coordinates l the
+      vertices and at the middles of the three edges ([T] appendix Д), where the normal is
+      ``(N_a + N_b)/|N_a + N_b|``, as for ``phong``. In the perspective-correct barycentric coordinates l the
       polynomial is ``sum_i l_i (2 l_i - 1) I_i + sum_{i<j} 4 l_i l_j I_ij``. Two triangles that share an edge
       and its normals have equal intensities along it. Between the six points the polynomial may leave their
-      range by up to a third of it (in the middle of the triangle), and is saturated again;
+      range by up to a third of it (in the middle of the triangle). It is saturated again;
     - ``adaptive``: ``gouraud`` in the triangles of `gouraud_triangles`, ``phong`` in the others ([T]
       appendix В);
     - ``phong``: the vertex normals interpolated perspective-correctly and normalised at every pixel, as a
       GPU does: the reference image;
     - ``slerp``: normals on the great circle between the ends of each span, linear in screen space ([T] 2.1).
 
-    With point lights or a near viewer L and V are those of the shaded point: of a fragment's point of the
-    surface, of a vertex, or of the middle of an edge.
+    With point lights or a near viewer L and V are those of the shaded point. This is a fragment's point of
+    the surface, a vertex, or the middle of an edge.
 
     Parameters
     ----------
@@ -278,17 +278,17 @@ def shade_spans(
     """Picture from spans alone, as in hardware.
 
     The normal of a fragment is the curve between its span's ends at ``t = offset / (length - 1)`` (0 for a
-    span of one pixel), with the length that the curve gives it. With ``normalised`` and unit ends this is
-    not the exact frame, whose line has ends with lengths (docs/theory/interpolation.md#true-spans).
+    span of one pixel), with the length that the curve gives it. The line of the exact frame has ends with
+    lengths. So ``normalised`` with unit ends differs from it (docs/theory/interpolation.md#true-spans).
 
     Parameters
     ----------
     scene : Scene
         Size, background, materials, lights and viewer; the mesh is read for the materials of its faces.
     raster : Raster
-        The spans. Only normal_left, normal_right, length, span, offset, pixel and visible are used, and
-        triangle with several materials, and triangle, weights_left and weights_right with point lights or a
-        near viewer. So the normals may be replaced by quantised ones, with `dataclasses.replace`.
+        The spans. normal_left, normal_right, length, span, offset, pixel and visible are used. Several
+        materials need triangle, too. Point lights or a near viewer need triangle, weights_left and
+        weights_right. So `dataclasses.replace` may put quantised normals in.
     curve : str or callable
         One of `CURVES`, or a function of the normals at both ends and t.
     model : ReflectionModel
@@ -304,7 +304,7 @@ def shade_spans(
     Raises
     ------
     ValueError
-        If the curve is unknown, or spans without weights have point lights or a near viewer.
+        If the curve is unknown, or the spans lack weights that point lights or a near viewer need.
     """
     image = _background(scene)
     colors = image.reshape(-1, 3)
@@ -336,7 +336,7 @@ def shade_operands(
     raster : Raster
         The fragments; span, pixel, visible and triangle are used.
     cosine, highlight_cosine : arrays, shape (fragments, lights)
-        N·L, times its factor for a light that fades; and N·H.
+        N·L, for a light that fades times its factor; and N·H.
     model : ReflectionModel
         Reflection model.
     factor : array, shape (fragments, lights), optional

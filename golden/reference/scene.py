@@ -35,26 +35,30 @@ class Scene:
     width, height : int
         Pixels, 1 to 4095 each.
     material : Material or sequence of Material
-        Coefficients of the surface: one material, or several, chosen by `Mesh.material`; stored as a tuple.
+        Coefficients of the surface: one material, or several materials that `Mesh.material` chooses from.
+        Stored as a tuple.
     lights : sequence of Light
         Any number, directional or point lights; stored as a tuple.
     ambient_light : three floats, float or str
-        I_a of each channel, at least 0; or of all, or ``"#rrggbb"``. Stored as three floats.
+        I_a, at least 0: of each channel, one number for all channels, or ``"#rrggbb"``. Stored as three
+        floats.
     background : three floats, float or str
         Color of the pixels that show no surface, in [0, 1], in the same forms.
     back_faces : {"flip", "show", "cull"}
-        Treatment of a triangle seen from behind (its corners are clockwise). ``"flip"`` draws it with negated
-        normals, so that they point to the viewer's side; ``"show"`` draws it with its own normals; ``"cull"``
-        leaves it out, or negates the normals if its material is two-sided.
+        Treatment of a triangle seen from behind (its corners are clockwise).
+
+        - ``"flip"`` draws it with negated normals, which point to the viewer's side.
+        - ``"show"`` draws it with its own normals.
+        - ``"cull"`` leaves it out. If its material is two-sided, ``"cull"`` draws it with negated normals.
     viewer : {"distant", "near"}
-        Vector V for the lighting: `Camera.viewer` everywhere, or the direction from each point of the surface
-        to a perspective camera.
+        Vector V for the lighting. ``"distant"`` is `Camera.viewer` everywhere, ``"near"`` the direction from
+        each point of the surface to a perspective camera.
 
     Raises
     ------
     ValueError
-        If a value is out of range, a face has the index of a material that does not exist, or the viewer is
-        near and the camera orthographic.
+        If a value is out of range, or a face has the index of a missing material. If the viewer is near and
+        the camera orthographic.
     TypeError
         If a size is not an integer, a light is not a `Light` or a material is not a `Material`.
     """

@@ -64,12 +64,17 @@ a, b : array
 Raises
 ------
 ValueError
-    If not.
+    In one of these cases:
+
+    - not 1
+      or 2;
+    - a - b is 0.
 
 Source: [T] 2.1."""
     assert markdown(text) == (
         "What.\n\n**Parameters**\n\n- `degree` (int): 1 or 2, not 3.\n- `a`, `b` (array): Both.\n\n"
-        "**Raises**\n\n- `ValueError`: If not.\n\nSource: [T] 2.1."
+        "**Raises**\n\n- `ValueError`: In one of these cases:\n  - not 1 or 2;\n  - a - b is 0.\n\n"
+        "Source: [T] 2.1."
     )
 
 
