@@ -15,28 +15,22 @@ from amaranth.hdl import UnusedElaboratable
 from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.command import run
 from blysk.golden.frames.prepare import constants_of, prepare
-from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
-from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
-from blysk.golden.number.unit_vector import ONE
 from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset
-from blysk.hdl.normals.adaptive_normaliser import SEGMENT_CYCLES, AdaptiveNormaliserUnit
+from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["WAITING", "compare", "frame_cycles", "intervals_of", "span_cycles", "unit_of"]
+__all__ = ["WAITING", "compare", "frame_cycles", "span_cycles", "unit_of"]
 
 _NEVER = -(1 << 40)
 """Minus infinity of sums of cycles."""
 
-WAITING = 2
-"""Cycles from the first pixel of span k - 2 until the buffer has a free place for the prepared span k."""
+WAITING = InterpolatorUnit.room_after
+"""`InterpolatorUnit.room_after` of most methods."""
 
 _CHUNK = 1 << 16
-
-EMPTY_SEGMENT_CYCLES = 3
-"""Cycles of the adaptive normaliser for a segment without a pixel."""
 
 
 def span_cycles(length: np.ndarray, interval: np.ndarray, waiting: int = WAITING) -> int:
@@ -85,35 +79,6 @@ def _product(matrices: np.ndarray) -> np.ndarray:
     return matrices[0]
 
 
-def intervals_of(unit: ShadingPipelineUnit, spans: Spans) -> np.ndarray:
-    """Least cycles from the previous span to each span; int, shape (spans,).
-
-    They depend on the length of spans under three pixels if these may follow sooner
-    (`InterpolatorUnit.shortest_interval`), and for ``bisection`` on the number of segments.
-    """
-    interpolator, method = unit.parameters.interpolator, unit._interpolator
-    length = np.asarray(spans.length)
-    if isinstance(interpolator, BisectionInterpolator):
-        return _bisected(interpolator.normaliser, spans)
-    if method.shortest_interval is not None:
-        return np.minimum(length, 3) * unit.setup_interval // 3
-    return np.full(len(length), unit.setup_interval)
-
-
-def _bisected(normaliser: AdaptiveNormaliser, spans: Spans) -> np.ndarray:
-    """Intervals of ``bisection``: a span's levels are counted while the previous span is divided."""
-    unit = AdaptiveNormaliserUnit(normaliser)
-    steps = np.asarray(spans.length) - 1
-    cosine = np.einsum("ij,ij->i", spans.normal_left / ONE, spans.normal_right / ONE)
-    q = (1 - cosine) / 4
-    levels = ((q + q * q)[:, np.newaxis] > normaliser.limits.values).sum(axis=1)
-    levels = np.minimum(levels, np.where(steps < 3, np.maximum(steps - 1, 0), normaliser.depth))
-    counting = np.array([unit.counting(level) for level in range(normaliser.depth + 1)])
-    empty = np.maximum((1 << levels) - steps, 0)
-    segments = SEGMENT_CYCLES * ((1 << levels) + 1) - (SEGMENT_CYCLES - EMPTY_SEGMENT_CYCLES) * empty
-    return np.maximum(counting[levels], np.r_[0, segments[:-1]])
-
-
 def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     """Cycles of a frame of one material without stalls, from the first write of a constant to the last pixel.
 
@@ -131,8 +96,9 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
         Writes of constants before it.
     """
     length = np.asarray(spans.length, dtype=np.int64) * unit.cycles_per_pixel
-    waiting = WAITING if unit._interpolator.shortest_interval is None else 0
-    return 1 + writes + unit.latency + span_cycles(length, intervals_of(unit, spans), waiting)
+    method = unit._interpolator
+    cycles = span_cycles(length, method.span_intervals(spans), method.room_after)
+    return 1 + writes + unit.latency + cycles
 
 
 def unit_of(design: Design) -> ShadingPipelineUnit:

@@ -1,13 +1,18 @@
 """Bisection of spans into segments short enough for straight lines ([T] figure 2.7): method ``bisection``."""
 
+import numpy as np
 from amaranth.lib import stream
 
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
+from blysk.golden.number.unit_vector import ONE
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit, span_words
-from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
+from blysk.hdl.normals.adaptive_normaliser import SEGMENT_CYCLES, AdaptiveNormaliserUnit
 
 __all__ = ["BisectionInterpolatorUnit"]
+
+EMPTY_SEGMENT_CYCLES = 3
+"""Cycles of the adaptive normaliser for a segment without a pixel."""
 
 
 class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInterpolator):
@@ -33,6 +38,23 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInte
         self._normaliser = AdaptiveNormaliserUnit(parameters.normaliser)
         self.latency = self._normaliser.preparation(0) + self.product_latency
         self.setup_interval = self._normaliser.interval(0)
+
+    def span_intervals(self, spans):
+        """Those of spans of several segments are longer.
+
+        A span's levels are counted while the previous span is divided.
+        """
+        unit = self._normaliser
+        normaliser = unit.parameters
+        steps = np.asarray(spans.length) - 1
+        cosine = np.einsum("ij,ij->i", spans.normal_left / ONE, spans.normal_right / ONE)
+        q = (1 - cosine) / 4
+        levels = ((q + q * q)[:, np.newaxis] > normaliser.limits.values).sum(axis=1)
+        levels = np.minimum(levels, np.where(steps < 3, np.maximum(steps - 1, 0), normaliser.depth))
+        counting = np.array([unit.counting(level) for level in range(normaliser.depth + 1)])
+        empty = np.maximum((1 << levels) - steps, 0)
+        segments = SEGMENT_CYCLES * ((1 << levels) + 1) - (SEGMENT_CYCLES - EMPTY_SEGMENT_CYCLES) * empty
+        return np.maximum(counting[levels], np.r_[0, segments[:-1]])
 
     def source(self, m):
         """The normaliser's normals, and its flag, on the last pixel of a span."""

@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from typing import ClassVar
 
+import numpy as np
 from amaranth.hdl import Module, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.beats import Spans
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
@@ -116,6 +118,9 @@ class InterpolatorUnit(wiring.Component):
 
     cycles_per_pixel = 1
 
+    room_after = 2
+    """Cycles from the first pixel of a span until there is room for the span after the next, prepared."""
+
     DEFAULT_INTERVAL = 4
     """Largest `setup_interval` that is taken where none is given."""
 
@@ -157,6 +162,10 @@ class InterpolatorUnit(wiring.Component):
     def shortest_interval(self) -> int:
         """Least cycles from any span to the next; a short one may take fewer than `setup_interval`."""
         return self.setup_interval
+
+    def span_intervals(self, spans: Spans) -> np.ndarray:
+        """Least cycles from the previous span to each of some spans, without stalls; int, shape (spans,)."""
+        return np.full(len(spans), self.setup_interval)
 
     @property
     def has_begun(self) -> Value | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 from amaranth.hdl import Module, Signal, Value
 from amaranth.lib import data, wiring
 
@@ -42,10 +43,16 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
     Source: docs/theory/chord.md#local-lights.
     """
 
+    room_after = 0
+
     @property
     def shortest_interval(self):
         """1: that of spans of one pixel."""
         return 1
+
+    def span_intervals(self, spans):
+        """Those of spans of one or two pixels are shorter."""
+        return np.minimum(spans.length, 3) * self.setup_interval // 3
 
     @classmethod
     def setup_intervals(cls, parameters):

@@ -1,5 +1,6 @@
 """The quotient method: N·L and highlights as quotients of quadratics, without a unit normal."""
 
+import numpy as np
 from amaranth.hdl import Module
 from amaranth.lib.wiring import Out
 
@@ -49,10 +50,16 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
         """Whether y is multiplied by cos a."""
         return {"mirror": parameters.mirror}
 
+    room_after = 0
+
     @property
     def shortest_interval(self):
         """1: that of spans of one pixel."""
         return 1
+
+    def span_intervals(self, spans):
+        """Those of spans of one or two pixels are shorter."""
+        return np.minimum(spans.length, 3) * self.setup_interval // 3
 
     @property
     def has_begun(self):
