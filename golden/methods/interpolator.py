@@ -1,5 +1,6 @@
 """Interpolators: models of the methods that compute the operands of the pixels of a span."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -52,7 +53,7 @@ class Operands(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Interpolator:
+class Interpolator(ABC):
     """A method that computes the operands of the pixels of spans; each method is a subclass.
 
     A subclass states its formats; `compute` is its bit-accurate model, `exact_normals` its curve in float64.
@@ -100,14 +101,14 @@ class Interpolator:
     CHECKED_AT: ClassVar[tuple[float, ...]] = (0.25, 0.5, 0.75)
 
     @property
+    @abstractmethod
     def name(self) -> str:
         """Name on the command line and in tables."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def operand(self) -> Any:
         """Operand of the specular unit: ``"cosine"``, ``"one_minus_cosine"`` or ``"place"``."""
-        raise NotImplementedError
 
     @property
     def scale(self) -> int:
@@ -228,7 +229,9 @@ class Interpolator:
         ValueError
             If values, factors or vectors are missing, or are for another number of lights.
         """
+        return None
 
+    @abstractmethod
     def operands(self, spans: Spans, constants: FrameConstants, highlights: bool) -> Operands:
         """Bit-accurate operands of every pixel, in the order of the spans.
 
@@ -241,7 +244,6 @@ class Interpolator:
         highlights : bool
             Whether there is specular light.
         """
-        raise NotImplementedError
 
     def geometry(self, lights: int) -> Geometry:
         """Geometry that makes the method's spans from triangles, for a number of lights.
@@ -257,17 +259,17 @@ class Interpolator:
         """Frame constants of each material, with L and H in the frame that the method takes."""
         return list(constants)
 
+    @abstractmethod
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
         """The spans of a frame, cut as the method needs them, and how many of those given were cut."""
-        raise NotImplementedError
 
+    @abstractmethod
     def filled(self, filler: SpanFiller) -> Spans:
         """The beats of cut spans, with what the method takes."""
-        raise NotImplementedError
 
+    @abstractmethod
     def exact_frame(self, shading: ExactShading) -> np.ndarray:
         """A frame by the method in exact arithmetic: float64 array, shape (height, width, 3)."""
-        raise NotImplementedError
 
     def bound(self, bounds: ErrorBounds) -> float | None:
         """Bound of the error of a frame against exact normals, in LSB; ``None``: no bound is known."""

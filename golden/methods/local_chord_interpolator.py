@@ -16,12 +16,13 @@ from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.lighting.value_gate import ValueGate
-from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanFiller
+from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.golden.reference.raster import Raster
 
 __all__ = ["METHODS", "LocalChordInterpolator"]
 
@@ -146,6 +147,10 @@ class LocalChordInterpolator(Interpolator):
     def geometry(self, lights: int) -> Geometry:
         """Raise `ValueError`: triangles give no values."""
         raise ValueError(f"triangles give normals, and {self.name} takes values; use another method")
+
+    def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
+        """Spans cut until the quadratics keep their tolerances."""
+        return cutter.by_error()
 
     def filled(self, filler: SpanFiller) -> Spans:
         """Spans with values of each light."""

@@ -1,5 +1,6 @@
 """Methods whose spans carry normals at their ends, and those of them that find the normal of each pixel."""
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,6 +101,7 @@ class EndNormalInterpolator(Interpolator):
         """A frame by the normals of the curve, in exact arithmetic."""
         return shading.by_normals()
 
+    @abstractmethod
     def compute(
         self,
         normal_left: Fixed,
@@ -119,7 +121,6 @@ class EndNormalInterpolator(Interpolator):
         direction, halfway : Fixed, shape (lights, 3), SQ(1, 17)
             Unit vectors L and H of each light.
         """
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -179,6 +180,7 @@ class NormalInterpolator(EndNormalInterpolator):
         """`shortest_length` if the operand is half the squared chord, else 1."""
         return self.shortest_length if self.uses_chord else 1.0
 
+    @abstractmethod
     def normals(
         self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
     ) -> tuple[Fixed, np.ndarray]:
@@ -194,7 +196,6 @@ class NormalInterpolator(EndNormalInterpolator):
         normals : Fixed, shape (pixels, 3), SQ(1, 17)
         out_of_range : bool array, shape (spans,)
         """
-        raise NotImplementedError
 
     def products(self, normals: Fixed, direction: Fixed, halfway: Fixed) -> tuple[Fixed, Fixed]:
         """N·L, exact, and the operand of the specular unit.

@@ -6,6 +6,7 @@ import pytest
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.lighting.specular import Specular
+from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.normal_interpolator import EndNormalInterpolator, NormalInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
@@ -209,8 +210,11 @@ def test_refuses():
             make(operand="sine")
     with pytest.raises(ValueError, match=r"'spline'"):
         QuadraticInterpolator(form="spline")
-    with pytest.raises(NotImplementedError):
-        EndNormalInterpolator().compute(None, None, None, None, None)
+    # What a method has to state is known where it is made.
+    with pytest.raises(TypeError, match=r"abstract methods? .*\bcut\b.*\bfilled\b"):
+        Interpolator()
+    with pytest.raises(TypeError, match=r"abstract methods? .*\bcompute\b"):
+        EndNormalInterpolator()
     wrong = Fixed(SQ(2, 16), np.zeros((1, 3), int))
     with pytest.raises(ValueError, match=r"^operands? must be "):
         METHODS["quadratic"].compute(wrong, wrong, np.array([2]), wrong, wrong)

@@ -41,8 +41,9 @@ class Toy(Interpolator):
     SHARE: ClassVar[float] = 0.05
     operand: ClassVar = "cosine"
     name: ClassVar = "toy"
+    serves_gate: ClassVar = True
 
-    def gate(self, specular, by_normals):
+    def gate(self, specular):
         return NoGate()
 
     def cut(self, cutter):
