@@ -1,62 +1,53 @@
-"""The report's section on [P]: exponents of Phong and Blinn, both in hardware, operations, frame times."""
+"""Claims of [P] on Phong's and Blinn's highlights: exponents, operations, times, and their shapes."""
 
+import base64
+import io
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from PIL import Image
+from scipy.optimize import brentq
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.phong_blinn_hardware import (
-    METHOD,
-    MODELS,
-    hardware_cost,
-    hardware_frames,
-    hardware_table,
-    picture,
-    pictured,
-    pictures_drawing,
-    said_of_hardware,
-    said_of_widths,
-    widths,
-    widths_drawing,
-)
-from blysk.bench.report.section import Drawing, Section, Table
-from blysk.bench.report.thesis_figures import fastest
-from blysk.bench.report.thesis_ways import Counted, dot
+from blysk.bench.report.claims import Claim, ClaimTable, Document, Plot, at_least
+from blysk.bench.report.counted import Counted, dot, fastest
+from blysk.bench.report.section import Drawing
 from blysk.bench.store import Task
+from blysk.bench.surfaces import sphere
 from blysk.bench.svg import panels, svg
+from blysk.golden.frames.compare import compare
+from blysk.golden.presets import preset
+from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS, exponent_ratio
 from blysk.golden.reference.renderer import render
+from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = [
-    "FEWER_OPERATIONS",
-    "LESS_TIME",
     "PIXELS",
     "WAYS",
-    "exponents",
+    "claims",
+    "exponent_at",
+    "exponent_of_width",
     "frame_times",
+    "half_angle",
     "operations",
+    "picture",
     "section",
     "shading_times",
     "tasks",
+    "vectors",
 ]
-
-FEWER_OPERATIONS = (0.20, 0.35)
-"""[P]: share of operations that Blinn's model saves against Phong's."""
-
-LESS_TIME = (0.40, 0.45)
-"""[P]: largest share of a frame's time that Blinn's model saves, at a million polygons and 1920x1080."""
 
 PIXELS = 1 << 14
 """Pixels that the ways in software compute at once: their arrays stay in a processor's cache."""
 
 _EXPONENT = 50
-_TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
-_WIDTHS = (10, 100, 1000)
 
 
 # The ways in software: cosine of the highlight of a pixel from unit vectors N, L and V, as arrays of three
@@ -96,28 +87,16 @@ WAYS: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
 """Functions from N, L and V to a pixel's brightness in one channel, with diffuse and ambient light."""
 
 
-def _vectors(local: bool) -> list[np.ndarray]:
+def vectors(local: bool) -> list[np.ndarray]:
     """Random unit N of every pixel, and L and V of every pixel or of the frame."""
     rng = np.random.default_rng(1)
     columns = (PIXELS, PIXELS if local else 1, PIXELS if local else 1)
-    vectors = [rng.normal(size=(3, count)) for count in columns]
-    return [vector / np.sqrt(dot(vector, vector)) for vector in vectors]
-
-
-def exponents() -> dict[str, list[float]]:
-    """[P] figure 5: Blinn's exponent n over Phong's p for the same brightness, at angles gamma.
-
-    Returns
-    -------
-    dict
-        ``degrees``, 0 to 44, and ``ratio``: ``ln(2c^2 - 1)/ln c``.
-    """
-    degrees = np.linspace(0, 44, 177)
-    return {"degrees": degrees.tolist(), "ratio": exponent_ratio(np.cos(np.radians(degrees))).tolist()}
+    found = [rng.normal(size=(3, count)) for count in columns]
+    return [vector / np.sqrt(dot(vector, vector)) for vector in found]
 
 
 def operations(way: str, local: bool) -> dict[str, float]:
-    """Operations of a pixel, by kind, counted during the computation.
+    """Operations of a pixel, counted during the computation.
 
     Parameters
     ----------
@@ -130,15 +109,20 @@ def operations(way: str, local: bool) -> dict[str, float]:
     Returns
     -------
     dict
-        Operations of a pixel by kind: see `Counted`.
+        Operations of a pixel by kind (see `Counted`); ``all`` of them; ``fewer``: share of the operations of
+        the first of `WAYS` that this way saves.
     """
-    counts: Counter[str] = Counter()
-    WAYS[way](*(Counted.of(vector, counts) for vector in _vectors(local)))
-    return {kind: count / PIXELS for kind, count in counts.items()}
+    counts: dict[str, Counter[str]] = {}
+    for name in (next(iter(WAYS)), way):
+        counts[name] = Counter()
+        WAYS[name](*(Counted.of(vector, counts[name]) for vector in vectors(local)))
+    first, own = (sum(of.values()) for of in (next(iter(counts.values())), counts[way]))
+    of_pixel = {kind: count / PIXELS for kind, count in counts[way].items()}
+    return {**of_pixel, "all": own / PIXELS, "fewer": 1 - own / first}
 
 
 def shading_times(local: bool, repeats: int) -> dict[str, float]:
-    """Times of the ways on the same pixels, in one run, as ratios to that of Phong's vector R.
+    """Share of the time of Phong's vector R that each way saves on the same pixels, in one run.
 
     Parameters
     ----------
@@ -147,12 +131,12 @@ def shading_times(local: bool, repeats: int) -> dict[str, float]:
     repeats : int
         Runs of each, in turn; the fastest counts.
     """
-    vectors = _vectors(local)
-    times = fastest([lambda way=way: way(*vectors) for way in WAYS.values()], repeats)
-    return {name: time / times[0] for name, time in zip(WAYS, times, strict=True)}
+    operands = vectors(local)
+    times = fastest([lambda way=way: way(*operands) for way in WAYS.values()], repeats)
+    return {name: 1 - time / times[0] for name, time in zip(WAYS, times, strict=True)}
 
 
-def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[str, Any]:
+def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[str, float]:
     """[P] figure 8: time of a frame by the golden renderer with Phong's and with Blinn's model, in one run.
 
     Parameters
@@ -167,12 +151,13 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
     Returns
     -------
     dict
-        ``triangles``; ``pixels`` that show the teapot; ``raster``, ``phong`` and ``blinn``: seconds of
-        geometry, and of shading by each model.
+        ``phong`` and ``blinn``: nanoseconds of a pixel that shows the teapot, geometry included; ``frame``
+        and ``shading``: share of the time that Blinn's model saves, of the frame and of its shading;
+        ``geometry``: share of geometry in Blinn's frame.
     """
     scene = scene_for(teapot(triangles), _EXPONENT, width, height)
     raster = rasterise(scene)
-    times = fastest(
+    geometry, phong, blinn = fastest(
         [
             lambda: rasterise(scene),
             lambda: render(scene, "phong", REFLECTION_MODELS["phong"], raster),
@@ -180,219 +165,247 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
         ],
         repeats,
     )
+    pixels = int(raster.visible.sum())
     return {
-        "triangles": len(scene.mesh.faces),
-        "pixels": int(raster.visible.sum()),
-        **dict(zip(("raster", "phong", "blinn"), times, strict=True)),
+        "phong": (geometry + phong) / pixels * 1e9,
+        "blinn": (geometry + blinn) / pixels * 1e9,
+        "frame": 1 - (geometry + blinn) / (geometry + phong),
+        "shading": 1 - blinn / phong,
+        "geometry": geometry / (geometry + blinn),
     }
 
 
-def tasks(quick: bool) -> list[Task]:
-    """Measurements of the section.
+# Shapes of the highlights.
+
+
+def exponent_at(degrees: float) -> float:
+    """[P] figure 5: Blinn's exponent over Phong's for the same brightness, ``ln(2c^2 - 1)/ln c``."""
+    return float(exponent_ratio(math.cos(math.radians(degrees))))
+
+
+_ALONG, _ACROSS = "along", "across"
+
+_DIRECTIONS = {_ALONG: (1, 0), _ACROSS: (0, 1)}
+"""Directions in which a normal leaves H: along the plane of L and V, and across it."""
+
+
+def half_angle(way: Sequence[float], degrees: float, exponent: float) -> float:
+    """Angle in radians of a normal from H, at which ``(R·V)^n`` is half of its peak; NaN if there is none.
+
+    The angle is found from R·V itself, ``R = 2 (N·L) N - L``.
 
     Parameters
     ----------
-    quick : bool
-        Whether frames have up to 10,000 triangles at 320x240; else up to a million at 1920x1080.
+    way : two floats
+        Direction in which the normal leaves H: along the plane of L and V, and across it; of length 1.
+    degrees : float
+        a, half of the angle from L to V.
+    exponent : float
+        n.
     """
-    found = [Task(exponents), Task(widths, {"exponents": list(_WIDTHS)})]
-    for local in (False, True):
-        found += [Task(operations, {"way": way, "local": local}) for way in WAYS]
-        found.append(Task(shading_times, {"local": local, "repeats": 20 if quick else 100}, timed=True))
+    sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
+    light, viewer = np.array([sine, 0, cosine]), np.array([-sine, 0, cosine])
+
+    def excess(gamma: float) -> float:
+        normal = np.array([way[0] * math.sin(gamma), way[1] * math.sin(gamma), math.cos(gamma)])
+        mirrored = 2 * (normal @ light) * normal - light
+        return max(float(mirrored @ viewer), 0.0) ** exponent - 0.5
+
+    return brentq(excess, 0, math.pi / 2) if excess(math.pi / 2) < 0 else math.nan
+
+
+def exponent_of_width(way: str, degrees: float, exponent: float) -> float:
+    """Exponent over n of Blinn's highlight that has its half at the same normal as ``(R·V)^n``.
+
+    Parameters
+    ----------
+    way : {"along", "across"}
+        Where the normal lies: along the plane of L and V, or across it.
+    degrees, exponent
+        As for `half_angle`.
+    """
+    gamma = half_angle(_DIRECTIONS[way], degrees, exponent)
+    return math.log(0.5) / math.log(math.cos(gamma)) / exponent
+
+
+_DEGREES, _N = 50, 12
+"""a and Phong's n of the pictures."""
+
+_PICTURES = (
+    ("phong", _N, f"true Phong, n = {_N}"),
+    ("blinn", 4 * _N, f"Blinn, 4 n = {4 * _N}: alike along"),
+    *(
+        ("blinn", n, f"Blinn, 4 n cos² a = {n}: alike across")
+        for n in [round(4 * _N * math.cos(math.radians(_DEGREES)) ** 2)]
+    ),
+)
+"""Model, exponent and title of each picture."""
+
+
+def picture(model: str, exponent: int, side: int) -> dict[str, Any]:
+    """A highlight on a sphere by the simulated pipeline `quotient`; L and V are 100 degrees apart.
+
+    Parameters
+    ----------
+    model : str
+        ``"blinn"`` or ``"phong"``.
+    exponent : int
+        Its exponent.
+    side : int
+        Width and height.
+
+    Returns
+    -------
+    dict
+        ``png``, in base 64, the part with the highlight; ``lsb``, the largest error of the picture off the
+        border of the light.
+    """
+    scene = scene_for(sphere(48), exponent, side, side)
+    right, _, towards = scene.camera.axes[0], scene.camera.axes[1], scene.camera.viewer
+    turn = math.radians(2 * _DEGREES)
+    scene = replace(scene, lights=(Light(tuple(math.cos(turn) * towards - math.sin(turn) * right)),))
+    design = preset("quotient", model)
+    frame = FrameSimulator(design, "auto").render(scene)
+    buffer = io.BytesIO()
+    part = frame.image[side // 8 : side - side // 8, : side // 2]
+    Image.fromarray(part).convert("L").save(buffer, "png", optimize=True)
+    error = compare(scene, design, frame).method_error.steady_lsb
+    return {"png": base64.b64encode(buffer.getvalue()).decode(), "lsb": error}
+
+
+def _pictures(found: Sequence[dict]) -> Drawing:
+    figure, row = panels(9.0, 3.3, len(found))
+    for axes, result, (_, _, title) in zip(row, found, _PICTURES, strict=True):
+        image = Image.open(io.BytesIO(base64.b64decode(result["png"])))
+        axes.imshow(np.asarray(image), cmap="gray", vmin=0, vmax=255)
+        axes.set(xticks=(), yticks=())
+        axes.grid(False)
+        axes.set_title(title, fontsize=8)
+        axes.set_xlabel(f"largest error {result['lsb']:.2f} LSB", fontsize=8)
+    return Drawing(
+        "phong-blinn-pictures",
+        "True Phong and Blinn by simulated hardware",
+        svg(figure),
+        f"A sphere, the light {2 * _DEGREES} degrees from the viewer. Phong's highlight is wider across the "
+        "plane of L and V than along it. Blinn's highlight is a circle in the space of normals.",
+    )
+
+
+# The claims.
+
+
+def _shapes(quick: bool) -> list[Claim]:
+    brightness = "over n, for the same brightness, gamma = {} degrees"
+    found = [
+        Claim("[P] figure 5", "about 4", brightness.format(g), exponent_at, {"degrees": g}, printed=printed)
+        for g, printed in ((0, "4"), (15, ""), (30, ""), (40, ""), (44, ""))
+    ]
+    for way in _DIRECTIONS:
+        for degrees in (0, 30, 60, 75):
+            limit = "4" if way == _ALONG else f"4 cos^2 a = {4 * math.cos(math.radians(degrees)) ** 2:.3f}"
+            for n in (10, 1000):
+                quantity = (
+                    f"over n, for the same half-width {way} the plane of L and V, n = {n}, a = {degrees}"
+                )
+                settings = {"way": way, "degrees": degrees, "exponent": n}
+                found.append(
+                    Claim("[P]", "about 4", quantity, exponent_of_width, settings, printed="4", ours=limit)
+                )
+    return found
+
+
+def _counts(quick: bool) -> list[Claim]:
+    fewer, found = "20 to 35 % fewer operations", []
+    for local, whose in ((False, "the frame's"), (True, "each pixel's")):
+        for way in WAYS:
+            what = f"operations saved: {way}, L and V are {whose}, %"
+            printed = "20 to 35" if way == "Blinn" else ""
+            settings = {"way": way, "local": local}
+            found.append(Claim("[P]", fewer, what, operations, settings, "fewer", printed, at_least))
+        for way in list(WAYS)[1:]:
+            settings = {"local": local, "repeats": 20 if quick else 100}
+            what = f"time saved: {way}, L and V are {whose}, %"
+            found.append(Claim("[P]", fewer, what, shading_times, settings, way, timed=True))
+    return found
+
+
+def _frames(quick: bool) -> list[Claim]:
     size = {"width": 320, "height": 240} if quick else {"width": 1920, "height": 1080}
-    for count in _TRIANGLES[:2] if quick else _TRIANGLES:
-        settings = {"triangles": count, **size}
-        found.append(Task(frame_times, {**settings, "repeats": 9 if quick else 2}, timed=True))
-        errors = {"exponents": [_EXPONENT] if count != _TRIANGLES[1] else [1, 10, _EXPONENT, 100, 1000]}
-        found += [Task(hardware_frames, {"model": model, **settings, **errors}) for model in MODELS]
-    found += [Task(hardware_cost, {"model": model}) for model in MODELS]
-    side = 240 if quick else 480
-    return found + [Task(picture, {"model": m, "exponent": n, "side": side}) for m, n, _ in pictured()]
+    found = []
+    for triangles in (1_000, 10_000) if quick else (1_000, 10_000, 100_000, 1_000_000):
+        settings = {"triangles": triangles, **size, "repeats": 9 if quick else 2}
+        for key, what in (
+            ("frame", "time of a frame saved by Blinn"),
+            ("shading", "time of its shading saved by Blinn"),
+            ("geometry", "share of geometry in Blinn's frame"),
+        ):
+            printed = "40 to 45" if key == "frame" and triangles == 1_000_000 else ""
+            quantity = f"{what}, {triangles:,} triangles, {size['width']}x{size['height']}, %"
+            less = "40 to 45 % less time at a million polygons"
+            found.append(
+                Claim(
+                    "[P] figure 8", less, quantity, frame_times, settings, key, printed, at_least, timed=True
+                )
+            )
+    return found
 
 
-def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section from the results of its tasks."""
-    functions = (exponents, widths, operations, shading_times, frame_times)
-    functions += (hardware_frames, hardware_cost, picture)
-    by = {
-        function: [
-            (task.settings, result)
-            for task, result in zip(tasks, results, strict=True)
-            if task.function is function
-        ]
-        for function in functions
-    }
-    ratio = by[exponents][0][1]
-    ways = _ways_table(by[operations], by[shading_times])
-    hardware = hardware_table(by[hardware_frames], dict(_by_model(by[hardware_cost])))
-    frames = _frames_table(by[frame_times], hardware.records())
-    rows = ways.records()
-    smallest, *_, largest = frames.records()
-    size = by[frame_times][-1][0]
-    frame_wide, own = (
-        {
-            row["way"]: row["fewer operations than Phong, vector R"]
-            for row in rows
-            if row["L and V are"] == kind
-        }
-        for kind in dict.fromkeys(row["L and V are"] for row in rows)
-    )
-    scalar = list(WAYS)[1]
-    text = [
-        "[P] compares Phong's model, `(R·V)^p`, with Blinn's, `(N·H)^n`. For the same brightness "
-        f"`n/p = ln(2c^2 - 1)/ln c` (figure 5), which is {ratio['ratio'][0]:.3g} at the peak and "
-        f"{np.interp(30, ratio['degrees'], ratio['ratio']):.3g} at 30 degrees.",
-        said_of_widths(by[widths][0][1]),
-        said_of_hardware(hardware.records()),
-        f"Operations: [P] has {FEWER_OPERATIONS[0]:.0%} to {FEWER_OPERATIONS[1]:.0%} fewer for Blinn. "
-        "Counted here, with diffuse and ambient light, against Phong by the vector R: "
-        f"{_fewer(frame_wide['Blinn'])} where L and V are of the whole frame, {_fewer(own['Blinn'])} where "
-        "every pixel has its own, and H is normalised at each. The scalar form of Phong's own model takes "
-        f"{_fewer(frame_wide[scalar])} and {_fewer(own[scalar])}.",
-        f"Time of a frame (figure 8): [P] has up to {LESS_TIME[0]:.0%} to {LESS_TIME[1]:.0%} less at a "
-        "million polygons, 1920x1080. With Blinn's model the golden renderer takes "
-        f"{_less(largest['less time with Blinn, frame'])} for the frame and "
-        f"{_less(largest['less time with Blinn, shading'])} for its shading at {largest['triangles']:,} "
-        f"triangles, {size['width']}x{size['height']}. It shades only what is seen: geometry takes "
-        f"{smallest['share of geometry']:.0%} of Blinn's frame at {smallest['triangles']:,} triangles and "
-        f"{largest['share of geometry']:.0%} at {largest['triangles']:,}, and what a model saves counts the "
-        "less.",
-    ]
-    parts = [
-        *(_exponent_drawing(ratio), widths_drawing(by[widths][0][1]), pictures_drawing(by[picture])),
-        *(hardware, ways, frames, _frames_drawing(frames, size)),
-    ]
-    return Section("phong-blinn", "Experiments of [P]: Phong and Blinn", text, parts, appendix=True)
+def claims(quick: bool) -> list[Claim]:
+    """All claims; if quick, frames have up to 10,000 triangles at 320x240, else a million at 1920x1080."""
+    return [*_shapes(quick), *_counts(quick), *_frames(quick)]
 
 
-def _by_model(results: Sequence[tuple[dict, Any]]) -> list[tuple[str, Any]]:
-    return [(settings["model"], result) for settings, result in results]
-
-
-def _fewer(share: float) -> str:
-    return f"{abs(share):.0%} {'fewer' if share >= 0 else 'more'}"
-
-
-def _less(share: float) -> str:
-    return f"{abs(share):.1%} {'less' if share >= 0 else 'more'} time"
-
-
-_KINDS = ("multiplications", "additions", "divisions", "roots", "functions", "comparisons")
-
-
-def _ways_table(counted: Sequence[tuple[dict, dict]], timed: Sequence[tuple[dict, dict]]) -> Table:
-    times = {settings["local"]: result for settings, result in timed}
-    totals = {(s["way"], s["local"]): sum(result.values()) for s, result in counted}
-    rows, grades = [], []
-    for settings, result in counted:
-        way, local = settings["way"], settings["local"]
-        reference = totals["Phong, vector R", local]
-        fewer = None if way == "Phong, vector R" else 1 - totals[way, local] / reference
-        less = None if fewer is None else 1 - times[local][way]
-        rows.append(
-            [
-                *("each pixel's" if local else "the frame's", way),
-                *(result.get(kind, 0.0) for kind in _KINDS),
-                *(totals[way, local], fewer, less),
-            ]
-        )
-        grade = ""
-        if way == "Blinn":
-            grade = "good" if fewer >= FEWER_OPERATIONS[0] else "fair" if fewer > 0 else "bad"
-        grades.append([""] * 9 + [grade, ""])
-    return Table(
-        "phong-blinn-operations",
-        "Operations and time of a pixel's shading, Phong and Blinn",
-        (
-            *("L and V are", "way", *_KINDS, "all"),
-            *("fewer operations than Phong, vector R", "less time than Phong, vector R"),
+_DOCUMENT = Document(
+    "phong-blinn",
+    "[P]: Phong and Blinn",
+    [
+        "[P] compares Phong's model, `(R·V)^p`, with Blinn's, `(N·H)^n`. Its factor of about 4 between the "
+        "exponents holds for coplanar vectors near the peak; [P] itself says that it does not hold towards "
+        "pi/2. In the space of normals Phong's power n is as wide as Blinn's power 4 n along the plane of "
+        "L and V, and as `4 n cos^2 a` across it; 2 a is the angle from L to V. So no exponent makes both "
+        "models equal, unless L = V.",
+        "The section *Error against run time* has both models in hardware, the section *The documents' "
+        "criteria* cycles by number of triangles.",
+    ],
+    [
+        ClaimTable(
+            "phong-blinn-exponents",
+            "Blinn's exponent for Phong's highlight",
+            _shapes,
+            "Half-widths are found from R·V itself; a in degrees.",
         ),
-        rows,
-        "One channel, one light, diffuse and ambient light included, a power as one function; counted and "
-        "timed while NumPy does them in float64; times in one run, in turn, the fastest of many. In "
-        f"[P]: {FEWER_OPERATIONS[0]:.0%} to {FEWER_OPERATIONS[1]:.0%} fewer operations. Green: as many; "
-        "yellow: fewer, but not so many; red: more.",
-        grades,
-    )
-
-
-def _frames_table(timed: Sequence[tuple[dict, dict]], simulated: Sequence[dict[str, Any]]) -> Table:
-    cycles = {
-        row["triangles"]: row
-        for row in simulated
-        if row["model"] == MODELS[0] and row["exponent"] == _EXPONENT
-    }
-    rows = []
-    for _, result in timed:
-        phong, blinn = (result["raster"] + result[model] for model in ("phong", "blinn"))
-        run = cycles[result["triangles"]]
-        rows.append(
-            [
-                *(result["triangles"], result["pixels"], phong / result["pixels"] * 1e9),
-                *(blinn / result["pixels"] * 1e9, 1 - blinn / phong),
-                *(
-                    1 - result["blinn"] / result["phong"],
-                    LESS_TIME[1] if run["triangles"] > 900_000 else None,
-                ),
-                result["raster"] / (result["raster"] + result["blinn"]),
-                *(run["cycles"], run["pixels"], run["cycles a pixel"]),
-            ]
-        )
-    width, height = timed[0][0]["width"], timed[0][0]["height"]
-    return Table(
-        "phong-blinn-frames",
-        "[P] figure 8: time of a frame with Phong's and with Blinn's model",
-        (
-            *("triangles", "visible pixels", "Phong, ns a visible pixel", "Blinn, ns a visible pixel"),
-            *("less time with Blinn, frame", "less time with Blinn, shading", "published, at most"),
-            "share of geometry",
-            *("hardware cycles", "pixels shaded in hardware", "cycles a pixel"),
+        ClaimTable(
+            "phong-blinn-operations",
+            "Operations and time of a pixel's shading, against Phong by the vector R",
+            _counts,
+            "One channel, one light, diffuse and ambient light included, a power as one function. Counted "
+            "and timed while NumPy does them in float64. Times are of one run, in turn, the fastest of "
+            "many.",
+            {"operations": "all"}
+            | {
+                kind: kind
+                for kind in ("multiplications", "additions", "divisions", "roots", "functions", "comparisons")
+            },
         ),
-        rows,
-        f"Teapot at {width}x{height}, exponent {_EXPONENT}. Times: processor time of the golden renderer, "
-        "NumPy in float64, both models in one run; they are of the machine that made this report, the "
-        f"ratios are not. Cycles: simulated pipeline, method {METHOD}, model {MODELS[0]}, hidden "
-        "pixels included.",
-    )
+        ClaimTable(
+            "phong-blinn-frames",
+            "Time of a frame with Phong's and with Blinn's model",
+            _frames,
+            f"Teapot, exponent {_EXPONENT}; processor time of the golden renderer, NumPy in float64, both "
+            "models in one run. The renderer shades only what is seen, and what a model saves counts the "
+            "less, the more geometry takes.",
+            {"Phong, ns a visible pixel": "phong", "Blinn, ns a visible pixel": "blinn"},
+        ),
+    ],
+    [
+        Plot(
+            lambda quick: [
+                Task(picture, {"model": model, "exponent": n, "side": 240 if quick else 480})
+                for model, n, _ in _PICTURES
+            ],
+            _pictures,
+        )
+    ],
+)
 
-
-def _exponent_drawing(found: dict[str, list[float]]) -> Drawing:
-    figure, (panel,) = panels(6.4, 3.2)
-    panel.plot(found["degrees"], found["ratio"], color="#0072b2", label="ln(2c² - 1) / ln c")
-    panel.axhline(4, color="black", linestyle=":", label="4, at the peak")
-    panel.set_xlabel("gamma, degrees")
-    panel.set_ylabel("n / p")
-    panel.set_xlim(0, found["degrees"][-1])
-    panel.set_ylim(0, math.ceil(found["ratio"][-1]))
-    panel.legend(fontsize=8)
-    return Drawing(
-        "phong-blinn-5",
-        "[P] figure 5: Blinn's exponent over Phong's for the same brightness",
-        svg(figure),
-        "For coplanar vectors, where R and V are twice as far apart as N and H; at 45 degrees Phong's model "
-        "is dark. 4 is the factor of the peak; [P] itself says that it does not hold towards pi/2.",
-    )
-
-
-def _frames_drawing(frames: Table, size: dict[str, int]) -> Drawing:
-    rows = frames.records()
-    triangles = [row["triangles"] for row in rows]
-    figure, (left, right) = panels(9.0, 3.2, 2)
-    for model, marker, colour in (("Phong", "o", "#d55e00"), ("Blinn", "s", "#0072b2")):
-        times = [row[f"{model}, ns a visible pixel"] * row["visible pixels"] / 1e9 for row in rows]
-        left.plot(triangles, times, color=colour, marker=marker, label=f"{model}'s model")
-    left.set_ylabel("time of a frame, s")
-    right.plot(triangles, [row["cycles a pixel"] for row in rows], color="#009e73", marker="o", label=METHOD)
-    right.set_ylabel("hardware cycles a pixel")
-    for panel in (left, right):
-        panel.set_xscale("log")
-        panel.set_xlabel("triangles")
-        panel.set_ylim(0, 1.1 * max(max(line.get_ydata()) for line in panel.lines))
-        panel.legend(fontsize=8)
-    return Drawing(
-        "phong-blinn-8",
-        f"[P] figure 8: time of a frame against polygons, {size['width']}x{size['height']}",
-        svg(figure),
-        "Left: golden renderer in NumPy, the whole frame. Right: the simulated pipeline; spans get shorter "
-        "with more triangles, and each takes a setup interval at least.",
-    )
+tasks, section = _DOCUMENT.tasks, _DOCUMENT.section

@@ -1,392 +1,487 @@
-"""The report's section on [T]: its speed claims in software and in hardware, its table 1.1, and its MNSE."""
+"""Claims of [T]: speed in software, the same in hardware, shares of shading, and its measure MNSE."""
 
-from collections.abc import Sequence
+from collections import Counter, deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
-from blysk.bench.report.section import Drawing, Section, Table
-from blysk.bench.report.thesis_figures import (
-    SHADINGS,
-    UNITS,
-    clock_rate,
-    frame_cycles,
-    hardware,
-    prices,
-    shading_share,
-    software,
-    square_errors,
-)
-from blysk.bench.report.thesis_ways import CLAIMS, SPANS, WAYS, WIDEST, Claim
-from blysk.bench.store import Task
-from blysk.bench.svg import panels, svg
-from blysk.bench.tools.place_and_route import tool_versions
-from blysk.golden.presets import METHODS, PUBLISHED
+import numpy as np
+
+from blysk.bench.accuracy import model_of, scene_for
+from blysk.bench.report.claims import Claim, ClaimTable, Document, at_least
+from blysk.bench.report.counted import DEAR, Counted, fastest
+from blysk.bench.report.thesis_ways import DIVIDED, SCALED, SPANS, WAYS, WIDEST, random_operands
+from blysk.bench.tools.blocks import entry_of, row_of
+from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.presets import METHODS, PUBLISHED, preset
+from blysk.golden.reference.metrics import error_figures, mnse_published, nmse
+from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.renderer import render
+from blysk.sim.meshes.teapot import teapot
 
 __all__ = [
+    "SPEEDS",
+    "UNITS",
+    "Speed",
+    "claims",
+    "counted",
+    "hardware",
+    "price",
+    "prices",
     "section",
+    "shading_share",
+    "software",
+    "square_errors",
     "tasks",
 ]
 
 
-_LENGTHS = (4, 8, 16, 32, 64, 128, 256)
-
-_QUICK_LENGTHS = (8, 64)
-
-_TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
-
-_SEEDS = 3
-
-
-def tasks(quick: bool) -> list[Task]:
-    """Measurements of the section.
+@dataclass(frozen=True)
+class Speed:
+    """A method of [T] that is said to be faster than classical normalisation.
 
     Parameters
     ----------
-    quick : bool
-        Whether the measurements take only some seconds: two lengths of spans, the units of a pixel without
-        place and route, and small frames.
+    name, source : str
+        The method, and its place in [T].
+    printed : str
+        The claimed ratio of speeds.
+    ways, baselines : tuple of str
+        Some of `WAYS`: each way is compared with each baseline.
+    units : tuple of str
+        Some of `UNITS`: the same in hardware.
+    in_pixels : bool
+        Whether the ratio depends on the length of spans.
     """
-    found = []
-    for claim in CLAIMS:
-        lengths = (_QUICK_LENGTHS if quick else _LENGTHS) if claim.in_pixels else (1,)
-        settings = [
-            {"way": way, "baseline": baseline, "pixels": pixels, "repeats": 15 if quick else 40}
-            for way in claim.ways
-            for baseline in claim.baselines
-            for pixels in lengths
-        ]
-        found += [Task(software, chosen, timed=True) for chosen in settings]
-    found.append(Task(prices, {"repeats": 15 if quick else 40}, timed=True))
-    size = {"width": 160, "height": 120} if quick else {"width": 640, "height": 480}
-    units = [name for name in UNITS if not (quick and name.endswith("interpolator"))]
-    found += [Task(hardware, {"name": name}) for name in units]
-    if not quick:
-        rate = {"seeds": _SEEDS, "tools": tool_versions()}
-        found += [Task(clock_rate, {"name": name, **rate}) for name in units]
-        whole = [name for name in units if name.endswith("interpolator")]
-        found += [Task(frame_cycles, {"name": name, "triangles": 10_000, **size}) for name in whole]
-    found += [
-        Task(shading_share, {"triangles": count, **size, "repeats": 7 if quick else 3}, timed=True)
-        for count in (_TRIANGLES[:2] if quick else _TRIANGLES)
+
+    name: str
+    source: str
+    printed: str
+    ways: tuple[str, ...]
+    baselines: tuple[str, ...]
+    units: tuple[str, ...]
+    in_pixels: bool = True
+
+
+SPEEDS = (
+    Speed(
+        "bisection, polynomial of degree 2",
+        "[T] 2.1",
+        "2.4",
+        ("bisection, a factor each", "bisection, a factor a level"),
+        (f"bisection, {DIVIDED}", f"bisection, {SCALED}"),
+        ("bisection", "bisection interpolator"),
+    ),
+    Speed(
+        "middle normal, polynomial h",
+        "[T] 2.2",
+        "2.5",
+        ("middle by h(r)",),
+        (f"middle, {DIVIDED}", f"middle, {SCALED}"),
+        ("middle normal", "middle normal, one a cycle"),
+        in_pixels=False,
+    ),
+    Speed(
+        "forward differences of the normal",
+        "[T] 2.2",
+        "3.6",
+        ("forward differences",),
+        (f"line, {DIVIDED}", f"line, {SCALED}"),
+        ("forward differences", "quadratic interpolator"),
+    ),
+    Speed(
+        "spherical-angular recurrence",
+        "[T] 3.3",
+        "1.7",
+        ("recurrence",),
+        (
+            f"line, {DIVIDED}, N·L and N·H",
+            f"line, {SCALED}, N·L and N·H",
+            "a cosine of each angle",
+        ),
+        ("recurrence", "recurrence interpolator"),
+    ),
+)
+"""Speed claims of [T], all made for software."""
+
+
+UNITS = {
+    "renormaliser": ("renormaliser", ""),
+    "bisection": ("bisection", "2, 45"),
+    "middle normal": ("middle_normal", "exact"),
+    "middle normal, one a cycle": ("middle_normal", "exact, interval 1"),
+    "forward differences": ("difference_accumulator", ""),
+    "recurrence": ("recurrence", "reinsch, interleaved"),
+    "renormalise interpolator": ("renormalise_interpolator", "renormalise"),
+    "bisection interpolator": ("bisection_interpolator", "bisection"),
+    "quadratic interpolator": ("quadratic_interpolator", "quadratic"),
+    "recurrence interpolator": ("recurrence_interpolator", "recurrence"),
+}
+"""Units of the claims: unit and variant in the table of ``blysk blocks``. An interpolator includes its setup,
+and gives N·L and N·H; the others are only the unit of a pixel."""
+
+_SHADINGS = ("gouraud", "phong")
+
+
+@cache
+def counted(way: str, pixels: int) -> dict[str, float]:
+    """Operations of a way's result by kind (see `Counted`), counted while it runs, its setup included."""
+    counts: Counter[str] = Counter()
+    found = sum(1 for _ in WAYS[way](*(Counted.of(x, counts) for x in random_operands()), pixels))
+    return {kind: count / (found * SPANS) for kind, count in counts.items()}
+
+
+def price(printed: float, own: dict[str, float], other: dict[str, float]) -> float | None:
+    """Cost of a dear operation, in cheap ones, from which on counted operations give the printed ratio."""
+    dear = [sum(counts.get(kind, 0.0) for kind in DEAR) for counts in (own, other)]
+    cheap = [sum(counts.values()) - of for counts, of in zip((own, other), dear, strict=True)]
+    gain = dear[1] - printed * dear[0]
+    return max((printed * cheap[0] - cheap[1]) / gain, 0.0) if gain > 0 else None
+
+
+def _shown(counts: dict[str, float]) -> str:
+    return ", ".join(f"{count:.2g} {kind}" for kind, count in counts.items())
+
+
+def software(way: str, baseline: str, pixels: int, printed: float, repeats: int) -> dict[str, Any]:
+    """Two ways in software on the same spans: ratio of times, operations a result, and largest difference.
+
+    Both are NumPy in float64, vectorised over `SPANS` random spans of up to 45 degrees, their setup included.
+
+    Parameters
+    ----------
+    way, baseline : str
+        Two of `WAYS`.
+    pixels : int
+        Pixels of each span; for a bisection a power of two, one more than its results.
+    printed : float
+        Claimed ratio of speeds.
+    repeats : int
+        Runs of each; the fastest counts.
+
+    Returns
+    -------
+    dict
+        ``ratio``: time of the baseline over time of the way. ``own``, ``other``: `counted` of both, in words;
+        ``price`` of them. ``difference``: largest difference of a component of a normal, or of a cosine.
+    """
+    operands = random_operands()
+    pair = WAYS[way], WAYS[baseline]
+    results = zip(*(one(*operands, pixels) for one in pair), strict=True)
+    difference = max(float(np.abs(ours - theirs).max()) for ours, theirs in results)
+    # So many runs at once that a timing is no matter of microseconds.
+    runs = max(1, 64 // pixels)
+    time, baseline_time = fastest(
+        [lambda one=one: [_finish(one(*operands, pixels)) for _ in range(runs)] for one in pair], repeats
+    )
+    counts = counted(way, pixels), counted(baseline, pixels)
+    return {
+        "ratio": baseline_time / time,
+        "difference": difference,
+        "price": price(printed, *counts),
+        "own": _shown(counts[0]),
+        "other": _shown(counts[1]),
+    }
+
+
+def _finish(results: Iterable) -> None:
+    """Run through results without keeping them."""
+    deque(results, maxlen=0)
+
+
+def prices(repeats: int) -> dict[str, float]:
+    """Times of a division, a root and a cosine in NumPy, as ratios to a multiplication.
+
+    Parameters
+    ----------
+    repeats : int
+        Runs of each; the fastest counts.
+    """
+    x = np.random.default_rng(1).uniform(0.5, 1, SPANS)
+    actions = {"a multiplication": lambda: x * x, "a division": lambda: x / x}
+    actions |= {"a root": lambda: np.sqrt(x), "a cosine": lambda: np.cos(x)}
+    # Many at once: one takes some microseconds.
+    loops = [lambda action=action: [action() for _ in range(100)] for action in actions.values()]
+    product, *times = fastest(loops, repeats)
+    return {name: time / product for name, time in zip(list(actions)[1:], times, strict=True)}
+
+
+@cache
+def _parts(name: str) -> dict[str, int]:
+    row = row_of(entry_of(*UNITS[name]), None)
+    return {"interval": row.interval, **row.cost.totals}
+
+
+def hardware(unit: str, baseline: str) -> dict[str, float | None]:
+    """Cycles a result and parts of a baseline over those of a unit, both of `UNITS`.
+
+    Returns
+    -------
+    dict
+        Ratios of ``interval``, ``multipliers``, ``cells`` and ``register_bits``; ``None`` where the unit has
+        none.
+    """
+    own, other = _parts(unit), _parts(baseline)
+    kinds = ("interval", "multipliers", "cells", "register_bits")
+    return {kind: other[kind] / own[kind] if own[kind] else None for kind in kinds}
+
+
+def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict[str, float]:
+    """Share of a frame's time that the golden renderer spends on shading, by Gouraud's and Phong's method.
+
+    Parameters
+    ----------
+    triangles : int
+        Triangles of the teapot, about.
+    width, height : int
+        Size of the picture.
+    repeats : int
+        Runs of each part, in turn; the fastest count.
+
+    Returns
+    -------
+    dict
+        ``gouraud`` and ``phong``: shading over rasterising and shading.
+    """
+    scene = scene_for(teapot(triangles), 50, width, height)
+    raster = rasterise(scene)
+    actions = [lambda: rasterise(scene)]
+    actions += [
+        lambda shading=shading: render(scene, shading, REFLECTION_MODELS["phong"], raster)
+        for shading in _SHADINGS
     ]
-    methods = ("linear", "quadratic", "renormalise", "quotient") if quick else (*METHODS, *PUBLISHED)
-    count = 1_000 if quick else 10_000
-    found += [Task(square_errors, {"method": method, "triangles": count, **size}) for method in methods]
+    geometry, *times = fastest(actions, repeats)
+    return {shading: time / (geometry + time) for shading, time in zip(_SHADINGS, times, strict=True)}
+
+
+def square_errors(method: str, triangles: int, width: int, height: int) -> dict[str, Any]:
+    """MNSE of a frame as published in [T] 4.1, and its well-posed form NMSE.
+
+    The frame is by the bit-accurate model with `model_of` the method; the reference is the exact
+    frame, Phong shading with Blinn's model. Only pixels of the surface count.
+
+    Parameters
+    ----------
+    method : str
+        One of `METHODS` or `PUBLISHED`.
+    triangles : int
+        Triangles of the teapot, about.
+    width, height : int
+        Size of the picture.
+
+    Returns
+    -------
+    dict
+        ``nmse``, ``published``, ``defined`` (share of values for which the published form is defined),
+        ``max_lsb`` and ``p999_lsb``; ``nearest``: share of the published form that comes from the 1 % of the
+        values nearest the mean; ``step``: of the published form and of NMSE, the error of the reference
+        itself with 1 LSB more in the value nearest the mean, over that with 1 LSB more in the farthest.
+    """
+    scene = scene_for(teapot(triangles), 50, width, height)
+    design = preset(method, model_of(method))
+    prepared = prepare(scene, design)
+    color = design.compute(prepared.spans, constants_of(scene, design)).color
+    exact = render(scene, raster=prepared.raster)
+    image = np.zeros((height * width, 3))
+    seen = prepared.cut_raster.visible
+    image[prepared.cut_raster.pixel[seen]] = color[seen]
+    shown, reference = image[exact.mask.ravel()], exact.image[exact.mask] * 255
+    errors = error_figures(shown[np.newaxis], reference[np.newaxis])
+    published, defined = mnse_published(shown, reference)
+    distance = np.abs(reference - reference.mean()).ravel()
+    order = np.argsort(distance)
+    terms = np.square((shown - reference).ravel()[order] / distance[order])
+    steps = []
+    for place in (distance.argmin(), distance.argmax()):
+        wrong = reference.copy().ravel()
+        wrong[place] += 1
+        steps.append((mnse_published(wrong, reference.ravel())[0], nmse(wrong, reference.ravel())))
+    return {
+        "nmse": nmse(shown, reference),
+        "published": published,
+        "defined": defined,
+        "max_lsb": errors.max_lsb,
+        "p999_lsb": errors.p999_lsb,
+        "nearest": float(terms[: len(terms) // 100].sum() / terms.sum()),
+        "step": [nearest / farthest for nearest, farthest in zip(*steps, strict=True)],
+    }
+
+
+def _speeds(quick: bool) -> list[Claim]:
+    found, repeats = [], 15 if quick else 40
+    for speed in SPEEDS:
+        lengths = ((8, 64) if quick else (4, 8, 16, 32, 64, 128, 256)) if speed.in_pixels else (1,)
+        for way in speed.ways:
+            for baseline in speed.baselines:
+                for pixels in lengths:
+                    where = f", {pixels} pixels a span" if speed.in_pixels else ""
+                    settings = {"way": way, "baseline": baseline, "pixels": pixels}
+                    settings |= {"printed": float(speed.printed), "repeats": repeats}
+                    found.append(
+                        Claim(
+                            speed.source,
+                            f"{speed.name}: {speed.printed} times as fast",
+                            f"times as fast: {way}, against {baseline}{where}",
+                            software,
+                            settings,
+                            "ratio",
+                            speed.printed,
+                            at_least,
+                            timed=True,
+                        )
+                    )
     return found
 
 
-def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section from the results of its tasks.
+def _prices(quick: bool) -> list[Claim]:
+    settings = {"repeats": 15 if quick else 40}
+    kinds = ("a division", "a root", "a cosine")
+    return [
+        Claim("this machine", "", f"{kind} of NumPy, multiplications", prices, settings, kind, timed=True)
+        for kind in kinds
+    ]
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-        Tasks of `tasks`.
-    results : sequence
-        Their results.
-    """
-    by = {
-        function: [
-            (task.settings, result)
-            for task, result in zip(tasks, results, strict=True)
-            if task.function is function
-        ]
-        for function in (software, prices, hardware, clock_rate, frame_cycles, shading_share, square_errors)
-    }
-    speeds = _software_table(by[software])
-    units = {settings["name"]: {**result, "frame": None} for settings, result in by[hardware]}
-    rates = {settings["name"]: result for settings, result in by[clock_rate]}
-    for settings, result in by[frame_cycles]:
-        units[settings["name"]]["frame"] = result
-    squares = _squares_table(by[square_errors])
-    reached = [_reached(claim, speeds) for claim in CLAIMS]
-    first, one = by[square_errors][0]
-    turned = _turned(squares)
-    text = [
+
+def _units(quick: bool) -> list[Claim]:
+    found = []
+    for speed in SPEEDS:
+        for unit in speed.units:
+            whole = unit.endswith("interpolator")
+            baseline = "renormalise interpolator" if whole else "renormaliser"
+            if not (quick and whole):
+                found.append(
+                    Claim(
+                        speed.source,
+                        f"{speed.name}: {speed.printed} times as fast, in software",
+                        f"cycles a result of the {baseline} over those of the {unit}",
+                        hardware,
+                        {"unit": unit, "baseline": baseline},
+                        "interval",
+                        speed.printed,
+                        at_least,
+                    )
+                )
+    return found
+
+
+def _size(quick: bool) -> dict[str, int]:
+    return {"width": 160, "height": 120} if quick else {"width": 640, "height": 480}
+
+
+def _shares(quick: bool) -> list[Claim]:
+    return [
+        Claim(
+            "[T] table 1.1",
+            f"share of {shading.title()} shading in a frame's time",
+            f"share of shading, {count:,} triangles, %",
+            shading_share,
+            {"triangles": count, **_size(quick), "repeats": 7 if quick else 3},
+            shading,
+            timed=True,
+        )
+        for shading in _SHADINGS
+        for count in ((1_000, 10_000) if quick else (1_000, 10_000, 100_000, 1_000_000))
+    ]
+
+
+_MNSE = "MNSE: each error over its own pixel's distance from the mean"
+
+
+def _squares(quick: bool) -> list[Claim]:
+    methods = ("linear", "quadratic", "renormalise", "quotient") if quick else (*METHODS, *PUBLISHED)
+    settings = {"triangles": 1_000 if quick else 10_000, **_size(quick)}
+    return [
+        Claim("[T] 4.1", _MNSE, f"MNSE, {method}", square_errors, {"method": method, **settings}, "published")
+        for method in methods
+    ]
+
+
+def _steps(quick: bool) -> list[Claim]:
+    first = _squares(quick)[0].settings
+    step = "1 LSB more in the value nearest the mean, over 1 LSB more in the farthest"
+    share = "share of the 1 % of the values that are nearest the mean, %"
+    return [
+        Claim("[T] 4.1", _MNSE, step, square_errors, first, "step", ours="NMSE: sum over sum"),
+        Claim("[T] 4.1", _MNSE, share, square_errors, first, "nearest"),
+    ]
+
+
+def claims(quick: bool) -> list[Claim]:
+    """All claims; if quick, of two lengths of spans, small frames and the units of a pixel."""
+    return [claim for table in _DOCUMENT.tables for claim in table.claims(quick)]
+
+
+_DOCUMENT = Document(
+    "thesis",
+    "[T]: speed, table 1.1, MNSE",
+    [
         "[T] states of four of its methods how much faster they are than classical normalisation, in "
         "software. We know neither its programs nor its machine. What follows is measured in NumPy on this "
-        "machine, and does not refute it. " + " ".join(reached),
-        "NumPy does an operation at a time on whole arrays, so that a root costs what its unit takes and no "
-        "more: "
-        + ", ".join(f"{kind} {cost:.2g}" for kind, cost in by[prices][0][1].items())
-        + " multiplications on this machine. The table has the price from which on the counted operations "
-        "alone would give the published ratio, as on a machine whose roots cost so much.",
-        "In hardware a unit that takes new operands in every cycle gives a normal a cycle whatever is "
-        "inside, but for setups that take longer than a span: the claims turn into multipliers, cells and "
-        "registers that are saved, not into cycles. The table of units restates them so; the figure of a "
-        "baseline over a unit's is above 1 where the unit is the cheaper.",
+        "machine, and does not refute it. NumPy does an operation at a time on whole arrays, so a root "
+        "costs what its unit takes and no more.",
+        "In hardware a unit that takes new operands in every cycle gives a normal a cycle whatever is inside "
+        "it. The claims turn into multipliers, cells and registers that are saved, not into cycles.",
         "Table 1.1 of [T] has the share of shading in the time of a frame. Its published values were not at "
-        "hand; the table below shows what the golden renderer, in NumPy, takes for either method.",
-        f"MNSE, as published in [T] 4.1, is defined for {one['defined']:.0%} of the values of the teapot's "
-        "frame, and for few of a flat picture (see the errata). It divides by a pixel's own distance from "
-        f"the mean: with the method `{first['method']}` the hundredth of the values that is nearest the "
-        f"mean makes {one['nearest']:.0%} of it. The same single step of 1 LSB, in the reference frame "
-        f"itself, gives {one['worst']:.2g} in the value nearest the mean and {one['least']:.2g} in the "
-        f"farthest one, a ratio of {one['worst'] / one['least']:.2g}; NMSE says {one['one']:.2g} of both. "
-        f"{turned}",
-    ]
-    parts = [
-        speeds,
-        _speed_drawing(by[software]),
-        _operations_table(by[software]),
-        _hardware_table(units, rates),
-        _ratios_table(units, rates),
-        _shares_table(by[shading_share]),
-        squares,
-    ]
-    return Section("thesis", "[T]: speed, table 1.1, MNSE", text, parts, appendix=True)
-
-
-_CLAIM_OF = {(way, baseline): claim for claim in CLAIMS for way in claim.ways for baseline in claim.baselines}
-
-
-def _software_table(results: Sequence[tuple[dict, dict]]) -> Table:
-    rows, grades = [], []
-    for settings, result in results:
-        claim = _CLAIM_OF[settings["way"], settings["baseline"]]
-        holds = result["ratio"] >= claim.published
-        rows.append(
-            [
-                *(claim.name, claim.source, settings["way"], settings["baseline"]),
-                settings["pixels"] if claim.in_pixels else None,
-                *(
-                    claim.published,
-                    result["ratio"],
-                    holds,
-                    _price(claim.published, result),
-                    result["difference"],
-                ),
-            ]
-        )
-        grade = "good" if holds else "fair" if result["ratio"] > 1 else "bad"
-        grades.append([""] * 6 + [grade] * 2 + [""] * 2)
-    return Table(
-        "thesis-software",
-        "Speed claims of [T] in software: how many times faster",
-        (
-            *("claim", "source", "way", "compared with", "pixels a span"),
-            *("published ratio", "measured ratio", "reaches it", "price of a root that reaches it"),
-            "largest difference",
+        "hand. MNSE, as published, divides an error by its own pixel's distance from the mean. Values at the "
+        "mean have none; values near it count most.",
+    ],
+    [
+        ClaimTable(
+            "thesis-software",
+            "Speed in software",
+            _speeds,
+            f"NumPy in float64, {SPANS} spans of up to {WIDEST:g} degrees at once, setup included; both "
+            "ways in turn in one run, the least processor time of several. A bisection has a pixel more. "
+            "What [T] compared with is known as 'classical normalisation' only. Both usual forms are here, "
+            "and for the recurrence the direct evaluation of the cosines, too. Price: what a root, a "
+            "division or a cosine would have to cost, in multiplications or additions, for the counted "
+            "operations alone to give the published ratio. Difference: between the results of both, as "
+            "components of a unit normal or cosines; a line's normals lie on another curve than the great "
+            "circle, which is part of it.",
+            {
+                "price of a root": "price",
+                "largest difference": "difference",
+                "operations of a result": "own",
+                "of the other": "other",
+            },
         ),
-        rows,
-        f"NumPy in float64, {SPANS} spans of up to {WIDEST:g} degrees at once, setup included; both ways "
-        "in turn in one run, the least processor time of several; a bisection has a pixel more. What [T] "
-        "compared with is known as 'classical normalisation' only: both usual forms are here, and for the "
-        "recurrence the direct evaluation "
-        "of the cosines too. Price: what a root, a division or a cosine would have to cost, in "
-        "multiplications or additions, for the counted operations alone to give the published ratio. "
-        "Difference: between the results of both, as components of a unit normal or cosines; a line's "
-        "normals lie on another curve than the great circle, which is part of it. Green: the published ratio "
-        "is reached; yellow: faster, but less; red: slower.",
-        grades,
-    )
-
-
-def _price(published: float, result: dict[str, Any]) -> float | None:
-    """Least cost of a dear operation, in cheap ones, at which the counts give the published ratio."""
-    cheap, dear = (
-        [sum(result[of].get(kind, 0.0) for kind in kinds) for of in ("operations", "baseline_operations")]
-        for kinds in (_OPERATIONS[:2], _OPERATIONS[2:])
-    )
-    gain = dear[1] - published * dear[0]
-    return max((published * cheap[0] - cheap[1]) / gain, 0.0) if gain > 0 else None
-
-
-def _reached(claim: Claim, table: Table) -> str:
-    rows = [row for row in table.records() if row["claim"] == claim.name]
-    ratios = [row["measured ratio"] for row in rows]
-    held = [row for row in rows if row["reaches it"]]
-    text = (
-        f"*{claim.name[0].upper()}{claim.name[1:]}*: published {claim.published}, "
-        f"measured {min(ratios):.2f} to {max(ratios):.2f}, "
-    )
-    if len(held) == len(rows):
-        return text + "reached everywhere."
-    if not held:
-        return text + "reached nowhere."
-    against = sorted({row["compared with"] for row in held})
-    where = f"reached in {len(held)} of {len(rows)} comparisons: against {' and '.join(against)}"
-    lengths = sorted({row["pixels a span"] for row in held} - {None})
-    return text + where + (f", on spans of {', '.join(map(str, lengths))} pixels." if lengths else ".")
-
-
-def _speed_drawing(results: Sequence[tuple[dict, dict]]) -> Drawing:
-    chosen = [claim for claim in CLAIMS if claim.in_pixels]
-    figure, row = panels(9.6, 3.6, len(chosen), sharey=True)
-    for claim, panel in zip(chosen, row, strict=True):
-        for k, way in enumerate(claim.ways):
-            for baseline, colour in zip(claim.baselines, ("#0072b2", "#d55e00", "#009e73"), strict=False):
-                curve = [
-                    (settings["pixels"], result["ratio"])
-                    for settings, result in results
-                    if (settings["way"], settings["baseline"]) == (way, baseline)
-                ]
-                label = baseline.removeprefix("bisection, ").removeprefix("line, ")
-                label += f"; {way.removeprefix('bisection, ')}" if len(claim.ways) > 1 else ""
-                panel.plot(
-                    *zip(*curve, strict=True),
-                    marker="os"[k],
-                    linestyle=("-", "--")[k],
-                    color=colour,
-                    label=label,
-                )
-        panel.axhline(claim.published, color="black", linestyle=":", label=f"published, {claim.published}")
-        panel.axhline(1, color="#999999", linewidth=0.8)
-        panel.set_xscale("log", base=2)
-        panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        panel.set_title(claim.name, fontsize=9)
-        panel.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
-    row[0].set_ylabel("times faster than the baseline")
-    row[len(row) // 2].set_xlabel("pixels of a span")
-    return Drawing(
-        "thesis-speed",
-        "Speed of the ways of [T] in software, against the length of a span",
-        svg(figure),
-        "Short spans pay for the setup. Below 1 a way is slower than its baseline.",
-    )
-
-
-_OPERATIONS = ("multiplications", "additions", "divisions", "roots", "functions")
-
-
-def _operations_table(results: Sequence[tuple[dict, dict]]) -> Table:
-    found = {}
-    for settings, result in results:
-        found[settings["way"], settings["pixels"]] = result["operations"]
-        found[settings["baseline"], settings["pixels"]] = result["baseline_operations"]
-    order = {way: k for k, way in enumerate(WAYS)}
-    single = {way for claim in CLAIMS if not claim.in_pixels for way in (*claim.ways, *claim.baselines)}
-    rows = [
-        [way, None if way in single else pixels, *(counts.get(kind, 0.0) for kind in _OPERATIONS)]
-        for (way, pixels), counts in sorted(found.items(), key=lambda item: (order[item[0][0]], item[0][1]))
-    ]
-    return Table(
-        "thesis-operations",
-        "Operations in software, of a normal or of a pixel's N·L and N·H",
-        ("way", "pixels a span", *_OPERATIONS),
-        rows,
-        "Counted while the ways run, the setup's share included; additions with subtractions; a product "
-        "with a power of two counts; functions are cosines, sines and their inverses.",
-    )
-
-
-def _hardware_table(units: dict[str, dict], rates: dict[str, dict]) -> Table:
-    kinds = ("latency", "interval", "frame", "multipliers", "cells", "register_bits", "memory_bits")
-    rows = [
-        [name, *(figures[kind] for kind in kinds), rates.get(name, {}).get("fmax")]
-        for name, figures in units.items()
-    ]
-    reasons = sorted({result["reason"] for result in rates.values()} - {""})
-    missing = " ".join(reasons) if rates else "The quick report has no place and route."
-    return Table(
-        "thesis-units",
-        "The same in hardware: units",
-        (
-            *(
-                "unit",
-                "latency, cycles",
-                "interval, cycles",
-                "cycles a pixel of a frame",
-                "multipliers",
-                "cells",
-            ),
-            *("register bits", "memory bits", "Fmax, MHz"),
+        ClaimTable("thesis-prices", "Prices of dear operations", _prices),
+        ClaimTable(
+            "thesis-hardware",
+            "The same in hardware: the baseline's figure over the unit's",
+            _units,
+            "Above 1 the unit of [T] takes less. Cells, before technology mapping, are operators, "
+            "multiplexers, registers and memories of any width. An interpolator is whole: setup, and N·L "
+            "and N·H of one light. No figure: the unit has none. The section *Units, one by one* has each "
+            "unit's own figures, those on the documents' criteria and on place and route cycles and clock "
+            "rates of whole pipelines.",
+            {"multipliers": "multipliers", "cells": "cells", "register bits": "register_bits"},
         ),
-        rows,
-        "Interval: cycles from one result to the next. Cells, before technology mapping, are operators, "
-        "multiplexers, registers and memories of any width. An interpolator is whole: setup, and N·L and N·H "
-        "of one light; its frame is a teapot's, through the simulated pipeline, setups of spans included. "
-        f"Fmax: median of placements on an ECP5-25F. {missing}".strip(),
-    )
-
-
-def _ratios_table(units: dict[str, dict], rates: dict[str, dict]) -> Table:
-    rows = []
-    for claim in CLAIMS:
-        pairs = [
-            (name, baseline)
-            for name in claim.units
-            for baseline in claim.baseline_units
-            if name.endswith("interpolator") == baseline.endswith("interpolator")
-            and name in units
-            and baseline in units
-        ]
-        for name, baseline in pairs:
-            ours, theirs = units[name], units[baseline]
-            row = [claim.name, name, baseline, claim.published]
-            for kind in ("interval", "frame", "multipliers", "cells", "register_bits"):
-                row.append(theirs[kind] / ours[kind] if ours[kind] and theirs[kind] else None)
-            rate, baseline_rate = (rates.get(one, {}).get("fmax") for one in (name, baseline))
-            row.append(rate / baseline_rate if rate and baseline_rate else None)
-            rows.append(row)
-    return Table(
-        "thesis-hardware",
-        "Speed claims of [T] in hardware: the baseline's figure over the unit's",
-        (
-            *("claim", "unit", "compared with", "published ratio (software)", "cycles a result"),
-            "cycles a pixel of a frame",
-            *("multipliers", "cells", "register bits", "Fmax (unit over baseline)"),
+        ClaimTable(
+            "thesis-shading-share",
+            "Table 1.1: share of shading in the time of a frame",
+            _shares,
+            "Teapot, golden renderer, Phong's model. The rest of the time is projection, rasterising, "
+            "depth, and the normals at the ends of spans. Hidden pixels are not shaded.",
         ),
-        rows,
-        "Above 1 the unit of [T] needs less, or cycles faster. No figure: the unit has no multiplier, or "
-        "there is no place and route. The baseline is the direct renormaliser, a normal a cycle.",
-    )
-
-
-def _shares_table(results: Sequence[tuple[dict, dict]]) -> Table:
-    return Table(
-        "thesis-shading-share",
-        "[T] table 1.1: share of shading in the time of a frame",
-        ("shading", "triangles", "visible pixels", "share of shading"),
-        [
-            [shading, result["triangles"], result["pixels"], result[shading]]
-            for shading in SHADINGS
-            for _, result in results
-        ],
-        "Teapot, golden renderer, Phong's model. The rest of the time is projection, rasterising, depth, "
-        "and the normals at the ends of spans; pixels that are hidden are not shaded. The published values "
-        "were not at hand.",
-    )
-
-
-def _squares_table(results: Sequence[tuple[dict, dict]]) -> Table:
-    return Table(
-        "thesis-mnse",
-        "MNSE as published in [T] 4.1, and its well-posed form",
-        (
-            *("method", "MNSE as published", "share of values where it is defined", "NMSE"),
-            *("largest error, LSB", "99.9th percentile, LSB"),
+        ClaimTable(
+            "thesis-mnse",
+            "MNSE, and its well-posed form",
+            _squares,
+            "Teapot, exponent 50, model cosquad, of quotient blinn, against Phong shading with Blinn's "
+            "model, so mostly the error of cosquad; frames of the bit-accurate model, which the RTL equals "
+            "to the bit. NMSE is `sum (I-O)^2 / sum (I-mean(I))^2`.",
+            {
+                "NMSE": "nmse",
+                "share of values with a defined MNSE": "defined",
+                "largest error, LSB": "max_lsb",
+                "99.9th percentile, LSB": "p999_lsb",
+            },
         ),
-        [
-            [
-                settings["method"],
-                *(result[name] for name in ("published", "defined", "nmse", "max_lsb", "p999_lsb")),
-            ]
-            for settings, result in results
-        ],
-        "Teapot, exponent 50, model cosquad, of quotient blinn, against Phong shading with Blinn's model, so "
-        "mostly the error of cosquad; frames of the bit-accurate model, which the RTL equals to the bit. "
-        "NMSE is `sum (I-O)^2 / sum (I-mean(I))^2`.",
-    )
+        ClaimTable("thesis-mnse-steps", "What counts in MNSE", _steps, "Of the first method above."),
+    ],
+)
 
-
-def _turned(squares: Table) -> str:
-    """Sentence on two methods whose order differs between the published form and NMSE, if any."""
-    rows = squares.records()
-    for better in rows:
-        for worse in rows:
-            if (
-                better["NMSE"] < worse["NMSE"]
-                and better["largest error, LSB"] <= worse["largest error, LSB"]
-                and better["MNSE as published"] > worse["MNSE as published"]
-            ):
-                return (
-                    f"Of the methods, too, it puts `{worse['method']}` "
-                    f"({worse['MNSE as published']:.5g}) before `{better['method']}` "
-                    f"({better['MNSE as published']:.5g}), which has the smaller NMSE "
-                    f"({better['NMSE']:.5g} against {worse['NMSE']:.5g}) and a largest error of "
-                    f"{better['largest error, LSB']:.4g} against {worse['largest error, LSB']:.4g} LSB."
-                )
-    orders = [sorted(rows, key=lambda row: row[form]) for form in ("NMSE", "MNSE as published")]
-    if orders[0] == orders[1]:
-        return "It puts these methods in the same order as NMSE does."
-    return "It puts these methods in another order than NMSE does."
+tasks, section = _DOCUMENT.tasks, _DOCUMENT.section

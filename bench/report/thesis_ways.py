@@ -1,26 +1,14 @@
-"""Ways in software to the normals, or to N·L and N·H, of a span, and the claims of [T] on their speed."""
+"""Ways in software to the normals, or to N·L and N·H, of a span."""
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
 
 import numpy as np
 
+from blysk.bench.report.counted import dot
 from blysk.bench.report.errata import FACTOR_PUBLISHED, ROOT_PUBLISHED
 
-__all__ = [
-    "CLAIMS",
-    "SPANS",
-    "WAYS",
-    "WIDEST",
-    "Claim",
-    "Counted",
-    "dot",
-    "finish",
-    "random_operands",
-]
+__all__ = ["DIVIDED", "SCALED", "SPANS", "WAYS", "WIDEST", "Way", "random_operands"]
 
 
 SPANS = 4096
@@ -33,12 +21,6 @@ WIDEST = 45.0
 # follows from the one before; all spans are worked on at once.
 
 Way = Callable[[np.ndarray, np.ndarray, np.ndarray, int], Iterator[np.ndarray]]
-
-
-def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Dot products of the columns of two arrays of three rows, by operations that `Counted` counts."""
-    product = a * b
-    return product[0] + product[1] + product[2]
 
 
 def _divided(vector: np.ndarray) -> np.ndarray:
@@ -164,23 +146,23 @@ def _recurrence(left, right, vectors, pixels):
         before, now = now, twice * now - before
 
 
-_DIVIDED = "normalised, three divisions"
+DIVIDED = "normalised, three divisions"
 
-_SCALED = "normalised, one division"
+SCALED = "normalised, one division"
 
 WAYS: dict[str, Way] = {
-    f"middle, {_DIVIDED}": partial(_middles, _divided),
-    f"middle, {_SCALED}": partial(_middles, _scaled),
+    f"middle, {DIVIDED}": partial(_middles, _divided),
+    f"middle, {SCALED}": partial(_middles, _scaled),
     "middle by h(r)": _middles_by_factor,
-    f"bisection, {_DIVIDED}": partial(_bisection_normalised, _divided),
-    f"bisection, {_SCALED}": partial(_bisection_normalised, _scaled),
+    f"bisection, {DIVIDED}": partial(_bisection_normalised, _divided),
+    f"bisection, {SCALED}": partial(_bisection_normalised, _scaled),
     "bisection, a factor each": _bisection,
     "bisection, a factor a level": _bisection_by_levels,
-    f"line, {_DIVIDED}": partial(_lines, _divided),
-    f"line, {_SCALED}": partial(_lines, _scaled),
+    f"line, {DIVIDED}": partial(_lines, _divided),
+    f"line, {SCALED}": partial(_lines, _scaled),
     "forward differences": _forward_differences,
-    f"line, {_DIVIDED}, N·L and N·H": partial(_cosines_normalised, _divided),
-    f"line, {_SCALED}, N·L and N·H": partial(_cosines_normalised, _scaled),
+    f"line, {DIVIDED}, N·L and N·H": partial(_cosines_normalised, _divided),
+    f"line, {SCALED}, N·L and N·H": partial(_cosines_normalised, _scaled),
     "a cosine of each angle": _cosines_by_angles,
     "recurrence": _recurrence,
 }
@@ -189,131 +171,6 @@ WAYS: dict[str, Way] = {
 Vectors are arrays of shape (3, spans) or (3, 1). A way yields an array for each pixel in turn: normals, shape
 (3, spans), or N·L and N·H, shape (2, spans).
 """
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A speed claim of [T].
-
-    Parameters
-    ----------
-    name : str
-        The way that is said to be faster.
-    source : str
-        Its place in [T].
-    published : float
-        The claimed ratio of speeds.
-    ways, baselines : tuple of str
-        Some of `WAYS`: each way is compared with each baseline.
-    units, baseline_units : tuple of str
-        Some of `UNITS`: the same in hardware.
-    in_pixels : bool
-        Whether the ratio depends on the length of spans.
-    """
-
-    name: str
-    source: str
-    published: float
-    ways: tuple[str, ...]
-    baselines: tuple[str, ...]
-    units: tuple[str, ...]
-    baseline_units: tuple[str, ...]
-    in_pixels: bool = True
-
-
-CLAIMS = (
-    Claim(
-        "bisection, polynomial of degree 2",
-        "[T] 2.1",
-        2.4,
-        ("bisection, a factor each", "bisection, a factor a level"),
-        (f"bisection, {_DIVIDED}", f"bisection, {_SCALED}"),
-        ("bisection", "bisection interpolator"),
-        ("renormaliser", "renormalise interpolator"),
-    ),
-    Claim(
-        "middle normal, polynomial h",
-        "[T] 2.2",
-        2.5,
-        ("middle by h(r)",),
-        (f"middle, {_DIVIDED}", f"middle, {_SCALED}"),
-        ("middle normal", "middle normal, one a cycle"),
-        ("renormaliser",),
-        in_pixels=False,
-    ),
-    Claim(
-        "forward differences of the normal",
-        "[T] 2.2",
-        3.6,
-        ("forward differences",),
-        (f"line, {_DIVIDED}", f"line, {_SCALED}"),
-        ("forward differences", "quadratic interpolator"),
-        ("renormaliser", "renormalise interpolator"),
-    ),
-    Claim(
-        "spherical-angular recurrence",
-        "[T] 3.3",
-        1.7,
-        ("recurrence",),
-        (
-            f"line, {_DIVIDED}, N·L and N·H",
-            f"line, {_SCALED}, N·L and N·H",
-            "a cosine of each angle",
-        ),
-        ("recurrence", "recurrence interpolator"),
-        ("renormaliser", "renormalise interpolator"),
-    ),
-)
-"""Speed claims of [T], all made for software."""
-
-
-class Counted(np.ndarray):
-    """An array that counts in `counts` the operations on it and on their results.
-
-    An operation on arrays counts once an element. Made by `Counted.of`.
-    """
-
-    counts: Counter[str]
-
-    _KINDS: ClassVar[dict[str, str]] = {
-        "multiply": "multiplications",
-        "add": "additions",
-        "subtract": "additions",
-        "negative": "additions",
-        "divide": "divisions",
-        "sqrt": "roots",
-        "cos": "functions",
-        "sin": "functions",
-        "arccos": "functions",
-        "arctan2": "functions",
-        "power": "functions",
-        "maximum": "comparisons",
-    }
-
-    @classmethod
-    def of(cls, values: np.ndarray, counts: Counter[str]) -> "Counted":
-        """Values whose operations count in ``counts``: multiplications, additions and subtractions (both as
-        additions), divisions, roots, functions, and comparisons.
-        """
-        counted = np.asarray(values, dtype=np.float64).view(cls)
-        counted.counts = counts
-        return counted
-
-    def __array_finalize__(self, source):
-        self.counts = getattr(source, "counts", Counter())
-
-    def __array_function__(self, function, types, arguments, options):
-        """Keep counting in the results of functions, such as stacks of arrays."""
-        result = super().__array_function__(function, types, arguments, options)
-        return self.of(result, self.counts) if isinstance(result, np.ndarray) else result
-
-    def __array_ufunc__(self, ufunc, method, *inputs, **options):
-        """Count, and work on plain arrays."""
-        plain = [x.view(np.ndarray) if isinstance(x, Counted) else x for x in inputs]
-        counts = next(x.counts for x in inputs if isinstance(x, Counted))
-        result = getattr(ufunc, method)(*plain, **options)
-        counts[self._KINDS[ufunc.__name__]] += np.size(result)
-        return self.of(result, counts)
 
 
 def random_operands(seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -325,9 +182,3 @@ def random_operands(seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     angle = np.radians(rng.uniform(0.1, WIDEST, SPANS))
     vectors = rng.normal(size=(2, 3, 1))
     return left, left * np.cos(angle) + normal * np.sin(angle), np.stack([_divided(v) for v in vectors])
-
-
-def finish(way: Way, operands: tuple, pixels: int) -> None:
-    """Run a way for all pixels, without keeping its results."""
-    for _ in way(*operands, pixels):
-        pass

@@ -8,10 +8,10 @@ from markdown import table
 from blysk.bench.report import phong_blinn
 from blysk.bench.report.claims import measured
 from blysk.bench.report.cosine_quadratic import PUBLISHED, errors
+from blysk.bench.report.counted import DEAR
 from blysk.bench.report.errata import CLAIMS as ERRATA
 from blysk.bench.report.errata import KINDS, factor_quadratics, matters
-from blysk.bench.report.phong_blinn_hardware import half_angle
-from blysk.bench.report.thesis import CLAIMS, software
+from blysk.bench.report.thesis import SPEEDS, counted
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax
 from blysk.golden.reference.reflection import exponent_ratio
 
@@ -57,47 +57,39 @@ def _line_models() -> str:
 def _operations() -> str:
     """Operations of a normal or of a pixel's N·L and N·H, counted while the ways of [T] run."""
     rows = []
-    for claim in CLAIMS:
-        for rival in claim.baselines:
-            for way in claim.ways:
-                counted = software(way, rival, 32, 1)
-                totals = [sum(counted[of].values()) for of in ("operations", "baseline_operations")]
-                dear = [_dear(counted[of]) for of in ("operations", "baseline_operations")]
-                shown = (f"{total:.1f} ({cost:.1f})" for total, cost in zip(totals, dear, strict=True))
-                rows.append([claim.name, f"{claim.published}", way, rival, *shown])
+    for speed in SPEEDS:
+        for rival in speed.baselines:
+            for way in speed.ways:
+                both = counted(way, 32), counted(rival, 32)
+                dear = [sum(of.get(kind, 0.0) for kind in DEAR) for of in both]
+                shown = (f"{sum(of.values()):.1f} ({cost:.1f})" for of, cost in zip(both, dear, strict=True))
+                rows.append([speed.name, speed.printed, way, rival, *shown])
     return table(
         ["claim", "printed", "way", "compared with", "operations of the way", "of the other"], rows, 4
     )
 
 
-def _dear(counts: dict[str, float]) -> float:
-    """Divisions, roots and functions."""
-    return sum(counts.get(kind, 0.0) for kind in ("divisions", "roots", "functions"))
-
-
 def _phong_blinn() -> str:
     rows = []
     for local in (False, True):
-        totals = {}
         for way in phong_blinn.WAYS:
-            counts = phong_blinn.operations(way, local)
-            totals[way] = sum(counts.values())
-            fewer = 1 - totals[way] / next(iter(totals.values()))
-            of = "each pixel's" if local else "the frame's"
-            rows.append([of, way, f"{totals[way]:.1f}", f"{fewer:.0%}" if len(totals) > 1 else ""])
+            found = phong_blinn.operations(way, local)
+            fewer = f"{found['fewer']:.0%}" if found["fewer"] else ""
+            rows.append(["each pixel's" if local else "the frame's", way, f"{found['all']:.1f}", fewer])
     return table(["L and V are", "way", "operations", "fewer than the first"], rows, 2)
 
 
 def _phong_widths() -> str:
-    rows = []
-    for degrees in (0, 15, 30, 45, 60, 75):
-        rows.append([f"{2 * degrees}", f"{4 * math.cos(math.radians(degrees)) ** 2:.3f}"])
-        for way in ((1, 0), (0, 1)):
-            for exponent in (10, 100, 1000):
-                gamma = half_angle(way, degrees, exponent)
-                rows[-1].append(f"{math.log(0.5) / math.log(math.cos(gamma)) / exponent:.3f}")
-    ways = [f"{way}, n = {n}" for way in ("along", "across") for n in (10, 100, 1000)]
-    return table(["L to V, degrees", "4 cos^2 a", *ways], rows, 0)
+    columns = [(way, n) for way in ("along", "across") for n in (10, 100, 1000)]
+    rows = [
+        [
+            f"{2 * degrees}",
+            f"{4 * math.cos(math.radians(degrees)) ** 2:.3f}",
+            *(f"{phong_blinn.exponent_of_width(way, degrees, n):.3f}" for way, n in columns),
+        ]
+        for degrees in (0, 15, 30, 45, 60, 75)
+    ]
+    return table(["L to V, degrees", "4 cos^2 a", *(f"{way}, n = {n}" for way, n in columns)], rows, 0)
 
 
 def _errata_sentences() -> list[str]:
@@ -120,7 +112,7 @@ def _errata_sentences() -> list[str]:
 def _figure_sentences() -> list[str]:
     found = [errors(model) for model in ("cosquad", "cosquad_q", "cosquad_lin")]
     values = dict(zip(("f2", "fQ", "fQ2"), found, strict=True))
-    ratios = {claim.name: claim.published for claim in CLAIMS}
+    ratios = {speed.name: speed.printed for speed in SPEEDS}
     return [
         f"f2 is off by {values['f2']['absolute']:.4f} at most, fQ2 by {values['fQ2']['absolute']:.4f}",
         *(f"{name}: {value} times" for name, value in ratios.items()),

@@ -1,10 +1,12 @@
 """Claims of the documents: each is measured, its verdict is held; the table that is made of them."""
 
 import json
+import math
+from dataclasses import replace
 
 import pytest
 
-from blysk.bench.report import cosine_quadratic, errata
+from blysk.bench.report import cosine_quadratic, errata, phong_blinn, thesis
 from blysk.bench.report.claims import Claim, ClaimTable, Document, at_least, measured, to_the_digits
 from blysk.bench.report.section import Section
 
@@ -35,6 +37,40 @@ def test_figures_of_the_cosine_quadratic():
     found = verdicts(cosine_quadratic.claims(quick=True))
     assert len(found) == len(cosine_quadratic.PUBLISHED)
     assert {quantity for quantity, verdict in found.items() if not verdict} == NOT_AS_PRINTED
+
+
+def test_counts_and_exponents_of_phong_and_blinn():
+    """Fewer operations where H is the frame's; about 4 along the plane of L and V, across at L = V only."""
+    claims = [claim for claim in phong_blinn.claims(quick=True) if not claim.timed]
+    found = verdicts(claims)
+    assert len(found) == 1 + 2 + 16
+    assert {quantity for quantity, verdict in found.items() if not verdict} == {
+        "operations saved: Blinn, L and V are each pixel's, %",
+        *(
+            f"over n, for the same half-width across the plane of L and V, n = {n}, a = {degrees}"
+            for n in (10, 1000)
+            for degrees in (30, 60, 75)
+        ),
+    }
+
+
+@pytest.mark.long
+def test_speeds_in_hardware():
+    """A cycle a normal either way; and a step of MNSE counts by its place."""
+    claims = [claim for claim in thesis.claims(quick=True) if not claim.timed]
+    found = verdicts(claims)
+    assert len(found) == 5 + 1
+    assert not any(found.values())
+
+
+@pytest.mark.parametrize("document", [thesis, phong_blinn])
+def test_times_have_a_verdict(document):
+    """Which one depends on the machine."""
+    of_kind = {(c.function, c.key): c for c in document.claims(quick=True) if c.timed}
+    claims = [replace(claim, settings={**claim.settings, "repeats": 1}) for claim in of_kind.values()]
+    for claim, result in zip(claims, measured(claims), strict=True):
+        assert math.isfinite(claim.values(result)[1])
+        assert (claim.verdict(result) is None) == (not claim.printed)
 
 
 @pytest.mark.parametrize(
