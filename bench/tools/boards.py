@@ -89,9 +89,9 @@ BOARDS = {
             lines=8,
             loader="ulx3s",
             compact=True,
-            known="none with quotient so far: on commit 142fa70 it took 19,888 of 24,288 look-up tables, "
-            "mapped; one placement had 1,423 wires used twice when 15 minutes of routing ended; an "
-            "ulx3s-85f has room, --simulate routes nothing",
+            known="none with quotient so far. On commit 142fa70 the mapped design took 19,888 of 24,288 "
+            "look-up tables; one placement had 1,423 wires used twice when 15 minutes of routing ended. An "
+            "ulx3s-85f has room, and --simulate routes nothing",
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
@@ -104,8 +104,8 @@ BOARDS = {
             lines=16,
             loader="ulx3s",
             compact=False,
-            known="not tried with quotient so far; commit c815b08 gave one with a method that is gone, at "
-            "the first placement, of a third of the device",
+            known="not tried with quotient so far. Commit c815b08 gave one with an earlier method, at the "
+            "first placement, on a third of the device",
         ),
         Board(
             *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
@@ -118,8 +118,8 @@ BOARDS = {
             lines=8,
             loader="icepi-zero",
             compact=True,
-            known="not tried with quotient so far; commit c815b08 gave one with a method that is gone; the "
-            "same device on an ulx3s-25f gave none on commit 142fa70",
+            known="not tried with quotient so far. Commit c815b08 gave one with an earlier method. The same "
+            "device on an ulx3s-25f gave none on commit 142fa70",
         ),
     )
 }
