@@ -30,6 +30,7 @@ ANCHORS = {
     "chord.md": "the-chord differences error-bound where-spans-are-cut local-lights",
     "quotient.md": "frame identities span pixel bound counted",
     "bus.md": "streams registers",
+    "bounds.md": "bisection middle-normal recurrence gate-of-unit-normals lobe-tables specular-terms",
     "video.md": "vertices bands display tmds",
     "units.md": "specular-unit exact-power highlight-gate intensity pipeline frame-constants lobe",
 }

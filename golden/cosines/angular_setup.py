@@ -26,30 +26,33 @@ SPAN_ANGLES = ("half_chord", "arccos")
 class AngularSetup:
     """``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` from ``N_l``, ``N_r`` and a fixed vector H.
 
-    [T] 3.1 takes psi from arccos. From it ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)`` would
-    follow, which becomes 0/0 as psi tends to 0, and most spans are narrow. Here, with ``a = N_l.H``,
-    ``b = N_r.H`` and the angle counted from the middle of the span,
+    [T] 3.1 takes psi from arccos. Then ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``, which
+    becomes 0/0 as psi tends to 0. Most spans are narrow. Here, with ``a = N_l.H``, ``b = N_r.H`` and the
+    angle counted from the middle of the span,
 
     - ``cos gamma(t) = x cos((t - 1/2) psi) + y sin((t - 1/2) psi)``,
     - ``x = (a + b)/(2 cos(psi/2))`` and ``y = (b - a)/(2 sin(psi/2))``,
     - ``cos beta = sqrt(x^2 + y^2)``, ``lambda = atan2(y, x) + psi/2``.
 
-    The curve goes through a and b for any psi, so an error of y is multiplied by ``sin(psi/2)``, which is
-    small for narrow spans, where y is inaccurate. Differences of nearly equal numbers are exact, because dot
-    products of codes are exact: ``w = |N_r - N_l|^2 = N_l.N_l + N_r.N_r - 2 N_l.N_r`` and ``b - a``. Both
-    half-angle functions follow from ``z = w/4 = sin^2(psi/2)``: ``1/(2 cos(psi/2)) = 1/2 + e(z)/2`` with e, a
-    small correction, from a table; ``1/(2 sin(psi/2)) = 2^j T(v)`` with T from a table on ``v = z 4^j`` in
-    [1/4, 1), and ``b - a`` shifted by j. psi comes from `HalfChord`; no arccos is needed.
+    The curve goes through a and b for any psi. So ``sin(psi/2)`` multiplies an error of y. In narrow spans y
+    is inaccurate, and this factor is small. Dot products of codes are exact, so differences of nearly equal
+    numbers are exact, too: ``w = |N_r - N_l|^2 = N_l.N_l + N_r.N_r - 2 N_l.N_r`` and ``b - a``. Both
+    half-angle functions follow from ``z = w/4 = sin^2(psi/2)``:
 
-    Beyond 90 degrees ``|N_r + N_l|^2`` takes the role of w, and x and y are exchanged, so that angles from 0
-    to 180 degrees are possible. Only opposite normals have no plane; the curve then goes through the pole
-    ``x = 0``. The closer the angle is to 180 degrees, the more the rounding of the normals rotates the plane,
-    in proportion to ``1/sin psi``: spans over 150 degrees are flagged, by the comparison
-    ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``. Its limit is lowered by the largest error of rounding, so that
-    all spans from 150.01 degrees on are flagged.
+    - ``1/(2 cos(psi/2)) = 1/2 + e(z)/2`` with e, a small correction, from a table;
+    - ``1/(2 sin(psi/2)) = 2^j T(v)`` with T from a table on ``v = z 4^j`` in [1/4, 1), and ``b - a`` shifted
+      by j.
 
-    Polar coordinates come from 22 steps of CORDIC, whose gain is divided out by shifts and additions. A span
-    of one pixel gets ``psi/(m-1) = psi``, which no unit reads.
+    psi comes from `HalfChord`, without arccos.
+
+    Beyond 90 degrees ``|N_r + N_l|^2`` takes the role of w, and x and y are exchanged. So angles from 0 to
+    180 degrees are possible. Only opposite normals have no plane. The curve then goes through the pole
+    ``x = 0``. The rounding of the normals rotates the plane in proportion to ``1/sin psi``. So spans over 150
+    degrees are flagged, by the comparison ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``. Its limit is lowered by
+    the largest error of rounding. So all spans from 150.01 degrees on are flagged.
+
+    Polar coordinates come from 22 steps of CORDIC [Volder59]. Shifts and additions divide its gain out. A
+    span of one pixel gets ``psi/(m-1) = psi``, which no unit reads.
 
     ============ ============ ====================================================================
     word         format       why
@@ -66,15 +69,15 @@ class AngularSetup:
     cos beta     UQ(1, 25)    over 1 only where normals of unequal length are few steps apart
     ============ ============ ====================================================================
 
-    `error` bounds the error of cos gamma(t) at any pixel: the exact cosine of the setup's angles, against the
-    formula above in exact arithmetic on the same codes. The largest errors found are 5e-7 up to 0.1 degrees,
-    9e-7 at 1, 3e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 degrees on.
+    `error` bounds the error of cos gamma(t) at any pixel, against the formula above in exact arithmetic on
+    the same codes. The largest errors found are 5e-7 up to 0.1 degrees, 9e-7 at 1, 3e-6 at 10, 1.3e-5 at 45,
+    3.3e-5 from 90 degrees on.
 
     **By arccos**, as published: ``angle="arccos"`` takes psi from `Arccos` of ``r = N_l.N_r``, divided by
-    `ONE_SQUARED` as ``r + r/2^16`` and rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians and
-    converted to turns by a product with ``1/(2 pi)`` in UQ(-2, 19); ``psi/(m-1)`` reads the first 17 bits of
-    the product. x and y are those above, so that only the error of arccos is added: `arccos_error`. Largest
-    error of cos gamma found, by the span angle in degrees:
+    `ONE_SQUARED` as ``r + r/2^16`` and rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians. A product
+    with ``1/(2 pi)`` in UQ(-2, 19) converts it to turns. ``psi/(m-1)`` reads the first 17 bits of the
+    product. x and y are as above, so only the error of arccos is added: `arccos_error`. The largest errors of
+    cos gamma found are, by the span angle in degrees:
 
     ==================== ====== ====== ====== ======
     psi from             1e-4   1      10     45
@@ -85,7 +88,7 @@ class AngularSetup:
     arccos, as published 0.088  0.078  0.045  5.0e-4
     ==================== ====== ====== ====== ======
 
-    The vectors must be of unit length, except for rounding; words of other vectors saturate or wrap.
+    The vectors must be of unit length, except for rounding. Words of other vectors saturate or wrap.
 
     Parameters
     ----------
@@ -142,16 +145,7 @@ class AngularSetup:
     def error(angle: np.ndarray) -> np.ndarray:
         """Bound of the error of cos gamma with the half chord, by the span angle in degrees.
 
-        It is the sum of these errors:
-
-        - x: the errors of the correction (fit 2.5e-7, table 2^-22, rounding 2^-19), times at most 1, and the
-          cut of its factor, 2^-18 times 0.42.
-        - y: the rounding of its factor, 2^-17, and twice the errors of T (fit 2.9e-6, table 2^-22, rounding
-          2^-18).
-        - CORDIC: the angle of the last step, 2^-21; a cut of 2^-26 in each step; the rounding of 22 angles.
-        - psi: half of its error at either end, times cos beta, which is at most 1.
-        - ``psi/(m-1)``: 17 leading bits of psi, 2^-19 over 0.159, and the reciprocal, 2^-17, at the right
-          end, times cos beta.
+        docs/theory/bounds.md#angular-setup derives it.
 
         Parameters
         ----------
@@ -173,12 +167,7 @@ class AngularSetup:
     def arccos_error(self, angle: float) -> float:
         """Bound of the error of cos gamma with ``angle="arccos"``, for one span angle in degrees.
 
-        It is the sum of `error`; half the error of psi at either end, times cos beta; and the rounding of psi
-        for its step, 2^-19 turns. cos beta is at most 1 plus the difference of the lengths, 2^-17, over the
-        chord, and at most sqrt 2. The error of the cosine is 2^-17 by its rounding plus 2^-18 by each length.
-        The error of psi is the sum of the change that this makes in arccos; the largest model error and
-        arithmetic error of the segments in which the cosine may be; 2^-16 by the last rounding; and a
-        relative ``2^-20 2 pi`` by the rounding of ``1/(2 pi)``.
+        docs/theory/bounds.md#angular-setup derives it.
 
         Parameters
         ----------
@@ -285,7 +274,7 @@ class AngularSetup:
             ``psi/(m-1)`` in turns.
         cos_beta : Fixed, shape (spans,), UQ(1, 25)
         out_of_range : bool array, shape (spans,)
-            Whether the normals are over `MAX_ANGLE` apart; the plane of the span is then inaccurate.
+            Whether the normals are over `MAX_ANGLE` apart. The plane of the span is then inaccurate.
 
         Raises
         ------

@@ -62,15 +62,16 @@ class Arccos:
     [0.96, 1]    0.174         0.084      0.019
     ============ ============= ========== =========
 
-    Near x = 1, the usual case in a smooth mesh, arccos behaves like a square root, and no polynomial in x
-    fits it. Besides, the rounding of x to 16 bits alone is an error of 2.5 % for an angle of 1 degree.
-    `HalfChord` avoids both, and `AngularSetup` uses it.
+    x near 1 is the usual case in a smooth mesh. There arccos behaves like a square root, and no polynomial in
+    x fits it. Besides, the rounding of x to 16 bits alone is an error of 2.5 % for an angle of 1 degree.
+    `HalfChord`, which `AngularSetup` uses, avoids both.
 
     Parameters
     ----------
     table : str
-        ``"as_published"``: [T] table 3.1 digit by digit; ``"corrected"``: with 74.457 for the misprinted
-        74.547; ``"refitted"``: fitted for the least maximum error of each segment in words of the hardware.
+        - ``"as_published"``: [T] table 3.1 digit by digit;
+        - ``"corrected"``: with 74.457 for the misprinted 74.547;
+        - ``"refitted"``: fitted for the least maximum error of each segment in words of the hardware.
 
     Raises
     ------

@@ -15,8 +15,8 @@ __all__ = ["Chord"]
 class Chord:
     """Half the squared chord ``u = |a - b|^2 / 2``; for unit vectors ``1 - a . b``.
 
-    A length error e of a vector is an error e of the dot product, but of u only ``e^2/2 + e u``. Near u = 0
-    the formula is not a difference of nearly equal numbers.
+    A length error e of a vector is an error e of the dot product. Of u it is only an error ``e^2/2 + e u``.
+    Near u = 0 the formula has no difference of nearly equal numbers.
 
     ========== ========== =======================================================================
     word       format     why
@@ -26,7 +26,7 @@ class Chord:
     operand    UQ(1, 25)  operand of the specular unit; cut, saturates
     ========== ========== =======================================================================
 
-    u is exact if all components of ``a - b`` are under 1, which always holds for u < 1/2. Else halving cuts
+    If all components of ``a - b`` are under 1, u is exact. This always holds for u < 1/2. Else halving cuts
     up to half a step of each component, and the error of u is at most ``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``,
     2.7e-5 for unit vectors.
 

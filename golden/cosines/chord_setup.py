@@ -34,7 +34,7 @@ class SpanValues(NamedTuple):
         diffuse, highlight : float64 arrays, shape (spans, lights, 3)
             N·L, -1 to 1, and u, 0 to 2.
         scale : int
-            s: if over 0, the words of u are ``min(2^s u, 1)``; see `LocalChordInterpolator`.
+            s. If it is over 0, the words of u are ``min(2^s u, 1)``, see `LocalChordInterpolator`.
 
         Raises
         ------
@@ -62,8 +62,8 @@ class Differences(NamedTuple):
 class ChordSetup:
     """Quadratics through given values of ``f = N·L`` and ``u = |N - H|^2 / 2`` at t = 0, 1/2 and 1.
 
-    For unit vectors ``u = 1 - N·H``, but u depends on the length of a normal only at second order, and near
-    the peak of a highlight it is not a difference of nearly equal numbers. f and u are each
+    For unit vectors ``u = 1 - N·H``. But u depends on the length of a normal only at second order. Near the
+    peak of a highlight u needs no difference of nearly equal numbers. f and u are each
     ``v = v_l + P t + G t^2`` with
 
     ``G = 2 (v_l + v_r - 2 v_m)`` and ``P = v_r - v_l - G``.
@@ -87,8 +87,8 @@ class ChordSetup:
     ============ ============ =====================================================================
 
     A span with ``|G| >= 1/8`` or ``|P| >= 1/2`` is flagged, and its words are invalid. No sum along a span
-    wraps: u_l is in [0, 2), f_l in [-1, 1), and the curve of any span, flagged or not, is at most
-    ``|P| + |G|``, 5/8, away from its start; the sums hold -4 to 4.
+    wraps. u_l is in [0, 2), f_l in [-1, 1). The curve of every span, also of a flagged span, is at most
+    ``|P| + |G|``, 5/8, away from its start. The sums hold -4 to 4.
 
     `highlight_error` and `diffuse_error` bound the errors of u and f at any pixel against the quadratic
     through the exact values.
@@ -96,7 +96,7 @@ class ChordSetup:
     Parameters
     ----------
     fraction_bits : int
-        Fraction bits of the differences, 36 to 46; even, as a span of twice the length needs two more.
+        Fraction bits of the differences, 36 to 46. Even, because a span of twice the length needs two more.
 
     Raises
     ------
@@ -177,7 +177,7 @@ class ChordSetup:
         factor : Differences
             Differences of a, only if ``factor`` is given.
         out_of_range : bool array, shape (spans,)
-            Whether P or G of the span does not fit its word; the differences are then invalid.
+            Whether P or G of the span outgrows its word. The differences are then invalid.
 
         Raises
         ------
@@ -214,8 +214,8 @@ class ChordSetup:
         """Largest error of u at any pixel of a span that is not flagged, against the exact quadratic.
 
         In units of `ONE_SQUARED`, like u. The error of the three values is half a step, which the quadratic
-        multiplies by at most 1.25. The rounding of G, 2^-21, does not move the ends and is multiplied by
-        ``t (1 - t)``, at most 1/4. The rest is `walk_error`.
+        multiplies by at most 1.25. The rounding of G is 2^-21. ``t (1 - t)``, at most 1/4, multiplies it, and
+        the ends stay. The rest is `walk_error`.
 
         Parameters
         ----------

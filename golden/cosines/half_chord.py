@@ -16,16 +16,14 @@ __all__ = ["HalfChord"]
 class HalfChord:
     """Angle ``psi = 2 arcsin(|N_r - N_l|/2)`` in turns, from the squared chord ``w = |N_r - N_l|^2``.
 
-    This is the well-conditioned form of arccos. ``sqrt(1 - x) poly(x)`` is well-conditioned, too, but its
-    input is imprecise: at 1 degree ``1 - x`` is 1.5e-4, and the length error of each quantised normal changes
-    ``x = N_l . N_r`` by up to 2^-18, both together by 5 % of ``1 - x``. The chord changes only by the
-    rounding of the components, and ``w = N_l . N_l + N_r . N_r - 2 N_l . N_r`` is exact.
+    This is the well-conditioned form of arccos: ``w = N_l . N_l + N_r . N_r - 2 N_l . N_r`` is exact. The
+    input of ``sqrt(1 - x) poly(x)`` is imprecise, see docs/theory/bounds.md#half-chord.
 
     ``z = w/4`` is shifted by an even number of bits to ``v = z 4^j`` in [1/4, 1). ``s = sqrt(v)`` is read
-    from a table of 512 words with linear interpolation, and ``psi = 2^-(j+1) s g(z)`` with
-    ``g(z) = 2 arcsin(sqrt z)/(pi sqrt z) = 2/pi + z (c1 + z (c2 + z (c3 + z c4)))``, exact at angle 0 and
-    fitted up to 90 degrees. For larger angles the caller gives the squared chord to the opposite vector,
-    ``|N_r + N_l|^2``, and sets ``supplement``: the result is then half a turn minus the angle of that chord.
+    from a table of 512 words with linear interpolation. Then ``psi = 2^-(j+1) s g(z)`` with ``g(z) = 2
+    arcsin(sqrt z)/(pi sqrt z) = 2/pi + z (c1 + z (c2 + z (c3 + z c4)))``. g is exact at angle 0 and fitted up
+    to 90 degrees. For larger angles the caller gives the squared chord to the opposite vector,
+    ``|N_r + N_l|^2``, and sets ``supplement``. The result is then half a turn minus the angle of this chord.
     So angles from 0 to 180 degrees are possible, and the result is well-conditioned at both ends.
 
     ============ ============ ==================================================================
@@ -40,13 +38,10 @@ class HalfChord:
     result       UQ(0, 36)    relative precision down to a chord of one step
     ============ ============ ==================================================================
 
-    Lengths count in units of `ONE`, which is part of the coefficients.
+    Lengths count in units of `ONE`. The coefficients contain it.
 
     The error relative to the angle (beyond 90 degrees: to its supplement) is at most `RELATIVE_ERROR`, and
-    the cut of the result adds 2^-36 turns. s is at least 1/2; its errors are 2^-20 for the fit and the slope
-    of the table and 2^-18 for the rounding. g is at least 0.636; its errors are the fit (a relative 6.6e-6),
-    the rounding of z by 2^-19 (times the slope 0.2), of four products by 2^-20 (times powers of z, which is
-    at most 1/2), of the constant by 2^-20, and of g by 2^-18.
+    the cut of the result adds 2^-36 turns. docs/theory/bounds.md#half-chord derives it.
 
     Source: docs/theory/interpolation.md#half-chord; [T] 3.3.
     """
@@ -81,7 +76,7 @@ class HalfChord:
     def roots(self) -> tuple[Fixed, Fixed]:
         """Table of the square root: value at the start of each of 512 segments of [0, 1), and slope.
 
-        Each line has the least maximum error. The first 128 words are 0; they are read only if ``w = 0``.
+        Each line has the least maximum error. The first 128 words are 0. They are read only if ``w = 0``.
         """
         size = 1 << self.ADDRESS_BITS
         start = np.arange(size) / size

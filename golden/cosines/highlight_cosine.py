@@ -14,15 +14,15 @@ __all__ = ["HighlightCosine"]
 class HighlightCosine:
     """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for every pixel.
 
-    N(t) moves along a great circle. beta is the angle between the plane of this circle and H, and lambda the
+    N(t) moves along a great circle. beta is the angle between the plane of this circle and H. lambda is the
     angle from N_l to the projection of H onto the plane. One signed accumulator counts
-    ``theta = lambda - t psi`` down in turns. It passes through zero if the highlight is inside the span, so
-    that one pass is enough; [T] has two. With the light vector L in place of H the result is ``1 - N·L``.
+    ``theta = lambda - t psi`` down in turns. If the highlight is inside the span, it passes through zero. So
+    one pass is enough; [T] has two. With the light vector L in place of H the result is ``1 - N·L``.
 
-    The table holds ``v = 1 - cos`` for a quarter of the wave. With theta folded into the quarter,
-    ``1 - cos gamma = (1 - cos beta) + cos beta v`` in the half turn about the highlight and
+    The table holds ``v = 1 - cos`` for a quarter of the wave. theta is folded into the quarter. Then
+    ``1 - cos gamma`` is ``(1 - cos beta) + cos beta v`` in the half turn about the highlight, and
     ``(1 + cos beta) - cos beta v`` in the other half turn. So the result is most accurate where it is small,
-    which high exponents need: below ``v = 1/32`` (14 degrees) the multiplier gets all bits of v.
+    which high exponents need. Below ``v = 1/32`` (14 degrees) the multiplier gets all bits of v.
 
     ============== ============= ====================================================================
     word           format        why
@@ -38,19 +38,16 @@ class HighlightCosine:
     ============== ============= ====================================================================
 
     The arithmetic error of the result, for exact operands and cos beta up to 1, is at most `NEAR_ERROR` if v
-    is under 1/32, else `ERROR`. Both include the fit of the table (``0.0858 h^2`` in its first segment,
-    ``h^2/16`` in the others, with ``h = pi/1024``), three roundings of 2^-23 (value, rise, their sum), the
-    cut of theta to 2^-25 turns, and the last rounding, 2^-26. The rounding of cos beta, 2^-17, is multiplied
-    by at most 1/32 below v = 1/32, and by v above, where v itself is rounded by 2^-18, or by 2^-17 where it
-    would round up to 1.
+    is under 1/32, else `ERROR`. docs/theory/bounds.md#highlight-cosine derives both.
 
     Parameters
     ----------
     address_bits : int
         Address bits of the table, 4 to 12: it has ``2**address_bits`` words.
     interpolated : bool
-        Whether there is linear interpolation between the words. Without it, as published, the error of the
-        table is ``h/2``, 0.0015 with 512 words. The bounds above are those of 512 words with interpolation.
+        Whether there is linear interpolation between the words. Without interpolation, as published, the
+        error of the table is ``h/2`` with ``h = pi/1024``, 0.0015 with 512 words. The bounds above hold for
+        512 words with interpolation.
 
     Raises
     ------
@@ -89,8 +86,8 @@ class HighlightCosine:
     def table(self) -> tuple[Fixed, Fixed]:
         """Table of v: value at the start of each segment of the quarter wave, and rise to its end.
 
-        Each line is the one of least maximum error; the first goes through 0, so that the peak is exact.
-        Without interpolation the value is the mean of both ends, and the rise is 0.
+        Each line has the least maximum error. The first goes through 0, so the peak is exact. Without
+        interpolation the value is the mean of both ends, and the rise is 0.
         """
         size = 1 << self.address_bits
         width = np.pi / 2 / size

@@ -11,7 +11,7 @@ from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 __all__ = ["OCTAVES", "STEPS", "Quotient", "place_format"]
 
 OCTAVES, STEPS = 15, 16
-"""Octaves of a part of a lobe's table, beside a row for all smaller numbers; and steps of a row."""
+"""Octaves of a part of a lobe's table, beside a row for all smaller numbers, and steps of a row."""
 
 FRACTION_BITS = 12
 """Bits of a place within a step."""
@@ -24,18 +24,20 @@ def place_format(parts: int) -> Format:
 
 @dataclass(frozen=True)
 class Quotient:
-    """``N·L = l/sqrt(q)`` and ``s = m/q`` of every pixel; s as its place in a table by octaves.
+    """``N·L = l/sqrt(q)`` and ``s = m/q`` of every pixel; s is a place in a table by octaves.
 
     ``q = m + w`` is shifted by an even number of bits, 2k, into [1, 4). Then ``r = 1/sqrt(q)`` comes from a
     table of 384 entries with one product. N·L is ``l 2^k r``. m is shifted into a word of 17 bits, by
-    multiples of four. ``s = m r^2`` then has a leading one within the upper seven bits, and its octave and
-    the 16 bits behind the leading one are its place in the table (`QuotientLobe`).
+    multiples of four. ``s = m r^2`` then has a leading one within the upper seven bits. Its octave and the 16
+    bits behind the leading one are its place in the table (`QuotientLobe`).
 
     *Two parts.* Where ``m > w``, the place is that of ``1 - s = w/q`` in a second part of the table. So both
-    ends of the range have octaves. With ``mirror`` there is one part, as a highlight of R·V ends at
-    ``s = 1/2``: from there on the place is past the end, as it is where ``z < 0`` without ``mirror``.
+    ends of the range have octaves. With ``mirror`` there is one part, because a highlight of R·V ends at
+    ``s = 1/2``. From there on the place is past the end. Without ``mirror`` it is past the end where
+    ``z < 0``.
 
-    *Row.* Octave ``[2^-(j+1), 2^-j)`` with j = 0 to 14 is row 15 - j; all less is row 0, with equal steps.
+    *Row.* Octave ``[2^-(j+1), 2^-j)`` with j = 0 to 14 is row 15 - j. All smaller numbers are row 0, with
+    equal steps.
 
     ============ =========== =====================================================================
     word         format      why
@@ -51,19 +53,16 @@ class Quotient:
     place        UQ(i, 12)   cut
     ============ =========== =====================================================================
 
-    A pixel with ``q < 2^-14`` of the largest scale is flagged; its results are invalid. After the two cuts of
-    `spans_for` no pixel is: q is at least 0.05.
+    A pixel with ``q < 2^-14`` of the largest scale is flagged. Its results are invalid. After the two cuts of
+    `spans_for` q is at least 0.05, and no pixel is flagged.
 
-    *Error of r*, in 2^-20: 3.0 by the chord, halved by its move; 1 by the rounding of base and slope; 1 by
-    the cut of the product; 1 by the cut of q; 4 by the rounding of r. Relative to r, which is 1/2 at least:
-    `ROOT_ERROR`. *Error of s*, relative: twice that, 2^-15 by the cut of r^2, 2^-13 by that of the numerator,
-    2^-16 by that of the place: `SINE_ERROR`. *Error of N·L*: `ROOT_ERROR`, and 2^-16 by the cut of the line;
-    that of N·L itself does not change the term, which is rounded to 2^-17.
+    The relative error of r is at most `ROOT_ERROR`, that of s `SINE_ERROR`. N·L is off by `ROOT_ERROR` and
+    2^-16. docs/theory/bounds.md#quotient derives them.
 
     Parameters
     ----------
     spans : QuotientSpans
-        Which words there are.
+        The words of a span: lights, highlights, mirror.
 
     Source: docs/theory/quotient.md#pixel.
     """
@@ -99,8 +98,8 @@ class Quotient:
     def table(self) -> tuple[Fixed, Fixed]:
         """Entries ``base`` and ``slope`` of the reciprocal root, shape (512,) each, by q's upper 9 bits.
 
-        ``r = base - slope f`` with f from 0 to 1 in a step; the first 128 entries are not used. A base is
-        moved by half of the chord's error in the middle, and has the half step of r's rounding.
+        ``r = base - slope f`` with f from 0 to 1 in a step. The first 128 entries are unused. A base is moved
+        by half of the chord's error in the middle, and contains the half step of r's rounding.
         """
         step = 2.0 ** -(self.TABLE_BITS - 2)
         q = np.maximum(np.arange(1 << self.TABLE_BITS) * step, 1.0)

@@ -12,14 +12,14 @@ __all__ = ["MARGIN", "PixelWords", "QuotientSpans", "QuotientWords", "SpanVector
 
 
 MARGIN = 4
-"""Steps from a component to 1: at the last pixel it is off by 2.5 at most, and at 1 it would wrap."""
+"""Steps from a component to 1. At the last pixel it is off by 2.5 steps at most, and at 1 it would wrap."""
 
 
 class SpanVectors(NamedTuple):
     """Vectors ``v = N/W`` of spans: at the first pixel, and the step to the next.
 
-    Pixel i of a span has the vector ``start + i 2^-exponent step``, up to a scale that is forgotten. The
-    components are those of `QuotientSpans.components`.
+    Pixel i of a span has the vector ``start + i 2^-exponent step``, times any scale.
+    `QuotientSpans.components` names the components.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ class SpanVectors(NamedTuple):
     def quantise(cls, left: np.ndarray, right: np.ndarray, length: np.ndarray) -> "SpanVectors":
         """Nearest codes of vectors at both ends, scaled to fill the words.
 
-        The largest component of both ends is 1 less `MARGIN` steps of 2^-17. The exponent is the largest with
-        which the step fits, but at most ``ceil(log2(m - 1)) + 3``.
+        The largest component of both ends is 1 less `MARGIN` steps of 2^-17. The exponent is the largest
+        number with which the step fits, and at most ``ceil(log2(m - 1)) + 3``.
 
         Parameters
         ----------
         left, right : float64 arrays, shape (spans, components)
             Vectors at the first and the last pixel; not both 0.
         length : int array, shape (spans,)
-            Pixels m, 1 to 4095. Of a span of one pixel the right end has no effect. The step of a span of
-            two may not fit: give two spans of one.
+            Pixels m, 1 to 4095. In a span of one pixel the right end has no effect. The step of a span of two
+            pixels may not fit: give two spans of one pixel.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class PixelWords(NamedTuple):
     Parameters
     ----------
     numerator : Fixed, shape (pixels, lights)
-        m of each light; no light without highlights.
+        m of each light; empty without highlights.
     rest : Fixed, shape (pixels,)
         w, so that ``q = m + w`` with m of the first light.
     line : Fixed, shape (pixels, lights)
@@ -108,7 +108,7 @@ class QuotientWords(NamedTuple):
     Parameters
     ----------
     squares : tuple of three arrays, shape (spans, lights + 1)
-        ``m`` of each light, and ``w`` last. With lights without highlight ``w`` alone.
+        ``m`` of each light, and ``w`` last. Without highlights ``w`` alone.
     lines : tuple of two arrays, shape (spans, lights)
         l of each light; no second difference.
     heights : tuple of two arrays, shape (spans, lights)
@@ -131,8 +131,8 @@ class QuotientSpans:
     - ``l = x sin a + z cos a``, the numerator of N·L;
     - z, whose sign tells whether there is a highlight; not with ``mirror``.
 
-    Without highlights ``w = x^2 + y^2 + z^2`` in the frame with z along the first light, and l is z itself:
-    a further light brings its l alone.
+    Without highlights ``w = x^2 + y^2 + z^2`` in the frame with z along the first light, and l is z. A
+    further light brings its l alone.
 
     A square has the start ``v·v``, the first difference ``2 v·d 2^-e + b`` and the second
     ``2 d·d 2^-2e``; b is half of the second difference, cut. Lines have the start ``v·L`` and the
@@ -151,9 +151,9 @@ class QuotientSpans:
     ========= ============ =================================================================
 
     At pixel i the words are off by at most ``(i + i^2/2) 2^-47`` (m, w), ``i 2^-36`` (l), ``i 2^-29`` (z).
-    As ``|v| < 2``, and m and w are convex along a span, no word wraps, if both ends of the span are in the
-    range of the components: also the last pixel, ``start + (K - 1) 2^-exponent step``, with a step that was
-    rounded. A source of spans has to ensure that; `SpanVectors.quantise` does by its margin.
+    ``|v| < 2``, and m and w are convex along a span. So no word wraps if both ends of the span are in the
+    range of the components. The last pixel, ``start + (K - 1) 2^-exponent step``, has to be in the range with
+    its rounded step. A source of spans has to ensure this, as `SpanVectors.quantise` does by its margin.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class QuotientSpans:
     highlights : bool
         Whether there is specular light.
     mirror : bool
-        Whether the highlight is one of R·V; only with ``highlights``.
+        Whether the highlight is of R·V; only with ``highlights``.
 
     Raises
     ------
@@ -181,7 +181,7 @@ class QuotientSpans:
     LINE_FORMAT = SQ(2, 36)
     HEIGHT_FORMAT = SQ(1, 29)
     ONE = 2**17 - 2
-    """Code of length 1 of L: the code's length is under 1 after rounding, and the line never outgrows v."""
+    """Code of length 1 of L. After rounding the code's length is under 1, so the line never outgrows v."""
 
     def __post_init__(self) -> None:
         if self.lights < 1:

@@ -36,13 +36,13 @@ def shortcut_cosine(angle: np.ndarray, steps: np.ndarray) -> np.ndarray:
 class Recurrence:
     """Cosines ``x(k) = A cos(phase - k d)`` for k = 0 ... m - 1, by one product a pixel.
 
-    ``direct``, as published: ``x(k+1) = 2 cos(d) x(k) - x(k-1)``. The coefficient is near 2, so its rounding
-    error is large compared with ``2 - 2 cos d``, the small number that is the curvature: the form is
-    **unstable** in short words.
+    ``direct``, as published: ``x(k+1) = 2 cos(d) x(k) - x(k-1)``. The coefficient is near 2. So its rounding
+    error is large compared with the curvature, the small number ``2 - 2 cos d``. The form is **unstable** in
+    short words.
 
     ``reinsch``: ``D(k) = D(k-1) - K 2^(2-s) x(k)``, ``x(k+1) = x(k) + D(k)``, from ``D(0) = x(1) - x(0)``,
-    with ``K 2^(2-s) = 4 sin^2(d/2)``. The small number has its own shift s, and the state has guard bits,
-    which cost adders but no multiplier.
+    with ``K 2^(2-s) = 4 sin^2(d/2)``. The small number has its own shift s. The state has guard bits, which
+    cost only adders.
 
     F is ``fraction_bits`` and E ``guard_bits``; with the defaults multiplier operands have 18 bits:
 
@@ -59,41 +59,29 @@ class Recurrence:
 
     The result has the format `result_format`.
 
-    With d up to 90 degrees and ``|A| <= 1 - 2^-16``, the product of two unit vectors, no word of ``reinsch``
-    wraps (|D| <= sqrt 2) in spans of any length, with 16 or more fraction bits and 20 or more guard bits.
-    With shorter words the cuts add up: with 8 and 10 bits, spans of very small steps wrap after about 1300
-    pixels.
+    The error of the result is at most `error`. In ``reinsch`` it is at most ``psi^2/2 2^-F``, psi = (m - 1)
+    d, **for any length**, plus 4.8e-7 by the cuts in 4095 pixels. In ``direct`` it is 0.05 after 64 pixels.
+    From 300 pixels on the range of the words gives the only bound, 3. docs/theory/bounds.md#recurrence
+    derives the bounds.
 
-    The error of the result is at most `error`. An error e of one step becomes ``e sin(j d)/sin d`` after j
-    more steps, at most ``j e``, so that the errors of a span of m pixels add up to at most ``(m-1)(m-2)/2``
-    times the largest one.
+    With d up to 90 degrees and ``|A| <= 1 - 2^-16`` no word of ``reinsch`` wraps, in spans of any length.
+    This needs 16 or more fraction bits and 20 or more guard bits. With shorter words the cuts add up: with 8
+    and 10 bits, spans of very small steps wrap after about 1300 pixels.
 
-    - In ``reinsch`` the error of a step is ``4 sin^2(d/2) 2^-F`` (by K a relative 2^-(F+1), by the operand
-      2^-(F+1)). These errors add up to at most ``psi^2/2 2^-F``, psi = (m - 1) d, **for any length**. The
-      cuts, 2^-(F+E) each, add up to 4.8e-7 in 4095 pixels.
-    - In ``direct`` the error of a step is 2^-F by the cut coefficient plus 2^-(F+1) by the rounding, even if
-      d is small. This adds up to 0.05 after 64 pixels; from 300 pixels on the only bound is 3, by the range
-      of the words.
+    **Interleaved**, for one pixel a cycle. The product in the loop takes several cycles, so four recurrences
+    share the loop. Phase j has the pixels j, j + 4, j + 8, ...: ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``. This is
+    the same recurrence with a step of 4d and its own start values. A phase has ``ceil(m/4)`` pixels, 4d
+    apart, and `error` bounds their error. 4d is limited to 90 degrees. In spans of up to 90 degrees this has
+    no effect. In wider spans of more than 4 pixels d must be at most 22.5 degrees.
 
-    With the peak at 0.79 of the span, the largest errors of ``direct`` (with its coefficient cut) in the four
-    published cases are 0.015, 0.40, 0.40 and 1.5e-3; those of ``reinsch`` with 20 guard bits are at most
-    5.7e-5 and, for F = 24, 2.3e-7. A rounded coefficient gives ``direct`` less than 0.1 in the second and
-    third case by chance, because ``2^F (2 - 2 cos d)``, 1.1, is close to a whole number.
+    A setup can compute the start values in two ways.
 
-    **Interleaved**, for one pixel a cycle: the product in the loop takes several cycles, so that four
-    recurrences share the loop. Phase j has the pixels j, j + 4, j + 8, ...:
-    ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``, the same recurrence with a step of 4d and its own start values. A
-    phase has ``ceil(m/4)`` pixels, 4d apart, and `error` bounds their error: the same ``psi^2/2 2^-F``, a
-    sixteenth of the drift by cuts (3.0e-8), and a sixteenth of the growth of ``direct``. 4d is limited to 90
-    degrees. In spans of up to 90 degrees this has no effect, as the coefficient is read from pixel 8 on and
-    the second values from pixel 4 on, where 4d is at most 90 degrees. In wider spans of more than 4 pixels d
-    must be at most 22.5 degrees.
-
-    A setup can compute the start values in two ways. One takes x(0), D(0) and the coefficient of d, and seven
-    steps of the recurrence with ``interleave`` 1 (`prologue`); these steps add at most `prologue_error`, of
-    which no part grows with the square of the length. The other takes 17-bit cosines and sines, such as those
-    of the highlight-cosine unit: ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times a sine, so
-    that an error e of the sine becomes ``psi e`` at the end of the span.
+    - It takes x(0), D(0) and the coefficient of d, and seven steps of the recurrence with ``interleave`` 1
+      (`prologue`). These steps add at most `prologue_error`. No part of it grows with the square of the
+      length.
+    - It takes 17-bit cosines and sines, such as those of the highlight-cosine unit.
+      ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times a sine. So an error e of the sine
+      becomes ``psi e`` at the end of the span.
 
     Parameters
     ----------
@@ -105,15 +93,15 @@ class Recurrence:
         E, 10 to 28, in ``reinsch`` only.
     interleave : int
         Number of phases: 1, as published, or 4. With 1 a span has two start values for each cosine in place
-        of eight, and there are registers for one phase only; with 4 there is a pixel a cycle.
+        of eight, and there are registers for one phase only. With 4 there is a pixel a cycle.
     result_format : Format
-        Format of the cosines; with 25 fraction bits the last rounding is negligible.
+        Format of the cosines. With 25 fraction bits the last rounding is negligible.
 
     Raises
     ------
     ValueError
-        If the form or the number of phases is unknown, a number of bits is out of range, or the result's
-        format is unsigned or has more fraction bits than the state of ``reinsch``.
+        If the form or the number of phases is unknown, or a number of bits is out of range. If the result's
+        format is unsigned, or has more fraction bits than the state of ``reinsch``.
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5; [Stoer02].
     """
@@ -200,10 +188,7 @@ class Recurrence:
     def prologue_error(self, length: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """Bound of the error that start values from `prologue` add to `error`, for spans up to 90 degrees.
 
-        For ``reinsch``. A step adds at most ``b = 4 sin^2(d/2) 2^-F + 2^-(F+E)`` to the error of the
-        difference, whose first value has a rounding error of ``e = 2^-(F+E+1)``. So the error of x(j) is
-        ``b j (j-1)/2 + (j+1) e``, and that of ``x(j+4) - x(j)``, a sum of four differences,
-        ``b (4j + 6) + 4 e``, which every step of the phase adds once more.
+        For ``reinsch``. docs/theory/bounds.md#recurrence derives it.
 
         Parameters
         ----------

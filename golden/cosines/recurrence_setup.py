@@ -27,18 +27,18 @@ class RecurrenceSetup:
     - ``x(0) = a``,
     - ``x(1) - x(0) = rho (b - a + a q) - a K/2``, ``rho = sin d/sin psi``, ``K = 4 sin^2(d/2)``.
 
-    This needs neither lambda nor A, neither an arctangent nor a root. rho and K are even in psi and therefore
-    smooth in q. Equal normals are no special case: ``rho = 1/(m-1)`` and ``K = 0``, so that
-    every x is exactly a. All but 16 products are the same for every H:
+    This needs no lambda, no A, no arctangent and no root. rho and K are even in psi and therefore smooth in
+    q. Equal normals are no special case: ``rho = 1/(m-1)`` and ``K = 0``, so every x is exactly a. All but 16
+    products are the same for every H:
 
     - ``psi^2 = 2 q p(q)``, ``d^2 = Q = psi^2/(m-1)^2``, ``K = Q k(Q)`` and, for the coefficient of four
       pixels, ``16 Q k(16 Q)``;
     - ``rho = (1 + c)/(m-1)``, ``1 + c = i(q) (1 - s(Q))`` with ``i = psi/sin psi``, ``s = 1 - sin d/d``.
 
     The differences of the four functions from 1 are tables with linear interpolation. q, psi^2, Q and K each
-    have a floating scale (a word in [1/2, 1) and a shift), so that a small angle keeps its relative
-    precision. Seven steps of the recurrence, one product each, lead from ``x(0)`` and ``x(1) - x(0)`` to the
-    start values of the four phases (`Recurrence.prologue`).
+    have a floating scale, a word in [1/2, 1) and a shift. So a small angle keeps its relative precision.
+    Seven steps of the recurrence, one product each, lead from ``x(0)`` and ``x(1) - x(0)`` to the start
+    values of the four phases (`Recurrence.prologue`).
 
     =============== ============ =================================================================
     word            format       why
@@ -68,20 +68,16 @@ class RecurrenceSetup:
     bound   0.06  0.6   6.6   50    171
     ======= ===== ===== ===== ===== =====
 
-    Up to 90 degrees ``|b - a + a q| = |A sin lambda sin psi|`` is at most 1, and a first difference at most
-    sqrt 2, so that no word that is used wraps: only x(j+4) - x(j) may wrap, if the two pixels are over 90
-    degrees apart and the second one is after the end of the span. Spans over 90 degrees are flagged (from
-    ``q = 1 + 2^-13`` on; the rounding of the normals and of q changes q by at most 6.4e-5); their words are
-    invalid. A span of one pixel is computed with ``m - 1 = 1``, but these words are not read. The coefficient
-    is that of a step 4d up to 90 degrees. In spans of up to 4 pixels 4d may be larger; the coefficient is
-    then arbitrary, and it is not read.
+    Up to 90 degrees no used word wraps (docs/theory/bounds.md#recurrence-setup). Spans over 90 degrees are
+    flagged, from ``q = 1 + 2^-13`` on. Their words are invalid. A span of one pixel is computed with
+    ``m - 1 = 1``, and nothing reads its words. The coefficient is that of a step 4d up to 90 degrees.
 
     Parameters
     ----------
     recurrence : Recurrence
         Recurrence that takes the start values: interleaved, 16 fraction bits. The start values of ``direct``
-        are computed from those of ``reinsch``: ``x(j+4)`` is rounded half up, ``-2 cos 4d = K 2^(2-s) - 2``
-        is rounded up.
+        are computed from those of ``reinsch``. ``x(j+4)`` is rounded half up, and
+        ``-2 cos 4d = K 2^(2-s) - 2`` is rounded up.
 
     Raises
     ------
@@ -122,24 +118,9 @@ class RecurrenceSetup:
     def error(self, length: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """Bound of the error of every pixel by setup and recurrence together, for unit vectors.
 
-        The error is that against the curve above for the same codes, for ``reinsch``. With ``e = 2^-18``,
-        half a step of the 17-bit words, and ``t = TABLE_ERROR``, the error of the tables before they are
-        rounded:
-
-        - The relative error of K is ``(2 + 1 + 2 + 2 + 2) e + t`` by Q (words of q, p, psi^2, square and Q,
-          each 1/2 or more except p), plus ``(e + t)/0.81`` by k, plus ``e/0.40`` by its own rounding. Each
-          step of the recurrence has this relative error, and every following step adds it again: the sum is
-          ``psi^2/2`` times the error.
-        - The relative error of rho is 2 e by 1/(m-1), plus ``2.6 (e + t)`` by i and s, plus 3 e by c and its
-          own rounding, plus ``d^2/4`` times the relative error of Q, on which sin d/d depends. It is
-          multiplied by psi.
-        - The error of ``b - a + a q`` is ``4 e q`` by the words of q and a, plus a few cuts. It is multiplied
-          by ``psi/sin psi``.
-        - From q = 1/2 on `Chord` cuts half a step of each difference. The error of q is then at most 2.7e-5,
-          and that of the curve 0.65 times as much (``tan(psi/2)/(2 sin psi)`` in its middle, plus the odd
-          part).
-
-        `Recurrence.error` and `Recurrence.prologue_error` are added.
+        The error is measured against the curve above for the same codes, for ``reinsch``.
+        docs/theory/bounds.md#recurrence-setup derives it. `Recurrence.error` and `Recurrence.prologue_error`
+        are parts of it.
 
         Parameters
         ----------
@@ -238,7 +219,7 @@ class RecurrenceSetup:
         shift : int array, shape (spans,)
             Shift of the coefficient.
         out_of_range : bool array, shape (spans,)
-            Whether the span is over 90 degrees; its words are then invalid.
+            Whether the span is over 90 degrees. Its words are then invalid.
 
         Raises
         ------

@@ -11,7 +11,7 @@ __all__ = ["Factor"]
 class Factor:
     """``a S``: specular term S times the factor a of distance and spot, cut to 17 fraction bits.
 
-    The diffuse term needs no product here: N·L of a light that fades is multiplied by a before.
+    The diffuse term needs no product here: N·L of a light that fades already contains a.
 
     ====== ========= =============================================
     word   format    why
@@ -21,7 +21,7 @@ class Factor:
     a S    UQ(0, 17) cut: at most S and at most a
     ====== ========= =============================================
 
-    The result is at most the exact product, and less by under 2^-17, 0.002 LSB of a full channel.
+    The result is at most the exact product. It is less by under 2^-17, 0.002 LSB of a full channel.
 
     Source: docs/theory/chord.md#local-lights.
     """

@@ -1,4 +1,4 @@
-"""Base of the models of gates: which spans can hold a visible highlight."""
+"""Base of the models of gates, which decide whether a span can hold a visible highlight."""
 
 from functools import cached_property
 
@@ -14,7 +14,7 @@ __all__ = ["Gate"]
 class Gate:
     """Decides which spans may have a highlight, by a threshold for each exponent or table.
 
-    A subclass has a field ``specular``, the model of the unit that is gated.
+    A subclass has a field ``specular``, the model of the gated unit.
     """
 
     specular: HighlightOperand

@@ -1,4 +1,4 @@
-"""Bit-accurate model of the highlight gate: which spans can hold a visible highlight."""
+"""Bit-accurate model of the highlight gate, which stops spans without a visible highlight."""
 
 from dataclasses import dataclass, field
 
@@ -17,7 +17,7 @@ __all__ = ["GateLimits", "HighlightGate"]
 
 @dataclass(frozen=True)
 class GateLimits:
-    """What a highlight gate relies on, of a method: bounds for its spans up to an angle.
+    """Bounds of a method, for its spans up to an angle. A highlight gate relies on them.
 
     With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of `ONE_SQUARED`,
     no pixel has an N·H over ``c + excess``, or a 1 - N·H under ``shortest (1 - c) - excess``.
@@ -27,7 +27,7 @@ class GateLimits:
     excess : float
         Bound of the excess of N·H over that of the great circle.
     shortest : float
-        Least length of a normal on the method's curve; 1 without chords to H.
+        Least length of a normal on the method's curve. It is 1 without chords to H.
     angle : float
         Largest angle of a span, in degrees, for which both hold, up to 45.
     """
@@ -41,11 +41,11 @@ class GateLimits:
 class HighlightGate(Gate):
     """Whether a span may be lit, from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
 
-    Along the great circle from ``N_l`` to ``N_r``, psi apart, the largest ``N . H`` is inside the arc if
-    ``b > a cos psi`` and ``a > b cos psi``, else at an end. Inside it is
+    The largest ``N . H`` along the great circle from ``N_l`` to ``N_r``, psi apart, is inside the arc if
+    ``b > a cos psi`` and ``a > b cos psi``. Else it is at an end. Inside it is
     ``M = sqrt(a^2 + b^2 - 2 a b cos psi) / sin psi``. With ``cos psi = 1 - u`` and d = a - b this is
-    ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``, in which nothing cancels for psi tending to 0, and the condition
-    is ``max(a, b) u > |d|``. A span is lit if
+    ``M^2 = (d^2 + 2 a b u) / (u (2 - u))``. Nothing cancels there as psi tends to 0. The condition is
+    ``max(a, b) u > |d|``. A span is lit if
 
     - it is wider than 45 degrees or than `GateLimits.angle`, or
     - ``max(a, b)^2 >= T``, or
@@ -64,58 +64,26 @@ class HighlightGate(Gate):
     products F + F bits    exact, like the comparisons
     ======== ============= ===============================================================================
 
-    F is 17; smaller words serve to check the decision exhaustively.
+    F is 17. Smaller words serve to check the decision exhaustively.
 
     **No pixel of a span that is not lit has a specular term other than 0**, for unit normals and H from
-    `quantise`. Such a term changes no channel: the picture is the same to the bit.
+    `quantise`. A term of 0 changes no channel, so the picture is the same to the bit.
+    docs/theory/bounds.md#gate-of-unit-normals proves it, with `GateLimits.excess` rounded up to whole steps
+    (`margin`).
 
-    1. *The curve.* Let omega be the square of the code of length 1, and ``cos psi = N_l.N_r / omega``, of the
-       codes. The exact curve is ``N(t) = alpha N_l + beta N_r`` with ``alpha = (1-t)(1 + k t)``,
-       ``beta = t (1 + k (1-t))``, ``k = 4h - 2``, ``h = 1/sqrt(2 (1 + cos psi)) >= 1/2``; both are at least 0
-       for t in [0, 1]. Hence ``N(t).H <= alpha a' + beta b'`` for all ``a' >= a``, ``b' >= b``. (Where
-       rounding makes ``cos psi > 1``, the unit takes k = 0, and the sum is at most max(a', b').) A straight
-       line has k = 0; points of the great circle, and straight lines between them, have factors like these.
-    2. *It stays inside the unit circle.* For unit vectors e_l, e_r psi apart, ``alpha e_l + beta e_r`` is the
-       same curve; its components parallel and perpendicular to the bisector are ``1 - s^2 (1 - c)`` and
-       ``s sin(psi/2)``, s = 2t - 1, ``c = cos(psi/2)``. Its squared length is
-       ``1 - (1-c)^2 s^2 (1 - s^2) <= 1`` and its direction turns from e_l to e_r. With the vector p of their
-       plane for which ``p.e_l = a'``, ``p.e_r = b'``:
-       ``alpha a' + beta b' = p.(alpha e_l + beta e_r) <= max(0, m)``, m the maximum of p·e over the arc.
-       This holds whatever the lengths of the codes.
-    3. *The arc.* At a share x of the arc, ``p.e = (a' sin((1-x) psi) + b' sin(x psi)) / sin psi``. If a' and
-       b' are not negative, this is at least 0 and grows with a', with b', and with psi, as
-       ``sin(x psi)/sin psi`` does on (0, pi). So m computed from the words is at least m of the exact values
-       if every word is at least its exact value.
-       This holds for a and b: a cut takes off less than the step that is added; if a word saturates, its
-       square is over every T. It holds for u: the cut takes off less than one step, ``u/omega`` exceeds u by
-       under 1.2 steps, and three steps are added. The maximum of p·e over the whole circle is ``|p| = M``; it
-       is on the arc where ``max(a', b') u > |d|``.
-    4. *The comparison.* T and w are cut, everything else is exact, so a span that is not lit has ``m^2 < T``,
-       also if m is at an end. T is at most ``tau^2``, so ``m < tau`` and ``N(t).H < tau`` on the exact curve.
-    5. *The pipeline.* Each method states a bound by which its pixels may exceed m
-       (`GateLimits.excess`, from the errors of its units; 4.4 steps of 2^-17 for quadratic
-       normals): no N·H is over ``m + excess``, no 1 - N·H is under ``shortest (1 - m) - excess``. Let x be
-       the largest argument for which the specular unit may give a term over 0, in steps of 2^-25; it follows
-       from the PROM in integers (`HighlightOperand.last_lit_arguments`). tau is chosen so that
-       ``shortest (1 - tau) - excess`` is one step more than x, with the excess rounded up to whole steps
-       (`margin`). The argument falls as N·H rises, and beyond x the term is 0. ∎
+    The margins cost little: for quadratic normals a span is let through only if
+    ``M^2 >= tau^2 - 10 * 2^-17``. Ends must be unit vectors from `quantise`;
+    docs/theory/bounds.md#gate-of-unit-normals tells about others.
 
-    The margins cost little: for quadratic normals, a span is let through only if
-    ``M^2 >= tau^2 - 10 * 2^-17``.
-
-    Ends must be unit vectors from `quantise`. A search over all models found no lost highlight with N·H of
-    linear or quadratic normals whose ends were up to 1/128 too long or too short; other methods lose some if
-    ends are 8 to 128 steps of 2^-17 too short or too long.
-
-    T is 0, so that every span is lit, for exponents with terms over 0 down to N·H = tau <= 0: for 1, and for
-    2 and 3 with models of wide highlights.
+    For exponents with terms over 0 down to N·H = tau <= 0, T is 0 and every span is lit. These are 1, and
+    with models of wide highlights 2 and 3.
 
     Parameters
     ----------
     limits : GateLimits
         Bounds of the method that computes the operands of the pixels.
     specular : Specular or Power
-        Model of the unit that is gated.
+        Model of the gated unit.
     fraction_bits : int
         F, 5 to 17.
 
@@ -178,7 +146,7 @@ class HighlightGate(Gate):
         return self.level_format
 
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
-        """T from the largest arguments with a term over 0, in steps of 2^-25; see `LobeTable`, too."""
+        """T from the largest arguments with a term over 0, in steps of 2^-25; see also `LobeTable`."""
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25
         level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.limits.shortest
         # In steps of 2^-34; one less, as the quotient is not exact.
@@ -188,7 +156,7 @@ class HighlightGate(Gate):
         return Fixed(self.level_format, codes)
 
     def decide(self, a: Fixed, b: Fixed, u: Fixed, threshold: Fixed) -> np.ndarray:
-        """Whether the maximum over the arc may reach the threshold: the comparisons alone.
+        """Whether the maximum over the arc may reach the threshold, by the comparisons alone.
 
         Parameters
         ----------

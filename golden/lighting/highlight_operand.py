@@ -20,9 +20,11 @@ MAX_EXPONENT = 1000
 class HighlightOperand:
     """Base of the models of specular units: format of the operand, range of the exponent.
 
-    A subclass has an attribute ``operand``. ``"cosine"``: the unit takes ``N . H`` of two unit vectors in
-    ``SQ(4, 34)`` and subtracts it from `ONE_SQUARED`. ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in
-    ``UQ(1, 25)``.
+    A subclass has an attribute ``operand``.
+
+    - ``"cosine"``: the unit takes ``N . H`` of two unit vectors in ``SQ(4, 34)`` and subtracts it from
+      `ONE_SQUARED`.
+    - ``"one_minus_cosine"``: it takes ``1 - cos gamma`` in ``UQ(1, 25)``.
     """
 
     OPERANDS: ClassVar[tuple[str, ...]] = ("cosine", "one_minus_cosine")
@@ -68,7 +70,7 @@ class HighlightOperand:
         operand : str
             Kind of the operand.
         scale : int
-            Scale of the operand, see `Lobe`; a unit without a table does not read it.
+            Scale of the operand, see `Lobe`. A unit without a table ignores it.
 
         Raises
         ------
@@ -80,7 +82,7 @@ class HighlightOperand:
         return replace(self, operand=operand)  # type: ignore[call-arg]  # a field of each unit
 
     def check(self, table: Any) -> None:
-        """Refuse a table that the unit cannot read; a unit without a table reads none.
+        """Refuse a table that the unit cannot read. A unit without a table refuses none.
 
         Raises
         ------
@@ -134,6 +136,6 @@ class HighlightOperand:
     def last_lit_arguments(self) -> np.ndarray:
         """Largest ``1 - cos gamma``, in steps of 2^-25, that may give a term over 0, for each exponent.
 
-        int64 array, shape (1024,); 2^27 where every argument may.
+        int64 array, shape (1024,). It is 2^27 where every argument may.
         """
         raise NotImplementedError

@@ -19,19 +19,19 @@ MAX_LIGHTS = 16
 class Intensity:
     """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, saturated to 255.
 
-    The products ``k I`` are inputs, *colour operands* in LSB of the 8-bit channel: ``UQ(11, 6)``, 17 bits for
-    the multipliers, so a term may reach 2047.98 LSB, eight times the full channel. The sum is exact. The
-    only roundings are those of the operands, 2^-7 LSB each times a term of at most 1, and that of the result,
-    1/2 LSB.
+    The products ``k I`` are inputs, *colour operands* in LSB of the 8-bit channel. Their format is
+    ``UQ(11, 6)``, 17 bits for the multipliers. So a term may reach 2047.98 LSB, eight times the full channel.
+    The sum is exact. Only the operands and the result are rounded: by 2^-7 LSB each times a term of at most
+    1, and by 1/2 LSB.
 
     Parameters
     ----------
     lights : int
         Number of lights, 0 to 16.
     has_specular : bool
-        Whether there are specular terms; without, the inputs for them must be 0.
+        Whether there are specular terms. If not, their inputs must be 0.
     channels : int
-        3, or 1: the colour operands of red are used for every channel.
+        3 or 1. With 1 every channel takes the colour operands of red.
 
     Raises
     ------

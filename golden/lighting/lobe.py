@@ -18,17 +18,17 @@ __all__ = ["Lobe", "LobeTable"]
 
 @dataclass(frozen=True)
 class Lobe(HighlightOperand):
-    """Any lobe of ``u = 1 - N·H`` from a table, linear between entries, which are denser where u is small.
+    """Any lobe of ``u = 1 - N·H`` from a table, linear between entries that are denser where u is small.
 
     *Address.* The range [0, 1) of u is divided into E octaves, ``[2^-j, 2^(1-j))`` with j = 1 to E, and the
     rest, ``[0, 2^-E)``. These are the E + 1 *rows* of the table: row 0 is the rest, row E the octave from
     1/2. A row has M equal steps. So the distance of two entries is between 1/(2M) and 1/M of u in every
-    octave, and ``2^-E / M`` in row 0. The row follows from the position of u's leading one, the step from the
-    m = log2(M) bits after it, and f, the position of u within the step, 0 to 1, from the bits after those.
+    octave, and ``2^-E / M`` in row 0. u's leading one gives the row, and the next m = log2(M) bits give the
+    step. The bits after them give f, the position of u within the step, 0 to 1.
 
-    *Entries.* There are (E + 1) M entries, and one for the end, u = 1. A word of the memory holds an entry v
-    and its difference D to the next entry, of either sign: 35 bits. A block RAM of 512 by 36 holds 512 words.
-    The term is ``v + D f``, with one product.
+    *Entries.* There are (E + 1) M entries, and an entry for the end, u = 1. A word of the memory holds an
+    entry v and its difference D to the next entry, of either sign: 35 bits. A block RAM of 512 by 36 holds
+    512 words. The term is ``v + D f``, with one product.
 
     ============= =========== =====================================================================
     word          format      why
@@ -44,21 +44,13 @@ class Lobe(HighlightOperand):
     *Range.* The term is 0 where N·H is not positive, ``u >= 1``, and for a dark beat. A negative u, which
     vectors longer than 1 give, counts as 0.
 
-    *Monotone.* Within a word the terms fall with f if D is negative, and rise if it is positive, as a cut
-    keeps the order. As f < 1, ``D f`` is between 0 and D, and so is ``D f`` after its cut. So no term of a
-    word passes the next entry: over the whole range the term falls where the entries fall. `table` makes
-    falling entries from every falling curve.
+    *Monotone.* Over the whole range the term falls where the entries fall. `table` makes falling entries from
+    every falling curve.
 
-    *Arithmetic error*, against straight lines between entries that are not rounded: at most 2^-17 from the
-    entries (2^-18 by rounding, 2^-17 for an entry of 1), ``|D| 2^-17`` from the cut of f, 2^-17 from the cut
-    of the product; together at most `ERROR`, 0.006 LSB of an 8-bit channel at intensity 1.
+    *Arithmetic error*, against straight lines between entries that are not rounded: at most `ERROR`, 0.006
+    LSB of an 8-bit channel at intensity 1.
 
-    *Error of the lines.* The error of a line over a step h is at most ``h^2/8 max |S''|``, where S is the
-    curve. In an octave that begins at b, ``h = b/M``: if ``b^2 |S''| <= C``, the error is at most
-    ``C / (8 M^2)``. C is 4/e^2 = 0.54 for Blinn's power with a large exponent, 0.5 for the exponent 2, and
-    3/8 for ``ggx``. Entries are moved to the other side of the curve, which halves the error (`table`). In
-    row 0 ``h = 2^-E/M`` must be small compared with the lobe's width: ``ggx`` has ``|S''| <= 24/alpha^4``,
-    which with M = 16 gives an error of 0.035 LSB if ``2^-E <= 0.15 alpha^2``. Measured in LSB, with rounding:
+    *Error of the lines.* docs/theory/bounds.md#lobe-tables derives it. Measured in LSB, with rounding:
 
     == == ===== ======================== ======================== =======================================
     E  M  words ``blinn``, n =           ``beckmann``, alpha =    ``ggx``, alpha =
@@ -69,31 +61,28 @@ class Lobe(HighlightOperand):
     20 16 336   0.00 0.05 0.03 0.03 0.03 0.03 0.03 0.04 0.06 0.55 0.03 0.02 0.02 0.02 0.02 0.02 0.02
     == == ===== ======================== ======================== =======================================
 
-    The largest error found of the default table is 0.05 LSB at exponents from 1 to 1000 and for ``ggx`` from
-    alpha = 0.0025 (roughness 0.05) on, without the error of u. Beckmann's distribution with a large
-    alpha falls to 0 just before u = 1, where steps are long: 0.55 LSB at alpha = 1.
+    Without the error of u, the largest error found of the default table is 0.05 LSB. This holds at exponents
+    from 1 to 1000 and for ``ggx`` from alpha = 0.0025 (roughness 0.05) on. Beckmann's distribution with a
+    large alpha falls to 0 just before u = 1, where steps are long: 0.55 LSB at alpha = 1.
 
-    *Error of u.* It is multiplied by the slope of the lobe and added: the slope is n for Blinn's power,
-    ``4/alpha^2`` for ``ggx``. A step of 2^-25 is 0.008 LSB for n = 1000, and for ``ggx`` 0.3 LSB at
-    alpha = 0.01 and 4.9 LSB at 0.0025: such lobes need B = 30 or `scale` 6. With the operand ``cosine``, u is
-    in units of `ONE_SQUARED`, and so too small by ``2^-16 u``: under 0.002 LSB for either lobe. The cut to B
-    bits adds another step. A cosine also depends on the length of the normal: a length error of 2^-18 changes
-    u by as much, which is 1 LSB for n = 1000. The chord form (operand ``one_minus_cosine``) depends on that
-    length at second order only.
+    *Error of u.* The slope of the lobe multiplies it: n for Blinn's power, ``4/alpha^2`` for ``ggx``. A step
+    of 2^-25 is 0.008 LSB for n = 1000. For ``ggx`` it is 0.3 LSB at alpha = 0.01 and 4.9 LSB at 0.0025: such
+    lobes need B = 30 or `scale` 6. With the operand ``cosine`` a length error of 2^-18 of the normal is 1 LSB
+    for n = 1000. The chord form (operand ``one_minus_cosine``) depends on this length at second order only.
 
-    *Gate.* A highlight gate leaves out terms that are 0, so that the picture is the same to the bit with and
+    *Gate.* A highlight gate leaves out only terms that are 0. So the picture is the same to the bit with and
     without a gate. The largest argument with a term over 0 follows from the table
     (`LobeTable.last_lit_argument`). A lobe with a long tail may have terms over 0 up to u = 1: ``ggx`` from
-    alpha = 0.044 on. Its gate leaves out only spans that face away from H. For a gate that leaves out more,
-    `table` ends the lobe early: entries under a ``cutoff`` are 0. The picture then differs from the model's,
-    with and without a gate alike, by at most the cutoff times the intensity I; with ``cutoff = 1/(510 I)`` by
-    half an LSB. A gate that leaves out terms over 0 would not be exact, even if they are under half an LSB:
-    they may change the rounding of a sum.
+    alpha = 0.044 on. Its gate leaves out only spans that face away from H. With a ``cutoff`` a gate leaves
+    out more: `table` sets entries under the cutoff to 0. The picture then differs from the model's, with and
+    without a gate alike. The difference is at most the cutoff times the intensity I, with
+    ``cutoff = 1/(510 I)`` half an LSB. A gate must keep terms over 0, even under half an LSB, because they
+    may change the rounding of a sum.
 
-    *Loading.* A write of 18 bits loads an entry; entries come in order, and the unit computes the differences
-    (`LobeTable.writes`). A table takes (E + 1) M + 2 writes, 338 by default; words of 35 bits would take
-    twice as many. Several *banks* hold a table each for several materials: a change of the material takes no
-    write. The word at address ``(bank (E + 1) + row) M + step`` belongs to a bank.
+    *Loading.* A write of 18 bits loads an entry. Entries come in order, and the unit computes the differences
+    (`LobeTable.writes`). A table takes (E + 1) M + 2 writes, 338 by default. Words of 35 bits would take
+    twice as many. Several *banks* hold a table each for several materials, so a change of the material takes
+    no write. The word at address ``(bank (E + 1) + row) M + step`` belongs to a bank.
 
     Parameters
     ----------
@@ -112,10 +101,10 @@ class Lobe(HighlightOperand):
     cutoff : float
         Entries of a table under this value are 0; at least 0, under 1.
     scale : int
-        s: the operand is ``min(2^s u, 1)``, of ``chord-local``, for lobes that are 0 from ``u = 2^-s`` on.
+        s. The operand of ``chord-local`` is ``min(2^s u, 1)``, for lobes that are 0 from ``u = 2^-s`` on.
     fixed : tuple of float or None
         Parameters of the tables that are fixed at build time, one for each bank (``None`` for a model without
-        a parameter). ``None``: tables are loaded by writes.
+        a parameter). ``None`` in place of the tuple: writes load the tables.
 
     Raises
     ------
@@ -239,7 +228,9 @@ class Lobe(HighlightOperand):
 
     @property
     def cosines(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cosines at entries and the end, short of the right angle, where the curve is 0; and in middles."""
+        """Cosines at the entries and at the end, short of the right angle, where the curve is 0; and in the
+        middles.
+        """
         knots = np.ldexp(np.minimum(self.knots, 1 - 2.0**-40), -self.scale)
         return 1 - knots, 1 - (knots[1:] + knots[:-1]) / 2
 
@@ -250,9 +241,9 @@ class Lobe(HighlightOperand):
     def table(self, parameter: float | None = None) -> "LobeTable":
         """Table of the model for one parameter.
 
-        An entry is the value of the curve, moved against the error of the two lines that meet there, as
-        measured in the middle of each: by half of the larger error, but at most twice the smaller one. If one
-        line is too high and the other too low, the entry is not moved.
+        Two lines meet at an entry. An entry is the value of the curve, moved against the error of these
+        lines, measured in the middle of each. It is moved by half of the larger error, but at most twice the
+        smaller error. If one line is too high and the other too low, the entry stays.
 
         Parameters
         ----------
@@ -262,7 +253,7 @@ class Lobe(HighlightOperand):
         Raises
         ------
         ValueError
-            If the model has a parameter and none is given, or it is out of the model's range.
+            If the parameter of the model is missing or out of range.
         """
         if parameter is None and self.model.PARAMETER is not None:
             raise ValueError(f"a table of {self.name} needs its {self.model.PARAMETER}")
@@ -282,8 +273,8 @@ class Lobe(HighlightOperand):
     def scale_of(self, parameters: Sequence[float | None]) -> int:
         """Largest scale, up to `MOST_SCALE`, that serves all lobes; 0 if no lobe needs one.
 
-        A lobe needs a scale if its slope is over `SHARP`, so that a step of 2^-25 of u is over 0.1 LSB. Scale
-        s serves a lobe that is under a quarter of the least entry from ``u = 2^-s`` on.
+        A lobe needs a scale if its slope is over `SHARP`. A step of 2^-25 of u is then over 0.1 LSB. Scale s
+        serves a lobe that is under a quarter of the least entry from ``u = 2^-s`` on.
 
         Parameters
         ----------
@@ -328,7 +319,7 @@ class Lobe(HighlightOperand):
         Raises
         ------
         ValueError
-            If the model has no exponent: its gate gets the threshold of a table.
+            If the model has no exponent. Its gate gets the threshold of a table.
         """
         if self.model.PARAMETER != "exponent":
             raise ValueError(f"{self.name} has no exponent, by which a gate could look up its threshold")

@@ -16,10 +16,10 @@ __all__ = ["Power"]
 class Power(HighlightOperand):
     """``max(cos gamma, 0)^n`` for n of 10 bits, by squares and products over the bits of n.
 
-    The unit computes with complements, ``x = 1 - c``: near the peak c^n multiplies a relative error of c by
-    n, and x keeps its digits there. Square and product are one operation, ``1 - (1-p)(1-q) = p + q - p q``:
-    for every bit of n from the lowest, ``s <- s + x - s x`` if it is set, then ``x <- 2 x - x^2``. The term
-    is ``1 - s``.
+    The unit computes with complements, ``x = 1 - c``. Near the peak c^n multiplies a relative error of c by
+    n, and x keeps its digits there. Square and product are one operation, ``1 - (1-p)(1-q) = p + q - p q``.
+    For every bit of n, from the lowest, ``s <- s + x - s x`` if the bit is set, then ``x <- 2 x - x^2``. The
+    term is ``1 - s``.
 
     ======= ========= ====================================================================
     word    format    why
@@ -29,13 +29,10 @@ class Power(HighlightOperand):
     result  UQ(0, 17) operand of the colour multipliers; cut
     ======= ========= ====================================================================
 
-    The arithmetic error of the result for an exact argument is at most `ERROR`. The error of a product of cut
-    factors is less than ``2^-17 (p + q)``; in the result it is multiplied by the derivative of the operations
-    that follow. With the final cut, the sum of the errors is largest at n = 513: ``5.96 * 2^-17``. It only
-    makes the result smaller. As it depends on the factors' low bits, the term may rise where the cosine
-    falls, by 5 steps of 2^-17 at most, 0.01 LSB at intensity 1. With the operand ``cosine`` and n = 1 the
-    term is one step, not 0, up to 2^-17 past the right angle, as 1 is 2^-16 more than the square of a code's
-    length.
+    The arithmetic error of the result for an exact argument is at most `ERROR`, and only makes the result
+    smaller (docs/theory/bounds.md#power). The term may rise where the cosine falls, by 5 steps of 2^-17 at
+    most, 0.01 LSB at intensity 1. With the operand ``cosine``, 1 is 2^-16 more than the square of a code's
+    length. So with n = 1 the term is one step in place of 0, up to 2^-17 past the right angle.
 
     Parameters
     ----------
@@ -60,12 +57,12 @@ class Power(HighlightOperand):
 
     @property
     def name(self) -> str:
-        """Name of the unit; that of the reflection model is the name of its unit with a table."""
+        """Name of the unit. The name of the reflection model stands for its unit with a table."""
         return f"{self.model.name}_product"
 
     @property
     def last_lit_arguments(self) -> np.ndarray:
-        """Argument of ``c^n = 2^-17``, as the result is never too large; one step more for float64."""
+        """Argument of ``c^n = 2^-17``, as the result is never too large, and one step more for float64."""
         exponent = np.arange(1 << self.EXPONENT_BITS)
         argument = -np.expm1(-17 * np.log(2) / np.maximum(exponent, 1)) / self.ARGUMENT_FORMAT.step
         return np.where(exponent > 0, np.ceil(argument).astype(np.int64) + 1, 1 << 27)

@@ -18,25 +18,28 @@ class QuotientLobe(Lobe):
     """Any lobe of N·H or R·V from a table that `Quotient` addresses, linear between entries.
 
     The integer of a place is the address of a word, its fraction the position within the step. The table of a
-    lobe of N·H has a part for ``s = sin^2 gamma`` and one for ``1 - s``, that of a lobe of R·V one part, for
-    ``s = sin^2 (psi/2)``. A part has `OCTAVES` octaves of `STEPS` steps and a row for all that is less. A
-    place past the end gives 0. Words, entries, writes and banks are those of `Lobe`.
+    lobe of N·H has a part for ``s = sin^2 gamma`` and a part for ``1 - s``. The table of a lobe of R·V has
+    one part, for ``s = sin^2 (psi/2)``. A part has `OCTAVES` octaves of `STEPS` steps and a row for all
+    smaller numbers. A place past the end gives 0. Words, entries, writes and banks are those of `Lobe`.
 
-    *Error of the lines*, with rounding, where a place may be (s or 1 - s up to 1/2): within 0.06 LSB for
-    ``blinn`` and ``phong`` at exponents 1 to 1000, within 0.04 LSB for ``ggx`` from roughness 0.1 on (5.3 at
-    0.05), within 0.1 LSB for ``beckmann``, and within 0.12 LSB for ``cosquad``.
+    *Error of the lines*, with rounding, at the possible places (s or 1 - s up to 1/2), in LSB:
+
+    - ``blinn`` and ``phong``: within 0.06 at exponents 1 to 1000;
+    - ``ggx``: within 0.04 from roughness 0.1 on (5.3 at 0.05);
+    - ``beckmann``: within 0.1;
+    - ``cosquad``: within 0.12.
 
     Parameters
     ----------
     model, banks, cutoff, fixed
-        As for `Lobe`; the model may be one of R·V.
+        As for `Lobe`. The model may be of R·V, too.
     operand : str
         ``"place"``.
 
     Raises
     ------
     ValueError
-        As for `Lobe`; and, by `table`, if a lobe of N·H lives on beyond a right angle.
+        As for `Lobe`. `table` also refuses a lobe of N·H that goes on beyond a right angle.
 
     Source: docs/theory/quotient.md#pixel.
     """
@@ -54,7 +57,7 @@ class QuotientLobe(Lobe):
         Raises
         ------
         ValueError
-            If the model is one of R·V, which has no other operand.
+            If the model is of R·V, which has no other operand.
         """
         if operand == self.operand:
             return self
@@ -94,7 +97,8 @@ class QuotientLobe(Lobe):
 
     @property
     def cosines(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cosines at the entries and the end, and in the middles; the end of a part is the next one's begin.
+        """Cosines at the entries and the end, and in the middles. The end of a part is the start of the next
+        part.
 
         ``sqrt(1 - s)`` and ``sqrt(1 - (1 - s))``; ``1 - 2 s`` for a lobe of R·V.
         """
@@ -119,7 +123,7 @@ class QuotientLobe(Lobe):
         Raises
         ------
         ValueError
-            As for `Lobe`; or if the curve of N·H is over half an LSB beyond the right angle, where this
+            As for `Lobe`. Also if the curve of N·H is over half an LSB beyond the right angle, where this
             method has no highlight.
         """
         if not self.model.MIRROR and (parameter is not None or self.model.PARAMETER is None):

@@ -73,19 +73,19 @@ class Specular(HighlightOperand):
     """``max(1 - k (1 - cos gamma), 0)^p`` with ``k = a n + b`` and p = 2, 4 or 8, by model and exponent n.
 
     ``cosquad_q`` reads k from a table of 1024 words; models of [Lyon93] square once, twice or three times.
-    ``exp`` is ``exp(-n (1 - cos gamma)) = 2^(-16 p)`` with ``p = k (1 - cos gamma)``, ``k = n log2(e)/16``:
-    the whole part of 16 p is a shift, its fraction addresses a table of 64 values of ``2^-f`` between
-    which 11 bits interpolate.
+    ``exp`` is ``exp(-n (1 - cos gamma)) = 2^(-16 p)`` with ``p = k (1 - cos gamma)``, ``k = n log2(e)/16``.
+    The whole part of 16 p is a shift. Its fraction addresses a table of 64 values of ``2^-f``, and 11 bits
+    interpolate between them.
 
     ``coscos2`` and ``coscos4`` are ``cos^k(a gamma)``, powers of a base ``cos(a gamma) = cos(pi/2 sqrt w)``
     with ``w = (2 a gamma / pi)^2``. They need no root and no arccos, because gamma^2 is smooth in cos gamma,
-    and the cosine of a root is smooth in w. ``gamma^2 = 2 x (1 + e)`` with ``x = 1 - cos gamma``; e, which is
-    0 at the peak, comes from a table of 128 chords over x in [0, 2). So ``w = p + p e`` with ``p = k x``,
-    ``k = 8 a^2 / pi^2``. By Taylor's rule k is ``4 n / pi^2`` or ``2 n / pi^2``; by equal integrals it comes
-    from a table of 1024 words. The base comes from 64 chords over w in [0, 1); from w = 1 on the term is 0.
+    and the cosine of a root is smooth in w. ``gamma^2 = 2 x (1 + e)`` with ``x = 1 - cos gamma``. e is 0 at
+    the peak, and comes from a table of 128 chords over x in [0, 2). So ``w = p + p e`` with ``p = k x``,
+    ``k = 8 a^2 / pi^2``. By Taylor's rule k is ``4 n / pi^2`` or ``2 n / pi^2``. By equal integrals k comes
+    from a table of 1024 words. The base comes from 64 chords over w in [0, 1). From w = 1 on the term is 0.
 
-    The slope is normalised to ``k = K 2^s`` with K in [1/2, 1), and ``1 - cos gamma`` shifted by s before
-    the multiplier, so that both its operands keep their 17 bits at every exponent.
+    The slope is normalised to ``k = K 2^s`` with K in [1/2, 1), and ``1 - cos gamma`` is shifted by s before
+    the multiplier. So both operands keep their 17 bits at every exponent.
 
     ============= ========== ===================================================================
     word          format     why
@@ -105,26 +105,16 @@ class Specular(HighlightOperand):
 
     The PROM holds for each exponent the largest shifted argument whose base reaches the cutoff. The cutoff is
     the base with a term of 2^-14: `CUTOFF` if the base is squared once, another base for other models. A lit
-    base has ``p < 1`` and ``w < 1``, so that nothing wraps. The comparison is made before the square, never
-    on it, so the parabola's second lobe cannot come through. The terms that it drops are less than
-    ``CUTOFF^2 = 2^-14``: 1/64 LSB at intensity 1, 1/8 LSB at the largest, 8.
+    base has ``p < 1`` and ``w < 1``, so nothing wraps. The comparison is made before the square, so the
+    parabola's second lobe cannot come through. The dropped terms are less than ``CUTOFF^2 = 2^-14``: 1/64 LSB
+    at intensity 1, 1/8 LSB at the largest, 8.
 
-    The arithmetic error of the result for an exact argument is at most `ERROR`: the argument, its shift and K
-    each add 2^-16 to the error of the base, the product adds 2^-17; the square doubles this error; the result
-    adds 2^-17. Each further square doubles the error and adds 2^-17: `error` is at most 2^-12 and 2^-11.
+    The arithmetic error of the result for an exact argument is at most `error`.
+    docs/theory/bounds.md#specular-terms derives it.
 
-    The error of ``exp`` is at most ``2^-12 + 2^-15``: errors relative to p (of K and the slope) are
-    multiplied by ``p 2^(-16 p) <= 0.034``; the cuts of the argument and its shift, under ``2^-16 + 2^-18``,
-    times ``16 ln 2``, add 2.2e-4; the chords add 7.3e-6, all others together under 2e-5.
-
-    The error of ``coscos`` is at most 2^-13 for k = 2 and 2^-12 for k = 4: every cut makes w smaller,
-    together by less than ``2^-16 K (1 + e) + 2^-17 (1 + e) + 2^-17 w / K + 2^-16 p + 2^-17`` and the error of
-    the slope, which is 2^-15 at the peak. There the term falls fastest with w, by 2.47 (k = 2) or 4.93 (k =
-    4); the chords of the base are too high by at most 1.11e-5, which counts two or four times. The sum is
-    largest next to the peak, 9.8e-5 and 2.0e-4. The chords of e make w larger, by less than 1.1e-5 up to a
-    right angle and 8e-5 up to x = 1.7, where the term falls slowly. Near x = 2 the chords are useless, as the
-    derivative of e has no bound there; only n = 1 with k = 4 has light beyond 1.7, under 0.03, and the fourth
-    power makes the error small again: 8e-6 as measured.
+    - `ERROR` for polynomials that are squared once; 2^-12 and 2^-11 for the further squares;
+    - ``2^-12 + 2^-15`` for ``exp``;
+    - 2^-13 for ``coscos`` with k = 2, 2^-12 with k = 4.
 
     Parameters
     ----------
@@ -133,17 +123,22 @@ class Specular(HighlightOperand):
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
     as_published : bool
-        Whether the unit has the comparator of figure 3.6 as published, for polynomials that are squared once:
-        it compares the *square*, with 2^-14 at every exponent. Up to the base's zero the terms are those of
-        the default to the bit. Past it the parabola rises again and its second lobe comes through; squares
-        over 1 saturate, so that from ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak: at
-        n = 20 from 37 degrees on. A highlight gate for such a unit lets every span through.
+        Whether the unit has the comparator of figure 3.6 as published, for polynomials that are squared once.
+        It compares the *square*, with 2^-14 at every exponent. Up to the base's zero the terms are those of
+        the default to the bit. Past the zero the parabola rises again, and its second lobe comes through.
+        Squares over 1 saturate. So from ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak:
+        at n = 20 from 37 degrees on. A highlight gate for this unit lets every span through.
 
     Raises
     ------
     ValueError
-        If the model is not one of `SERVED`, a polynomial's a or b does not fit into its word, or its slope at
-        exponent 1023 not into that of the slope; if it has no form as published, or the operand is unknown.
+        In one of these cases:
+
+        - the model is not one of `SERVED`;
+        - a polynomial's a or b outgrows its word;
+        - its slope at exponent 1023 outgrows the word of the slope;
+        - it has no form as published;
+        - the operand is unknown.
 
     Source: docs/theory/units.md#specular-unit; [T] 3.1 and 3.4, figures 3.6 and 3.7; [C] for ``cosquad_lin``
     and ``cosquad_q``; [Lyon93].

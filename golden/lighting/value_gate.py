@@ -1,4 +1,4 @@
-"""Value gate: which spans of ``chord-local`` can hold a visible highlight, from three u."""
+"""Value gate, which stops spans of ``chord-local`` without a visible highlight, by three values of u."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,26 +20,24 @@ class ValueGate(Gate):
     """Whether a span may be lit, from ``u = |N - H|^2 / 2`` at its first pixel, middle and last pixel.
 
     The u of the pixels lie on a quadratic, ``u_l + P t + G t^2`` with ``G = 2 (u_l + u_r - 2 u_m)``. It is
-    the straight line from u_l to u_r minus ``G t (1 - t)``, hence at least ``min(u_l, u_r) - max(G, 0) / 4``;
-    twice this bound is `least`. A span is lit unless
+    the straight line from u_l to u_r minus ``G t (1 - t)``. Hence it is at least
+    ``min(u_l, u_r) - max(G, 0) / 4``. `least` is twice this bound. A span is lit unless
 
     - ``|u_l + u_r - 2 u_m| < 2^-5`` and ``|u_r - u_l| < 2^-3``, so that ``|G| < 1/16`` and ``|P| < 3/16`` fit
       their words; and
     - `least` is at least a threshold, from a PROM addressed by the exponent.
 
-    The distance of a pixel's u from the quadratic through the values is less than
-    ``2^-23 + ChordSetup.walk_error(3/16, 1/16) + 2^-26`` (`margin`): the rounding of G, the reciprocal of the
-    length and the drift, and the rounding of the result. The threshold is twice the sum of the margin, one
-    step, and the largest argument with a term over 0 (`HighlightOperand.last_lit_arguments`). **So no pixel
-    of a span that is not lit has a specular term other than 0**, and the picture is the same to the bit. The
-    gate needs no multiplication.
+    A pixel's u is within `margin` of the quadratic through the values. The threshold is twice the sum of the
+    margin, one step, and the largest argument with a term over 0 (`HighlightOperand.last_lit_arguments`).
+    **So no pixel of a span that is not lit has a specular term other than 0**, and the picture is the same to
+    the bit (docs/theory/bounds.md#gate-of-values). The gate needs no multiplication.
 
-    In a span of one pixel all three values are those of the pixel.
+    In a span of one pixel all three values belong to the pixel.
 
     Parameters
     ----------
     specular : Specular or Power
-        Model of the unit that is gated; its operand is 1 - N·H.
+        Model of the gated unit. Its operand is 1 - N·H.
 
     Source: docs/theory/units.md#highlight-gate.
     """
@@ -106,8 +104,8 @@ class ValueGate(Gate):
     def lit(self, spans: Spans, halfway: np.ndarray, threshold: Fixed) -> np.ndarray:
         """Bit-accurate decisions from the values of spans, see `Gate.lit`; H has no effect.
 
-        Values that are no pixel's are replaced: of a span of two pixels that in the middle, of a span of one
-        pixel those behind the first.
+        Values without a pixel are replaced: the middle value of a span of two pixels, and the values behind
+        the first of a span of one pixel.
         """
         if spans.values is None:
             raise ValueError("a value gate takes spans with values")

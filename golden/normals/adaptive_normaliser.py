@@ -17,33 +17,28 @@ __all__ = ["AdaptiveNormaliser"]
 class AdaptiveNormaliser:
     """Normals of a span of m pixels, by linear interpolation over ``2^k`` equal arcs of its great circle.
 
-    **Number of levels.** Points of a chord are too short by at most its sagitta,
-    ``d_k = 1 - cos(psi/2^(k+1))`` for ``2^k`` segments, where ``d_(k+1)`` is about ``d_k/4``. With
-    ``q = (1 - cos psi)/4`` from the bisection unit, ``d_k <= (q + q^2) / 4^k``: this takes one square and
-    wired shifts. The right side is too large by at most 6.7 % (k = 0 at 90 degrees), and never too small. k
-    is the least with ``(q + q^2) / 4^k <= threshold``; `depth` is k at 90 degrees.
+    **Number of levels.** Points of a chord are too short by at most its sagitta. For ``2^k`` segments this is
+    ``d_k = 1 - cos(psi/2^(k+1))``, and ``d_(k+1)`` is about ``d_k/4``. With ``q = (1 - cos psi)/4`` from the
+    bisection unit, ``d_k <= (q + q^2) / 4^k``. This takes one square and wired shifts. The right side is too
+    large by at most 6.7 % (k = 0 at 90 degrees), and never too small. k is the least number with
+    ``(q + q^2) / 4^k <= threshold``. `depth` is k at 90 degrees.
 
-    **Segment ends** ``E_j`` at ``psi j / 2^k``, from the bisection unit, level by level.
+    **Segment ends.** The bisection unit gives ``E_j`` at ``psi j / 2^k``, level by level.
 
     **Linear interpolators.** Pixel i lies at ``i 2^k / (m - 1)`` of a segment's length. The integer part is
-    its segment j, exact by integer arithmetic for every m. The first pixel of a segment starts at
+    its segment j, computed in integers and exact for every m. The first pixel of a segment starts at
     ``E_j + phi (E_(j+1) - E_j)``, where phi is the fractional part, and every further pixel adds
     ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends are exact.
 
-    The published design extrapolates instead: ``N_l + g (N_r - N_l)`` is the normal of the pixel at the next
-    power of two, ``g = 2^p/(m - 1)``, so that segments are whole pixels and divisions are shifts. This is not
-    a variant here, for three reasons. The new end is not of unit length (up to 1.03 for 10 degrees, 1.47 for
-    45), so the word of a component does not hold it, and a `Renormaliser` for it would take eight
-    multipliers, where this whole unit takes three. A span of 90 degrees becomes one of up to 116, out of the
-    bisection's range. Even normalised, the new end lies on the continuation of the chord, not at its pixel's
-    position on the great circle: the last pixel misses N_r, by up to 0.00015 degrees for spans of 1 degree,
-    0.15 for 10 and 8.2 for 45. Here the last pixel is exactly N_r.
+    The published design extrapolates the end of the span instead. It is no variant here:
+    docs/theory/bounds.md#adaptive-normaliser has three reasons.
 
-    A span wider than the bisection's `max_angle` is flagged and not divided: its normals lie on the straight
-    line between its ends (near the left end, if the ends differ by more than 1 in a component), and only its
-    first and last pixel are defined. Ends must be of unit length, to 1/256 or so: a middle normal is made as
-    long as one, so that the normals between other ends are off by as much. An end of length 0 counts as 90
-    degrees away, and is not flagged.
+    A span wider than the bisection's `max_angle` is flagged and stays undivided. Its normals lie on the
+    straight line between its ends. (If the ends differ by more than 1 in a component, they lie near the left
+    end.) Only its first and last pixel are defined.
+
+    Ends must be of unit length, to 1/256 or so. A middle normal is made for unit ends, so normals between
+    other ends are off by as much. An end of length 0 counts as 90 degrees away, and is not flagged.
 
     ================ ========== ==================================================================
     word             format     why
@@ -58,16 +53,11 @@ class AdaptiveNormaliser:
     normal           SQ(1, 17)  rounded half up, saturates
     ================ ========== ==================================================================
 
-    The arithmetic error of a component, against straight lines between the exact ends, is at most `error`. It
-    is the sum of the error of the ends (`end_error`); a difference of ends, at most ``sqrt(8.1 threshold)``
-    and 0.77, times 2^-17 for phi and for the reciprocal; the drift; and the last rounding. The model error of
-    the bisection makes ends too long or too short, and the next level, which reads their dot product, keeps
-    ``1/(1 + cos)`` of it, at most 0.586; its arithmetic errors add up, with a factor of at most 1.12 over all
-    levels. The first and the last normal of a span are exact.
-
-    The model error is that against the great circle: a normal is too short by at most ``threshold`` (plus
-    2^-19 by the rounding of q), and never too long; its direction is off by at most ``0.017 theta^3`` for a
-    segment of angle theta, ``theta^2 <= 8.1 threshold``.
+    Against the great circle a normal is too short by at most ``threshold`` (plus 2^-19 by the rounding of q).
+    It is never too long. For a segment of angle theta, ``theta^2 <= 8.1 threshold``, its direction is off by
+    at most ``0.017 theta^3``. Against straight lines between the exact ends, `error` bounds the error of a
+    component. The first and the last normal of a span are exact. Both bounds are derived in
+    docs/theory/bounds.md#adaptive-normaliser.
 
     Parameters
     ----------
@@ -99,7 +89,7 @@ class AdaptiveNormaliser:
 
     @property
     def limits(self) -> Fixed:
-        """Limits ``threshold 4^k``, k under `depth`; a span has a level for each that ``q + q^2`` exceeds."""
+        """Limits ``threshold 4^k``, k under `depth`. A span has a level for each limit under ``q + q^2``."""
         code = int(np.floor(np.ldexp(self.threshold, self.SAGITTA_FORMAT.fraction_bits)))
         q = (1 - np.cos(np.radians(self.bisection.max_angle))) / 4
         largest = (q + q * q) / self.SAGITTA_FORMAT.step

@@ -23,8 +23,8 @@ _PUBLISHED_FIRST_STEP = (0.707, -0.341, 0.193, -0.059)
 class Bisection:
     """Normal half-way between two: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 r``, ``r = N_a . N_b``.
 
-    It is computed as ``N = (N_a + N_b)/2 + e (N_a + N_b)`` with ``e = 1/sqrt(2 + z) - 1/2``, so that the word
-    of e holds a small number. ``u = 1 - r`` chooses between two polynomials for e, in Horner's form:
+    The unit computes ``N = (N_a + N_b)/2 + e (N_a + N_b)`` with ``e = 1/sqrt(2 + z) - 1/2``. So the word of e
+    holds a small number. ``u = 1 - r`` chooses between two polynomials for e, in Horner's form:
 
     - up to 45 degrees (z in [sqrt 2, 2]) of degree 1 or 2 in u, without a constant: exact at angle 0;
     - from 45 to 90 degrees, the first step of a wide span, a cubic in r for the same function, written
@@ -33,12 +33,12 @@ class Bisection:
     With ``as_published`` both are polynomials in r with the published coefficients (as z = 2 r, a coefficient
     of z^i is multiplied by 2^i).
 
-    A span wider than `max_angle` by more than the rounding of its normals is flagged; its result is
+    A span wider than `max_angle` by more than the rounding of its normals is flagged. Its result is
     undefined.
 
-    Ends of length ``1 + x`` have a middle normal of length ``1 + x/(1 + r)``, so up to 45 degrees 0.5 to 0.59
-    of the length error remains. An end of length 0 counts as one at 90 degrees: it is flagged if `max_angle`
-    is 45; else the result is 0.7071 times the other end.
+    Ends of length ``1 + x`` have a middle normal of length ``1 + x/(1 + r)``. So up to 45 degrees 0.5 to 0.59
+    of the length error remains. An end of length 0 counts as 90 degrees away. It is flagged if `max_angle` is
+    45. Else the result is 0.7071 times the other end.
 
     ============= ========== ================================================================
     word          format     why
@@ -50,36 +50,19 @@ class Bisection:
     N             SQ(1, 17)  so that the unit can bisect its own results; saturates
     ============= ========== ================================================================
 
-    One factor scales both ends. Its error changes the length of N and not its direction, unless a component
-    saturates at 1.
+    One factor scales both ends. So its error changes only the length of N, unless a component saturates at 1.
 
-    The table has the model error of the factor, with the coefficients in the words above (`model_error`), and
-    the relative error of the length that it causes:
-
-    ====================== ================ ==================== ================ ====================
-    variant                to 45 degrees    relative             45 to 90 degrees relative
-    ====================== ================ ==================== ================ ====================
-    degree 1               8.3e-4           0.16 %, 0 at 0       1.1e-4           0.02 %
-    degree 2               2.5e-5           0.005 %, 0 at 0      1.1e-4           0.02 %
-    degree 1, as published 1.1e-3           0.22 %, 0 at 0       6.2e-4           0.09 %
-    degree 2, as published 1.0e-3           0.20 %, 0.20 % at 0  6.2e-4           0.09 %
-    ====================== ================ ==================== ================ ====================
-
-    The arithmetic error of a component against the same polynomial (`arithmetic_error`) is the sum of the
-    error of e times a component of ``N_a + N_b``, at most 2; the cut of the half sum, up to 2^-18, times 2 e;
-    the cut of the product, 2^-21; and the rounding of the result, 2^-18. The error of e is the sum of the
-    rounding of u to 17 bits (2^-18, and twice as much for r, which is computed from it) times the slope of e
-    (0.1585 at 45 degrees, 0.3536 at 90); the roundings of the sums (2^-19 times u, or times r + r^2); and its
-    own (2^-20).
+    `model_error`, `arithmetic_error` and `error` have the bounds; docs/theory/bounds.md#bisection derives
+    them.
 
     Parameters
     ----------
     degree : int
         1 or 2: degree of the polynomial for spans up to 45 degrees.
     max_angle : int
-        90, or 45 for a unit without the first step, which saves its multiplications.
+        90, or 45 for a unit without the first step and its multiplications.
     as_published : bool
-        Whether the coefficients are those of [T].
+        Whether the coefficients come from [T].
 
     Raises
     ------
@@ -128,7 +111,7 @@ class Bisection:
         return self._limit(self.max_angle)
 
     def reads_cosine(self, first_step: bool) -> bool:
-        """Whether a polynomial is one in r, not in u."""
+        """Whether a polynomial is in r in place of u."""
         return first_step or self.as_published
 
     def polynomial(self, first_step: bool) -> tuple[Fixed, Fixed]:
@@ -137,7 +120,7 @@ class Bisection:
         Parameters
         ----------
         first_step : bool
-            Whether the polynomial is that for 45 to 90 degrees; else it is that for spans up to 45 degrees.
+            Whether the polynomial is for 45 to 90 degrees, in place of spans up to 45 degrees.
 
         Returns
         -------
@@ -230,7 +213,7 @@ class Bisection:
         one_minus_cosine : Fixed, shape (...), SQ(2, 17)
             ``u``.
         out_of_range : bool array, shape (...)
-            Whether the two are further apart than `max_angle`: the normal is then undefined.
+            Whether the two are further apart than `max_angle`. The normal is then undefined.
 
         Raises
         ------

@@ -18,7 +18,7 @@ class BisectionChain:
     """Normal at ``psi / 2^k`` from the left end of a span: ``N_k = (L_k N_l + N_r) / M_k``.
 
     ``M_k = 2 M_(k-1) cos(psi/2^k)``, ``L_k = L_(k-1) + M_(k-1)``, ``M_0 = 1``, ``L_0 = 0``. M and L grow as
-    2^k, so the unit holds the weights themselves, ``l = L/M`` and ``m = 1/M``. With
+    2^k. So the unit holds the weights, ``l = L/M`` and ``m = 1/M``. With
     ``f_k = 1 / (2 cos(psi/2^k)) = 1/2 + e``, the factor of `Bisection`,
 
     ``l_k = (l_(k-1) + 1) f_k``, ``m_k = m_(k-1) f_k``. This takes no division, and both stay in [0, 1].
@@ -36,27 +36,12 @@ class BisectionChain:
     N             SQ(1, 17)  rounded, saturates
     ============= ========== ================================================================
 
-    `error` bounds the error: it follows the recursion with every rounding at its worst. An error of f_k is
-    multiplied by ``l + 1 <= 2`` in l_k and by m in m_k, and every further step multiplies it by f, 1/2 to
-    0.54 after the first step: errors do not grow along the chain. Each step also halves the error of u and
-    adds at most twice the error of e; the next factor has the error of u times the slope 0.1585. Unlike one
-    bisection, the chain can also change the direction of its result, as the errors of l and m differ.
+    `error` bounds the error of a component: at most 1.2e-4 to 45 degrees, 2.9e-4 to 90.
+    docs/theory/bounds.md#chain-of-bisections derives it. The published coefficients of degree 2 have larger
+    errors.
 
-    ===== ============================ ============================
-    level bound, to 45 degrees         bound, to 90 degrees
-    ===== ============================ ============================
-    1     7.2e-5                       2.5e-4
-    2     1.2e-4                       2.9e-4
-    4     1.1e-4                       2.0e-4
-    8     4.5e-5                       5.7e-5
-    15    3.8e-5                       3.9e-5
-    ===== ============================ ============================
-
-    With the published coefficients of degree 2 the errors do not become small: every factor of a small angle
-    is 0.2 % too small, and l tends to 0.9973 in place of 1.
-
-    Ends of length ``1 + x`` give normals whose length is off by x/2 to x. An end of length 0 counts as one at
-    90 degrees, as in `Bisection`.
+    Ends of length ``1 + x`` give normals whose length is off by x/2 to x. An end of length 0 counts as 90
+    degrees away, as in `Bisection`.
 
     Parameters
     ----------
@@ -80,7 +65,7 @@ class BisectionChain:
         level : int
             k, 1 to 15.
         first_step : bool
-            Whether spans are 45 to 90 degrees wide; else they are up to 45 degrees wide.
+            Whether spans are 45 to 90 degrees wide, in place of up to 45 degrees.
         """
         p = self.bisection
         one = ONE_SQUARED.values.item()
@@ -131,7 +116,7 @@ class BisectionChain:
         normal : Fixed, shape (spans, 3), SQ(1, 17)
             ``N_k``.
         out_of_range : bool array, shape (spans,)
-            Whether the span is wider than the bisection's `max_angle`: the normal is then undefined.
+            Whether the span is wider than the bisection's `max_angle`. The normal is then undefined.
 
         Raises
         ------

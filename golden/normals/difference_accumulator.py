@@ -22,14 +22,14 @@ class DifferenceAccumulator:
     normal SQ(1, 17)    18 bits for the multipliers that follow
     ====== ============ =====================================================================
 
-    These are the formats of a component of a normal; other formats serve other quadratics.
+    These are the formats of a component of a normal. Other quadratics have other formats.
 
-    Half a step of the output is added to N once, at the start: a cut then rounds half up. A value past the
-    end of ``SQ(1, 17)`` saturates. The sums themselves are exact. Up to 45 degrees no value that is used
-    leaves ``SQ(2, 42)``; in a wider span, which the middle normal flags, sums may wrap.
+    Half a step of the output is added to N once, at the start. A cut then rounds half up. A value past the
+    end of ``SQ(1, 17)`` saturates. The sums are exact. Up to 45 degrees no used value leaves ``SQ(2, 42)``.
+    In a wider span, which the middle normal flags, sums may wrap.
 
-    The error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)`` is that of the last rounding, 2^-18,
-    unless it saturates. `DifferenceSetup` bounds the drift from the rounding of the differences.
+    The error of a normal against ``Q + k W_0 + k (k - 1)/2 (2 G dt^2)`` is the last rounding, 2^-18, unless
+    the value saturates. `DifferenceSetup` bounds the drift from the rounding of the differences.
 
     Parameters
     ----------

@@ -17,9 +17,9 @@ __all__ = ["DifferenceSetup"]
 class DifferenceSetup:
     """First differences ``W_0 = P dt + G dt^2`` and ``2 G dt^2``, ``dt = 1/(m - 1)``, of spans of m pixels.
 
-    [T] has ``W_0 = (G dt + P) dt``. Here W_0 is a sum of two products, so that one multiplier computes all:
-    the square of dt, three products with P and three with G. dt and its square come from `step_words`.
-    Products are shifted and rounded half up to 42 fraction bits.
+    [T] has ``W_0 = (G dt + P) dt``. Here W_0 is a sum of two products. So one multiplier computes all: the
+    square of dt, three products with P and three with G. dt and its square come from `step_words`. Products
+    are shifted and rounded half up to 42 fraction bits.
 
     ======== ============ ===========================================================
     word     format       why
@@ -28,19 +28,14 @@ class DifferenceSetup:
     2 G dt^2 SQ(2, 42)    at most 1
     ======== ============ ===========================================================
 
-    The relative error of dt is at most 2^-17, that of dt^2 ``2^-16 + 2^-17 + 2^-34``; so the error at the end
-    of the curve is less than ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|``. The rounding of the differences
-    adds, at pixel k, at most ``2^-42 (k + k^2/2)``, 1.9e-6 after 4095 pixels.
+    The error at the end of the curve is less than ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|``, by dt and
+    dt^2. The rounding of the differences adds, at pixel k, at most ``2^-42 (k + k^2/2)``, 1.9e-6 after 4095
+    pixels.
 
-    A span of one pixel is computed with dt = 1; its differences are not read.
+    A span of one pixel is computed with dt = 1. Nothing reads its differences.
 
-    With ``as_published`` the order of figure 2.11 is kept, ``W_0 = (G dt + P) dt`` and ``2 (G dt) dt``: nine
-    products in place of seven. With ``dt = 2 f 2^-s``, where f is the word of the table, ``G f`` is rounded
-    to ``SQ(0, 18)``, and ``G dt + P`` to ``SQ(1, 17)``, which saturates; this sum is the mean slope of the
-    first step, under 0.84 up to 45 degrees. dt^2 is then the square of the same dt, with a relative error of
-    ``2^-16 + 2^-34``. The error at the end of the curve is less than the sum of
-    ``2^-17 |P| + (2^-16 + 2^-34) |G|``, 2^-18 for the rounding of ``G dt + P``, 2^-18 for that of ``G f``
-    (each times ``1 + 2^-17``), and the rounding of the differences.
+    With ``as_published`` the order of figure 2.11 is kept, ``W_0 = (G dt + P) dt`` and ``2 (G dt) dt``. This
+    takes nine products in place of seven. docs/theory/bounds.md#difference-setup has its words and bound.
 
     Parameters
     ----------

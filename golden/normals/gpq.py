@@ -13,9 +13,9 @@ __all__ = ["GPQ"]
 class GPQ:
     """Coefficients ``G = 2 N_r - 4 N_c + 2 N_l``, ``P = 4 N_c - N_r - 3 N_l``, ``Q = N_l``, exact.
 
-    ``N(t) = G t^2 + P t + Q`` passes through the three normals at t = 0, 1/2 and 1. As ``N_c`` has 19
-    fraction bits, G and P have 17 and are exact: there is no arithmetic error. Up to 45 degrees |G| <= 0.305
-    and |P| <= 0.83, so ``SQ(0, 17)`` and ``SQ(1, 17)`` hold them. The coefficients of a wider span, which the
+    ``N(t) = G t^2 + P t + Q`` passes through the three normals at t = 0, 1/2 and 1. ``N_c`` has 19 fraction
+    bits. So G and P have 17 and are exact: there is no arithmetic error. Up to 45 degrees |G| <= 0.305 and
+    |P| <= 0.83. So ``SQ(0, 17)`` and ``SQ(1, 17)`` hold them. The coefficients of a wider span, which the
     middle normal flags, saturate.
 
     Source: docs/theory/interpolation.md#quadratic-normals; [T] 2.2, figure 2.8.

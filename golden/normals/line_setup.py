@@ -29,7 +29,7 @@ def quantise_line(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.n
 class LineSetup:
     """First difference ``W = P dt``, ``P = N_r - N_l``, of vectors in ``SQ(1, 22)``; ``dt = 1/(m - 1)``.
 
-    The vector may be short at one end of the line, where a renormaliser magnifies every error, so P and dt
+    The vector may be short at one end of the line. A renormaliser magnifies every error there. So P and dt
     have more bits than a multiplier's operand. This takes three products a component, nine a span.
 
     ========== ============ ============================================================
@@ -41,8 +41,9 @@ class LineSetup:
     W          SQ(2, 40)    at pixel k its rounding adds up to ``k 2^-41``
     ========== ============ ============================================================
 
-    The error of a point of the line at any pixel is at most `ERROR`, for P up to 2 in a component: the sum of
-    ``2^-24 |P|`` by the reciprocal, 2^-31 by the product that is left out, and the drift, ``4094 2^-41``.
+    The error of a point of the line at any pixel is at most `ERROR`, for P up to 2 in a component. It is the
+    sum of ``2^-24 |P|`` by the reciprocal, 2^-31 by the product that is left out, and the drift,
+    ``4094 2^-41``.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """

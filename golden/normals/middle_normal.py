@@ -26,9 +26,9 @@ MAX_SPAN_ANGLE = 45.0
 class MiddleNormal:
     """Middle normal ``N_c = h(r) (N_l + N_r)``, ``h = 1/sqrt(2 (1 + r))``, ``r = N_l . N_r``.
 
-    It is computed as ``N_c = (N_l + N_r)/2 + e(u) (N_l + N_r)`` with ``u = 1 - r``. The polynomial
-    ``e = h - 1/2 = u (c1 + u (c2 + u c3))`` is exact at angle 0, as most spans of a mesh are narrow, and
-    fitted up to `MAX_SPAN_ANGLE`.
+    The unit computes ``N_c = (N_l + N_r)/2 + e(u) (N_l + N_r)`` with ``u = 1 - r``. Most spans of a mesh are
+    narrow. So the polynomial ``e = h - 1/2 = u (c1 + u (c2 + u c3))`` is exact at angle 0, and fitted up to
+    `MAX_SPAN_ANGLE`.
 
     ======== ============= ==========================================================
     word     format        why
@@ -40,37 +40,22 @@ class MiddleNormal:
     ======== ============= ==========================================================
 
     The error of a component of ``N_c``, against the exact function of the same two code vectors, is at most
-    `ERROR` for angles up to 45 degrees. The error of e has four parts: the fit (8.3e-7); the cut of u to 18
-    fraction bits, times the slope 0.18; two roundings of sums (2^-20 u and 2^-20 u^2); its own rounding
-    (2^-22). It is multiplied by a component of ``N_l + N_r``, at most 2. The cut of ``(N_l + N_r)/2``, up to
-    2^-18, is multiplied by 2 e <= 0.0824; the last rounding adds 2^-20.
+    `ERROR` for angles up to 45 degrees. docs/theory/bounds.md#middle-normal derives it.
 
-    A wider span is flagged; u and N_c then saturate.
+    A wider span is flagged. u and N_c then saturate.
 
-    Ends of length ``1 + x`` have a middle normal of length ``1 + x/(1 + r)``; if u would be negative, it is
-    half their sum, which is not longer than the ends. A span with an end of length 0 is flagged.
+    Ends of length ``1 + x`` have a middle normal of length ``1 + x/(1 + r)``. If u would be negative, the
+    middle normal is half their sum, at most as long as the ends. A span with an end of length 0 is flagged.
 
-    The other fits are for comparison. They need the same hardware, as their polynomials in r, rewritten in u,
-    have the same form. The fit of [T] has the constant 1/2 exactly: ``e = u (0.132 + u (0.016 + 0.059 u))``.
-    A plain minimax fit over r in [0, 1] has another constant, so that every normal of a flat face is too
-    short or too long by twice the error at angle 0; e is then ``SQ(-3, 21)``, 18 bits. The columns of the
-    table are `model_error` of h, with the coefficients in the words above; the relative error of the length
-    that it causes; the relative error at angle 0; and the first two for all r in [0, 1]:
-
-    ================ ============= ======== ============= ===============
-    fit              to 45 degrees relative at angle 0    over [0, 1]
-    ================ ============= ======== ============= ===============
-    ``exact``        8.2e-7        0.0002 % 0             -
-    ``as_published`` 4.9e-4        0.093 %  0             6.1e-4, 0.093 %
-    ``minimax_2``    1.9e-3        0.38 %   0.38 % long   1.9e-3, 0.38 %
-    ``minimax_3``    2.9e-4        0.058 %  0.058 % short 2.9e-4, 0.058 %
-    ================ ============= ======== ============= ===============
+    The other fits are for comparison, and need the same hardware. docs/theory/bounds.md#middle-normal has a
+    table of their `model_error`. The fit of [T] is exact at angle 0, too. A plain minimax fit has an error
+    there, and its e is ``SQ(-3, 21)``, 18 bits.
 
     Parameters
     ----------
     fit : str
-        One of `MIDDLE_NORMAL_FITS`: exact at angle 0; the coefficients of [T]; a plain minimax fit of degree
-        2 or 3.
+        One of `MIDDLE_NORMAL_FITS`: a fit that is exact at angle 0, the coefficients of [T], or a plain
+        minimax fit of degree 2 or 3.
 
     Raises
     ------
@@ -145,7 +130,7 @@ class MiddleNormal:
         normal_middle : Fixed, shape (..., 3), SQ(1, 19)
             Middle normals.
         out_of_range : bool array, shape (...)
-            Whether the span is wider than `MAX_SPAN_ANGLE`: the normal is then saturated.
+            Whether the span is wider than `MAX_SPAN_ANGLE`. The normal is then saturated.
 
         Raises
         ------

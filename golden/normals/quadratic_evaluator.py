@@ -23,11 +23,11 @@ class QuadraticEvaluator:
 
     ``direct`` adds the two products (figure 2.9 a); ``horner`` is ``(G t + P) t + Q`` (figure 2.9 b).
 
-    The words of the parameter are ``-t`` and ``-t^2``, since ``SQ(1, 17)`` holds -1 and not 1. ``-t`` is the
-    sum of ``-dt``, and dt comes from `reciprocal_table` in words of 18 bits. The relative error of such a
-    word is at most 2^-18; the shifted word and its sums are exact. The rounded t of the last pixel is
-    therefore exactly 1: **the curve starts in** ``N_l`` **and ends in** ``G + P + Q``, **which is** ``N_r``,
-    **at every length**.
+    The words of the parameter are ``-t`` and ``-t^2``, because ``SQ(1, 17)`` holds -1 but not 1. ``-t`` is
+    the sum of ``-dt``, and dt comes from `reciprocal_table` in words of 18 bits. The relative error of these
+    words is at most 2^-18. The shifted word and its sums are exact. So the rounded t of the last pixel is
+    exactly 1. **The curve starts in** ``N_l`` **and ends in** ``G + P + Q``, **which is** ``N_r``, **at every
+    length**.
 
     ============ =========== ============================================================
     word         format      why
@@ -42,12 +42,12 @@ class QuadraticEvaluator:
 
     The arithmetic error of a component is at most `error` for spans up to 45 degrees, where
     ``|2 G t + P| <= 0.83`` and ``|G| <= 0.305``. The error of t is 2^-18 by its table plus 2^-18 by its
-    rounding; the roundings of t^2 (``direct``) or of the inner sum (``horner``), and of the result, are
-    2^-18.
+    rounding. The rounding of t^2 (``direct``) or of the inner sum (``horner``) is 2^-18, and the rounding of
+    the result, too.
 
-    Wider spans are flagged by the middle normal; they should be cut before. P saturates from 53 degrees on
-    and G from 57: the curve then keeps its start and misses its end, by up to 0.1 at 60 degrees, 0.48 at 90,
-    0.78 at 120 and 1.05 at 180 (length of the error vector), and stays in its words.
+    The middle normal flags wider spans. Cut them before. P saturates from 53 degrees on and G from 57. The
+    curve then stays in its words and keeps its start. It misses its end by up to 0.1 at 60 degrees, 0.48 at
+    90, 0.78 at 120 and 1.05 at 180 (length of the error vector).
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class QuadraticEvaluator:
         return 2.0**-18 * (2 * 0.83 + (0.305 if self.form == "direct" else 1.0) + 1)
 
     def step(self, length: np.ndarray) -> Fixed:
-        """Bit-accurate ``dt = 1/(m - 1)``; 1 for a span of one pixel, which does not use it.
+        """Bit-accurate ``dt = 1/(m - 1)``; 1 for a span of one pixel, which ignores dt.
 
         Parameters
         ----------

@@ -19,9 +19,9 @@ class Renormaliser:
 
     v is shifted left until its largest component is 1/2 or more, and rounded to ``w``. With ``s = w . w``,
     1/4 to 3, the result is ``N = r w`` with ``r = (ONE/2^17) / sqrt(s)``, where ``ONE/2^17`` is the length 1
-    of `unit_vector`. Let q be the octave of s, and ``m = s 2^-q``, 1 to 2. r is a quadratic
-    ``c0 - x (c1 - x c2)`` in each of 16 segments of m in each of the four octaves, with x from the start of
-    the segment on.
+    of `unit_vector`. Let q be the octave of s, and ``m = s 2^-q``, 1 to 2. Each of the four octaves has 16
+    segments of m. In each segment r is a quadratic ``c0 - x (c1 - x c2)``, with x from the start of the
+    segment on.
 
     ============ ========== =================================================================
     word         format     why
@@ -38,10 +38,10 @@ class Renormaliser:
     N            SQ(1, 17)  rounded; saturates
     ============ ========== =================================================================
 
-    A vector with all components from -`SHORTEST` to under `SHORTEST` is flagged; its N is invalid. For other
-    vectors the error of direction is at most `DIRECTION_ERROR` radians, without that of the rounding of v:
-    ``sqrt(3) 2^-18`` by the rounding of w, of length 1/2 or more, and as much by that of N. The length error
-    is at most `LENGTH_ERROR`: the error of r times |w|, up to sqrt(3), plus the rounding of N.
+    A vector with all components from -`SHORTEST` to under `SHORTEST` is flagged. Its N is invalid. For other
+    vectors the error of direction is at most `DIRECTION_ERROR` radians, without the rounding of v. The
+    rounding of w, of length 1/2 or more, adds ``sqrt(3) 2^-18``, and the rounding of N as much. The length
+    error is at most `LENGTH_ERROR`: the error of r times |w|, up to sqrt(3), plus the rounding of N.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
@@ -65,8 +65,8 @@ class Renormaliser:
     def coefficients(self) -> tuple[Fixed, Fixed, Fixed]:
         """Coefficients ``c0, c1, c2`` of every segment, shape (64,) each, by octave and segment.
 
-        c2 comes from the Chebyshev series of a segment, which is nearly a minimax fit, as the segment is
-        short; c1 follows from the linear term and the rounded c2, and c0 centres the remaining error.
+        c2 comes from the Chebyshev series of a segment. This is nearly a minimax fit, because the segment is
+        short. c1 follows from the linear term and the rounded c2. c0 centres the remaining error.
         """
         width = 2.0**-self.SEGMENT_BITS
         x = chebyshev.chebpts2(33)
@@ -105,7 +105,7 @@ class Renormaliser:
         Parameters
         ----------
         square : Fixed, any shape, SQ(4, 34)
-            s; under 1/4 it counts as a value of the lowest octave, and r is invalid.
+            s. Under 1/4 it counts as a value of the lowest octave, and r is invalid.
         """
         codes = square.codes
         octave = sum((codes >> (33 + k)) > 0 for k in range(self.OCTAVES - 1))
