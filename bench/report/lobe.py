@@ -1,23 +1,16 @@
-"""Errors and costs of the lobe unit and of pipelines with it, beside their baselines.
-
-`python -m blysk.bench.report.lobe` prints the tables.
-"""
+"""Errors and costs of the lobe unit, and errors of frames with it, beside their baselines."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
-import click
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.colors import style_of
-from blysk.bench.labels import Label, place_labels
-from blysk.bench.report.section import Drawing, Section, Table
+from blysk.bench.report.section import Section, Table
 from blysk.bench.store import Task
 from blysk.bench.surfaces import grid, sphere
-from blysk.bench.svg import panels, svg
 from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.lighting.lobe import Lobe
@@ -34,7 +27,6 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.lobe import LobeUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SpecularUnit
-from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.meshes.mesh import load_mesh
 
 __all__ = [
@@ -46,7 +38,6 @@ __all__ = [
     "errors_of_size",
     "frame_errors",
     "largest_error",
-    "pipeline_cost",
     "section",
     "tasks",
     "unit_cost",
@@ -148,12 +139,6 @@ def unit_cost(name: str) -> dict[str, int]:
     }
 
 
-def pipeline_cost(method: str, model: str) -> dict[str, int]:
-    """`Cost.totals` of a pipeline, its latency and cycles a pixel."""
-    unit = ShadingPipelineUnit(preset(method, model))
-    return {**cost_of(unit).totals, "latency": unit.latency, "cycles_per_pixel": unit.cycles_per_pixel}
-
-
 def mesh_of(name: str) -> Mesh:
     """One of `MESHES`."""
     if name == "teapot":
@@ -233,14 +218,13 @@ def frame_errors(
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Measurements: errors by table size, costs of units and pipelines, errors of frames."""
+    """Measurements: errors by table size, costs of units, errors of frames."""
     size = [160, 120] if quick else [640, 480]
     found = [
         Task(errors_of_size, {"octaves": octaves, "steps": steps, "samples": 16 if quick else 256})
         for octaves, steps in (SIZES[-1:] if quick else SIZES)
     ]
     found += [Task(unit_cost, {"name": name}) for name in _UNITS]
-    found += [Task(pipeline_cost, {"method": method, "model": model}) for method, model in FRONT]
     names = ("method", "model", "values")
     for mesh in MESHES[:1] if quick else MESHES:
         frames = [(*design, list(EXPONENTS)) for design in FRONT]
@@ -257,7 +241,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: tables of errors and costs, and the drawing of the front."""
+    """The section: tables of errors and costs."""
     made: dict[str, list[tuple[dict, Any]]] = {}
     for task, result in zip(tasks, results, strict=True):
         made.setdefault(task.function.__name__, []).append((task.settings, result))
@@ -266,25 +250,23 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         for given, rows in made["frame_errors"]
         for row in rows
     ]
-    pipelines = {(given["method"], given["model"]): cost for given, cost in made["pipeline_cost"]}
     worst = {
         design: max(row["total"] for _, of, row in frames if of == design)
         for design in dict.fromkeys(of for _, of, _ in frames)
     }
-    table, normal, cosquad = (pipelines[of] for of in (("quotient", "blinn"), *_BASELINES))
-    worst_normal, worst_cosquad = (worst[of] for of in _BASELINES)
     sharp = _serves(frames, "ggx"), _serves(frames, "beckmann")
     text = [
         "A small table, addressed by octaves, with one multiplier gives Blinn's power at every exponent, and "
         "any other curve of N·H: Beckmann's and GGX among them. With `quotient` it is addressed by sin² and "
         "cos² of the angle and has 512 words, and by sin² of half the angle it gives true Phong, (R·V)^n; "
         "with the other methods it is addressed by 1 - N·H and has 336.",
-        f"A pipeline by `quotient` with it has {table['multipliers']} multipliers, by "
-        f"`renormalise` {normal['multipliers']}, by `renormalise` with `cosquad` {cosquad['multipliers']}; "
-        f"they take a span to its first pixel in {table['latency']}, {normal['latency']} and "
-        f"{cosquad['latency']} cycles. Largest errors against exact shading with Blinn's power: "
-        f"{worst['quotient', 'blinn']:.2f}, {worst_normal:.2f} and {worst_cosquad:.2f} LSB. True Phong, "
-        f"against itself: {worst['quotient', 'phong']:.2f}.",
+        "Largest errors against exact shading with Blinn's power: "
+        + ", ".join(
+            f"`{method}`, `{model}` {worst[method, model]:.2f} LSB"
+            for method, model in FRONT[:1] + FRONT[2:4]
+        )
+        + f". True Phong, against itself: {worst['quotient', 'phong']:.2f}. The section *Error against run "
+        "time* has what these pipelines cost.",
         "The column *spans alone* has the error of the normals that the spans give in exact arithmetic. "
         "Spans of both methods follow the true line of N/W, and have that of the words of their ends alone.",
         f"Sharp lobes: frames of `quotient` are within 1 LSB with ggx from roughness {sharp[0]:g} on, with "
@@ -316,14 +298,6 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "By Yosys, before mapping to an FPGA.",
         ),
         Table(
-            "lobe-pipelines",
-            "Pipelines, one light",
-            ["method", "model", *names, "largest error, LSB"],
-            [[*of, *(cost[name] for name in names), worst[of]] for of, cost in pipelines.items()],
-            "The error against exact shading with Blinn's power, of `phong` with (R·V)^n, over all frames of "
-            "the next table.",
-        ),
-        Table(
             "lobe-frames",
             "Largest errors of frames",
             [
@@ -349,12 +323,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "and *anywhere*: against exact normals of every pixel with Blinn's power, `phong`, `ggx` and "
             "`beckmann` with their own model.",
         ),
-        _front(pipelines, worst),
     ]
     return Section("lobe", "Exact highlights from one small table", text, parts)
-
-
-_BASELINES = ("renormalise", "blinn"), ("renormalise", "cosquad")
 
 
 def _serves(frames: Sequence[tuple[str, tuple[str, str], dict]], model: str) -> float:
@@ -362,43 +332,3 @@ def _serves(frames: Sequence[tuple[str, tuple[str, str], dict]], model: str) -> 
     off = [row["value"] for _, of, row in frames if of == ("quotient", model) and row["total"] > 1]
     values = sorted({row["value"] for _, of, row in frames if of == ("quotient", model)})
     return next((value for value in values if value > max(off, default=0)), float("inf"))
-
-
-def _front(pipelines: dict[tuple[str, str], dict], worst: dict[tuple[str, str], float]) -> Drawing:
-    """Drawing of the largest error against the number of multipliers."""
-    figure, (axes,) = panels(7.6, 3.6)
-    points = {of: (cost["multipliers"], worst[of]) for of, cost in pipelines.items()}
-    for (method, _), (x, y) in points.items():
-        style = style_of(method)
-        axes.plot(x, y, style.marker, color=style.color)
-    axes.set(xlabel="multipliers of the pipeline", ylabel="largest error, LSB", yscale="log")
-    axes.margins(x=0.3, y=0.2)
-    axes.set_yticks((0.5, 1, 2, 5, 10, 20, 50), ("0.5", "1", "2", "5", "10", "20", "50"))
-    axes.set_yticks((), minor=True)
-    axes.set_ylim(min(y for _, y in points.values()) / 1.5, max(y for _, y in points.values()) * 1.5)
-    # Lines to labels move no limit.
-    axes.autoscale(False)
-    axes.grid(True, color="#dddddd", linewidth=0.5)
-    axes.set_axisbelow(True)
-    labels = [Label(*at, ", ".join(of), style_of(of[0]).color) for of, at in points.items()]
-    place_labels(axes, labels, list(points.values()))
-    note = "Against exact shading with Blinn's power, `phong` with (R·V)^n. Lower and further left is better."
-    return Drawing("lobe-front", "Error of highlights against multipliers", svg(figure), note)
-
-
-@click.command()
-@click.option("--quick", is_flag=True, help="Small frames of one mesh.")
-def main(quick: bool) -> None:
-    """Print the tables."""
-    chosen = tasks(quick)
-    made = section(chosen, [task.function(**task.settings) for task in chosen])
-    for part in made.parts:
-        if isinstance(part, Table):
-            click.echo(f"\n{part.title}\n\n| {' | '.join(part.columns)} |\n|{'---|' * len(part.columns)}")
-            for row in part.rows:
-                cells = (f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in row)
-                click.echo(f"| {' | '.join(cells)} |")
-
-
-if __name__ == "__main__":
-    main()

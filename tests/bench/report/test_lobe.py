@@ -51,9 +51,6 @@ def test_phong_counts_against_phong():
 @pytest.mark.long
 def test_front_has_the_table_and_its_baselines():
     assert {model for _, model in lobe.FRONT} <= {*MODELS, *LOBES, *MIRROR_LOBES}
-    costs = {of: lobe.pipeline_cost(*of)["multipliers"] for of in lobe.FRONT[:4]}
-    assert costs["quotient", "blinn"] < costs["quotient", "phong"] < costs["renormalise", "blinn"]
-    assert costs["renormalise", "blinn"] <= costs["renormalise", "cosquad"] + 1
     assert lobe.unit_cost("lobe, memory outside")["memory_bits"] == 0
 
 
@@ -67,7 +64,7 @@ def test_section_is_whole():
             else dict.fromkeys(
                 (
                     *("multipliers", "cells", "register_bits", "memory_bits", "latency"),
-                    *("initiation_interval", "cycles_per_pixel"),
+                    "initiation_interval",
                 ),
                 3,
             )
@@ -76,6 +73,6 @@ def test_section_is_whole():
     ]
     section = lobe.section(tasks, results)
     names = [part.name for part in section.parts]
-    assert names == ["lobe-errors", "lobe-units", "lobe-pipelines", "lobe-frames", "lobe-front"]
+    assert names == ["lobe-errors", "lobe-units", "lobe-frames"]
     frames = next(part for part in section.parts if isinstance(part, Table) and part.name == "lobe-frames")
     assert len(frames.rows) == sum(task.function is lobe.frame_errors for task in tasks)
