@@ -117,8 +117,8 @@ def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]
     return scene, specialise(scene, preset(**counts | options))
 
 
-def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
-    """Savings of a scene's reductions, each alone and together, and its frame against the full pipeline's.
+def measure(name: str, size: Sequence[int]) -> dict[str, Any]:
+    """Savings of a scene's reductions, each alone and all together, and its frame beside the full pipeline's.
 
     Both frames are those of the bit-accurate models.
 
@@ -128,24 +128,21 @@ def measure(name: str, size: Sequence[int], steps: bool) -> dict[str, Any]:
         One of `SCENES`.
     size : sequence of int
         Width, height and triangles.
-    steps : bool
-        Whether the savings are counted step by step, each reduction after those before it; else all at once.
 
     Returns
     -------
     dict
-        Figures of `saving_figures` and `difference_figures`; ``reasons`` of the reductions; ``alone``,
-        resources that each reduction saves by itself; ``method``, ``model`` and ``pixels``.
+        ``full`` and ``specialised`` of `saving_figures`, and `difference_figures`; ``reasons`` of the
+        reductions; ``alone``, resources that each reduction saves by itself; ``method``, ``model`` and
+        ``pixels``.
     """
     scene, found = _specialised(name, size)
     full, smaller = model_frame(scene, found.full), model_frame(found.scenes[0], found.design)
-    counted = found
-    if not steps:
-        together = {key: value for reduction in found.reductions for key, value in reduction.changes.items()}
-        counted = replace(found, reductions=(Reduction("all of it", together),))
+    changes = {key: value for reduction in found.reductions for key, value in reduction.changes.items()}
+    together = saving_figures(replace(found, reductions=(Reduction("all of it", changes),)))
     alone = [saving_figures(replace(found, reductions=(each,)))["reductions"][0] for each in found.reductions]
     return {
-        **saving_figures(counted),
+        **{which: together[which] for which in ("full", "specialised")},
         **difference_figures(smaller, full),
         "alone": [each["saves"] for each in alone],
         "reasons": [reduction.reason for reduction in found.reductions],
@@ -174,7 +171,7 @@ def tasks(quick: bool) -> list[Task]:
     """Measurements of each scene by the bit-accurate models and, if not quick, by simulation."""
     size = list(_QUICK if quick else _FULL)
     settings = [{"name": name, "size": size} for name in (QUICK_SCENES if quick else SCENES)]
-    counted = [Task(measure, each | {"steps": not quick}) for each in settings]
+    counted = [Task(measure, each) for each in settings]
     return counted + [Task(simulate_both, each) for each in settings if not quick]
 
 
@@ -199,7 +196,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         f"{_left(found[most], 'cells'):.0%} ({most}). Cells are operators, multiplexers, registers and "
         "memories of any width, before technology mapping.",
     ]
-    parts = [_totals(found), _drawing(found), _alone(found), _reductions(found)]
+    parts = [_totals(found), _alone(found)]
     return Section("needs", "What a scene does not need", text, parts, conclusion=_conclusion(found))
 
 
@@ -319,40 +316,3 @@ def _totals(found: dict[str, dict]) -> Table:
         "PROM of exponents, three channels and, where the method can have one, a highlight gate."
     )
     return Table("needs", "The full pipeline and the specialised one", columns, rows, note, grades)
-
-
-def _reductions(found: dict[str, dict]) -> Table:
-    columns = ["scene", "left out, and why", *(f"saves {name.replace('_', ' ')}" for name in _RESOURCES)]
-    rows: list[list[Cell]] = []
-    for name, of in found.items():
-        if len(of["reasons"]) == len(of["reductions"]):
-            rows += [
-                [name, reduction["reason"], *(reduction["saves"][resource] for resource in _RESOURCES)]
-                for reduction in of["reductions"]
-            ]
-        else:
-            rows += [[name, reason, *[None] * len(_RESOURCES)] for reason in of["reasons"]]
-            saves = [sum(each["saves"][resource] for each in of["reductions"]) for resource in _RESOURCES]
-            rows.append([name, "all of it", *saves])
-    note = "Each on top of those above it."
-    return Table("needs-reductions", "What is left out of each pipeline", columns, rows, note)
-
-
-def _drawing(found: dict[str, dict]) -> Drawing:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.6, 0.62 * len(found) + 1.1), layout="constrained")
-    axes = figure.subplots()
-    place = np.arange(len(found))
-    colors = ("#0072b2", "#d55e00", "#00805c", "#b0508a")
-    for index, (resource, color) in enumerate(zip(_RESOURCES, colors, strict=True)):
-        left = [_left(of, resource) for of in found.values()]
-        axes.barh(place + (index - 1.5) * 0.2, left, 0.2, color=color, label=resource.replace("_", " "))
-    axes.set(yticks=place, yticklabels=list(found), xlim=(0, 1.02), xlabel="share of the full pipeline")
-    axes.xaxis.set_major_formatter(PercentFormatter(1))
-    axes.invert_yaxis()
-    axes.grid(True, axis="x", color="#dddddd", linewidth=0.5)
-    axes.set_axisbelow(True)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
-    note = "What is left of each resource when a pipeline has only what its scene needs."
-    return Drawing("needs-shares", "What stays of the full pipeline", svg(figure), note)

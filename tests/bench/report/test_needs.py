@@ -8,7 +8,6 @@ import pytest
 
 from blysk.bench.report import needs
 from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, section, simulate_both, tasks
-from blysk.bench.report.section import Drawing, Table
 from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.pipeline import Design
@@ -37,7 +36,7 @@ WHY = {
 
 @pytest.fixture
 def costs(monkeypatch):
-    """Costs without a netlist: a cell less with each step."""
+    """Costs without a netlist: a cell less with each reduction."""
 
     def counted(specialisation):
         full, *steps = (
@@ -52,15 +51,13 @@ def costs(monkeypatch):
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes(name, costs):
     """Each shows what it is there for, and its frame is the full pipeline's."""
-    found = measure(name, SMALL, steps=True)
+    found = measure(name, SMALL)
     assert any(WHY[name] in reason for reason in found["reasons"])
     assert found["different_pixels"] == 0
     assert found["pixels"] > 300
-    assert [reduction["reason"] for reduction in found["reductions"]] == found["reasons"]
-    saved = sum(reduction["saves"]["cells"] for reduction in found["reductions"])
-    assert found["full"]["cells"] - found["specialised"]["cells"] == saved == len(found["reasons"])
+    assert [saves["cells"] for saves in found["alone"]] == [1] * len(found["reasons"])
+    assert found["full"]["cells"] - found["specialised"]["cells"] == 1
     assert not {"cycles", "full_cycles"} & set(found)
-    assert measure(name, SMALL, steps=False)["specialised"]["cells"] == 99
 
 
 def test_a_frame_that_differs_is_told(monkeypatch, costs):
@@ -73,7 +70,7 @@ def test_a_frame_that_differs_is_told(monkeypatch, costs):
         return pixels
 
     monkeypatch.setattr(Design, "compute", brighter)
-    found = measure("copper teapot", SMALL, steps=True)
+    found = measure("copper teapot", SMALL)
     assert found["different_pixels"] > 300
     assert found["largest_difference"] == 1
 
@@ -81,7 +78,7 @@ def test_a_frame_that_differs_is_told(monkeypatch, costs):
 @pytest.mark.long
 def test_a_matt_scene_saves_half():
     """By its netlists, and by simulation of both."""
-    found = measure("matt teapot, k_s = 0", SMALL, steps=False)
+    found = measure("matt teapot, k_s = 0", SMALL)
     for resource in ("cells", "multipliers", "register_bits", "memory_bits"):
         assert 0 < found["specialised"][resource] < 0.6 * found["full"][resource]
     simulated = simulate_both("matt teapot, k_s = 0", SMALL)
@@ -138,7 +135,6 @@ def test_section():
     counted = {
         "full": figures,
         "specialised": half,
-        "reductions": [{"reason": "this", "saves": half}],
         "largest_difference": 0,
         "different_pixels": 0,
         "reasons": ["this"],
@@ -154,19 +150,18 @@ def test_section():
     assert [task.function for task in full] == [measure, measure, simulate_both, simulate_both]
     made = section(full, results)
     assert made.name == "needs"
-    totals, alone, reductions = (part for part in made.parts if isinstance(part, Table))
+    totals, alone = made.parts
     assert [row["cells, share of the full"] for row in alone.records()] == [0.5] * len(alone.rows)
-    assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["needs-shares"]
     assert "50% of the cells" in made.conclusion.sentence
     first, second = totals.records()
     assert (first["cells, full"], first["cells, specialised"], first["cycles, specialised"]) == (100, 50, 9)
     assert (first["pixels of another colour"], second["pixels of another colour"]) == (0, 3)
     assert [row[-1] for row in totals.grades] == ["good", "bad"]
-    assert [row["saves cells"] for row in reductions.records()] == [50, 50]
+    assert [row["saves cells"] for row in alone.records()] == [50, 50]
 
     quick = tasks(quick=True)
     assert [task.settings["name"] for task in quick] == list(QUICK_SCENES)
     several = counted | {"reasons": ["this", "that"], "alone": [half, half]}
-    totals, _, _, reductions = section(quick[:2], [several, several]).parts
+    totals, alone = section(quick[:2], [several, several]).parts
     assert totals.records()[0]["cycles, full"] is None
-    assert [row["saves cells"] for row in reductions.records()] == [None, None, 50] * 2
+    assert [row["left out, and why"] for row in alone.records()] == ["this", "that"] * 2
