@@ -31,7 +31,7 @@ from blysk.bench.report.frames import (
     view_of,
 )
 from blysk.bench.report.placed import placed
-from blysk.bench.report.points_text import front_table, fronts_of, readme_table, table, text
+from blysk.bench.report.points_text import accuracy_table, front_table, fronts_of, table, text
 from blysk.bench.report.section import Section
 from blysk.bench.store import Task
 from blysk.bench.tools.families import DEVICE
@@ -358,10 +358,10 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 @click.command()
 @click.argument("report", type=click.Path())
 def _print(report):
-    """Print README's table of accuracy from the report.json of a full report."""
+    """Print the table of docs/guide/accuracy.md from the report.json of a full report."""
     try:
         sections = json.loads(Path(report).read_text(encoding="utf-8"))["sections"]
-        click.echo(readme_table(sections["points"]["figures"]["points"]), nl=False)
+        click.echo(accuracy_table(sections["points"]["figures"]["points"]), nl=False)
     except (OSError, ValueError, KeyError, TypeError):
         raise InputError(report, "is not a full report", "give the report.json of `blysk bench`") from None
 

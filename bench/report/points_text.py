@@ -22,10 +22,10 @@ from blysk.golden.frames.compare import BORDER
 from blysk.golden.presets import METHODS, MIRROR_LOBES
 
 __all__ = [
+    "accuracy_table",
     "front",
     "front_table",
     "fronts_of",
-    "readme_table",
     "table",
     "text",
 ]
@@ -254,8 +254,8 @@ def front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Sequen
     )
 
 
-def readme_table(points: Sequence[Mapping[str, Any]]) -> str:
-    """README's table of accuracy, as Markdown: the designs of `DESIGNS`.
+def accuracy_table(points: Sequence[Mapping[str, Any]]) -> str:
+    """The table of docs/guide/accuracy.md, as Markdown: the designs of `DESIGNS`.
 
     Largest arithmetic and method error in LSB at each exponent; largest total error, cycles a pixel and
     millions of simulated pixels a second at exponent 100.

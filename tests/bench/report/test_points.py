@@ -28,7 +28,7 @@ from blysk.bench.report.frames import (
     speeds,
 )
 from blysk.bench.report.points import BEST, DESIGNS, GROUPS, QUICK_SIMULATED, section, tasks
-from blysk.bench.report.points_text import _is_comparable, front, readme_table
+from blysk.bench.report.points_text import _is_comparable, accuracy_table, front
 from blysk.bench.store import Task
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.metrics import ErrorFigures
@@ -448,11 +448,11 @@ def test_command_of_a_file():
 
 
 @pytest.mark.long
-def test_readme_table(measured):
+def test_accuracy_table(measured):
     chosen, results = measured
     kept = [(t, r) for t, r in zip(chosen, results, strict=True) if t.settings.get("method") == SIMULATED[0]]
     made = section(*zip(*kept, strict=True))
-    head, rule, line, end = readme_table(made.figures["points"]).split("\n")
+    head, rule, line, end = accuracy_table(made.figures["points"]).split("\n")
     assert head.startswith("| mesh | method | model | n = 10 | n = 100 | total | cycles a pixel |")
     assert len(rule.split("|")) == len(head.split("|")) == len(line.split("|"))
     assert end == ""
@@ -467,7 +467,7 @@ def test_readme_table(measured):
             assert cells[5:7] == [f"{result.total_error.max_lsb:.1f}", f"{frame.cycles / frame.pixels:.3f}"]
 
 
-def test_readme_table_of_no_report(tmp_path):
+def test_accuracy_table_of_no_report(tmp_path):
     (tmp_path / "report.json").write_text("{}")
     for name in ("report.json", "none.json"):
         found = CliRunner().invoke(points._print, [str(tmp_path / name)])
