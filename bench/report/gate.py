@@ -1,22 +1,18 @@
-"""Savings of the highlight gate: pixels, cycles of the compact style, and toggled register bits.
+"""Savings of the highlight gate: pixels, and cycles of the compact style.
 
 ``python -m blysk.bench.report.gate [MESH ...]`` renders each mesh (the teapot by default) at 320x240 by the
 method quadratic, or another one that serves a gate (``--method``), with one light, for the models cosquad,
 coscos4 and blinn_product and the exponents 2, 10, 50, 200 and 1000, in the compact and the throughput style,
-without and with the gate. It prints three tables in Markdown:
-gated spans and pixels, cycles, and toggled register bits. The exit status is 1 if a frame is not equal, to
-the bit, in all four simulations and by the bit-accurate model; 2 for bad input.
+without and with the gate. It prints two tables in Markdown: gated spans and pixels, and cycles. The exit
+status is 1 if a frame is not equal, to the bit, in all four simulations and by the bit-accurate model; 2 for
+bad input. The report's section `energy` has what the gate saves in toggled register bits.
 
 The methods quotient and renormalise have no gate: their spans bring no unit normals.
-
-Toggles are of registers: changes inside a multiplier between two registers are not counted. The gate works
-once a span and saves once a pixel, so the lengths of the frame's spans decide whether it saves toggles.
 """
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import NamedTuple
 
 import click
 import numpy as np
@@ -36,7 +32,6 @@ from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import Run, simulate
-from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.output import check_writable, write_json
@@ -47,7 +42,6 @@ __all__ = [
     "METHOD",
     "METHODS",
     "MODELS",
-    "Activity",
     "GateRow",
     "GateUnits",
     "Shares",
@@ -64,9 +58,6 @@ METHOD = "quadratic"
 
 MODELS = ("cosquad", "coscos4", "blinn_product")
 EXPONENTS = (2, 10, 50, 200, 1000)
-
-_SPECULAR = ("light_0.specular",)
-_GATE = ("highlight_gate", "decisions", "lengths", "undecided")
 
 
 @dataclass(frozen=True)
@@ -97,24 +88,6 @@ class Shares:
     behind_pixels: int
 
 
-class Activity(NamedTuple):
-    """Register bits that toggle in a frame.
-
-    Parameters
-    ----------
-    specular : int
-        Inside the specular unit.
-    gate : int
-        Inside the gate and the FIFOs about it.
-    pipeline : int
-        In the whole pipeline, with specular unit and gate.
-    """
-
-    specular: int
-    gate: int
-    pipeline: int
-
-
 @dataclass(frozen=True)
 class GateRow:
     """A frame without and with the gate: pairs are in this order.
@@ -130,8 +103,6 @@ class GateRow:
     cycles, compact_cycles : pair of int
         Cycles of the throughput and of the compact style, from the first write of a constant to the last
         pixel.
-    activity : pair of Activity
-        Toggles of the throughput style.
     identical : bool
         Whether the pixels of all four simulations, hidden ones too, equal those of the bit-accurate model.
     """
@@ -142,7 +113,6 @@ class GateRow:
     shares: Shares
     cycles: tuple[int, int]
     compact_cycles: tuple[int, int]
-    activity: tuple[Activity, Activity]
     identical: bool
 
 
@@ -212,7 +182,7 @@ class GateUnits:
         self.model, self.engine = model, engine
         designs = [preset(method, model, gate=gate) for gate in (False, True)]
         self.design = designs[0]
-        self._counters = [ToggleCounter(ShadingPipelineUnit(design)) for design in designs]
+        self._fast = [ShadingPipelineUnit(design) for design in designs]
         self._compact = [ShadingPipelineUnit(design.built(style="compact")) for design in designs]
 
     def compare(self, name: str, scene: Scene) -> GateRow:
@@ -220,9 +190,8 @@ class GateUnits:
         spans = prepare(scene, self.design).spans
         constants = FrameConstants.of(scene, 1)
         expected = self.design.compute(spans, constants)
-        fast = frames(self._counters, spans, constants, self.engine)
+        fast = frames(self._fast, spans, constants, self.engine)
         small = frames(self._compact, spans, constants, self.engine)
-        off, on = map(activity_of, fast)
         return GateRow(
             mesh=name,
             model=self.model,
@@ -230,23 +199,8 @@ class GateUnits:
             shares=shares_of(self.design, spans, constants),
             cycles=(fast[0].total_cycles, fast[1].total_cycles),
             compact_cycles=(small[0].total_cycles, small[1].total_cycles),
-            activity=(off, on),
             identical=all(same_pixels(run, expected) for run in (*fast, *small)),
         )
-
-
-def activity_of(run: Run) -> Activity:
-    """Toggles of a run of a `ToggleCounter` of a pipeline."""
-    toggles = {path: int(run.status[path]) for path in run.status.dtype.names}
-
-    def inside(names):
-        return sum(
-            count
-            for path, count in toggles.items()
-            if any(path == name or path.startswith(f"{name}.") for name in names)
-        )
-
-    return Activity(inside(_SPECULAR), inside(_GATE), sum(toggles.values()))
 
 
 def measure(
@@ -304,18 +258,6 @@ def _clock_cells(row: GateRow) -> tuple[str, ...]:
     return tuple(cell for pair in pairs for cell in (f"{pair[0]:,}", f"{pair[1]:,}", _saved(*pair)))
 
 
-def _activity_cells(row: GateRow) -> tuple[str, ...]:
-    off, on = row.activity
-    pixels = max(row.shares.pixels, 1)
-    return (
-        *(f"{count / pixels:.1f}" for count in (off.specular, on.specular, on.gate)),
-        _saved(off.specular, on.specular),
-        _saved(off.specular, on.specular + on.gate),
-        *(f"{count / pixels:.1f}" for count in (off.pipeline, on.pipeline)),
-        _saved(off.pipeline, on.pipeline),
-    )
-
-
 _TABLES: tuple[tuple[str, tuple[str, ...], Callable[[GateRow], tuple[str, ...]]], ...] = (
     (
         "Share of the spans that are gated, and of the pixels: gated, in spans without a highlight, without "
@@ -327,12 +269,6 @@ _TABLES: tuple[tuple[str, tuple[str, ...], Callable[[GateRow], tuple[str, ...]]]
         "Cycles of the frame, gate off and on: compact style, then one pixel a cycle.",
         ("off", "on", "saved", "off", "on", "saved"),
         _clock_cells,
-    ),
-    (
-        "Toggled register bits a pixel, one pixel a cycle: specular unit, gate; saved in the specular unit, "
-        "and less what the gate takes; whole pipeline, gate included.",
-        ("specular off", "on", "gate", "saved", "net", "pipeline off", "on", "saved"),
-        _activity_cells,
     ),
 )
 
@@ -372,7 +308,7 @@ def _print(rows: Sequence[GateRow]) -> None:
 )
 @click.option("--json", "figures", type=click.Path(), help="File for every figure.")
 def _command(meshes, method, size, models, exponents, figures) -> int:
-    """Measure the savings of the highlight gate: pixels, cycles, and toggled register bits."""
+    """Measure the savings of the highlight gate: pixels and cycles."""
     if figures:
         check_writable(figures)
     loaded = [load_mesh(source) for source in meshes or ["teapot"]]
@@ -380,13 +316,9 @@ def _command(meshes, method, size, models, exponents, figures) -> int:
     rows = list(progress(measure(loaded, models, exponents, *size, method), total=count, unit="frames"))
     if figures:
         settings = {"method": method, "width": size[0], "height": size[1]}
-        write_json(figures, settings | {"frames": [_figures(row) for row in rows]})
+        write_json(figures, settings | {"frames": [asdict(row) for row in rows]})
     _print(rows)
     return 0 if all(row.identical for row in rows) else 1
-
-
-def _figures(row: GateRow) -> dict:
-    return asdict(row) | {"activity": [of._asdict() for of in row.activity]}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
