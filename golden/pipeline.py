@@ -3,17 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 
 from blysk.golden.beats import Pixels, Spans
+from blysk.golden.build import Build
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants, by_material
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.gate import Gate
-from blysk.golden.lighting.highlight_operand import MAX_EXPONENT, HighlightOperand
+from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.methods.interpolator import Interpolator, Operands
@@ -22,43 +23,7 @@ from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.reference.lighting import Material
 
-__all__ = ["STYLES", "Build", "Design", "Pixels", "Spans"]
-
-
-STYLES = ("throughput", "compact")
-"""Styles of a design: one pixel a cycle, or few multipliers."""
-
-
-@dataclass(frozen=True)
-class Build:
-    """Build options of a design: they change its cost and its cycles, and no pixel.
-
-    Parameters
-    ----------
-    style : {"throughput", "compact"}
-        One pixel a cycle, or few multipliers.
-    setup_interval : int or None
-        Least number of cycles from a span to the next, for methods with this choice. A smaller number needs
-        more multipliers. ``None``: the largest up to 4 (``renormalise``: 3), or the largest of all in the
-        compact style.
-    exponent : int or None
-        Specular exponent, fixed at build time; ``None``: the exponent is a frame constant.
-
-    Raises
-    ------
-    ValueError
-        If the style is unknown or the exponent is out of range.
-    """
-
-    style: Literal["throughput", "compact"] = "throughput"
-    setup_interval: int | None = None
-    exponent: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.style not in STYLES:
-            raise ValueError(f"style must be one of {', '.join(STYLES)}, not {self.style!r}")
-        if self.exponent is not None and not 1 <= self.exponent <= MAX_EXPONENT:
-            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {self.exponent}")
+__all__ = ["Design", "Pixels", "Spans"]
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,7 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.pipeline import Design, Pixels, Spans
 
-__all__ = ["PIPES", "PixelPipelines"]
-
-PIPES = (1, 2, 4, 8)
-"""Allowed numbers of pipelines."""
+__all__ = ["PixelPipelines"]
 
 
 @dataclass(frozen=True)
@@ -24,27 +21,27 @@ class PixelPipelines:
     Parameters
     ----------
     design : Design
-        Design of every pipeline.
-    pipes : int
-        Number of pipelines: one of `PIPES`, at most the scanlines that the design has.
+        Design of every pipeline; its `Build` has their number, at most the scanlines that the design has.
 
     Raises
     ------
     ValueError
-        If the number of pipelines is not allowed.
+        If there are more pipelines than scanlines.
 
     Source: docs/theory/units.md#pipeline.
     """
 
-    design: Design = field(default_factory=Design)
-    pipes: int = 4
+    design: Design = field(default_factory=lambda: Design().built(pipes=4))
 
     def __post_init__(self) -> None:
-        if self.pipes not in PIPES:
-            raise ValueError(f"pipes must be one of {', '.join(map(str, PIPES))}, not {self.pipes}")
         if self.pipes > 1 << self.design.y_bits:
             rows = 1 << self.design.y_bits
             raise ValueError(f"pipes must be at most the number of scanlines, {rows}, not {self.pipes}")
+
+    @property
+    def pipes(self) -> int:
+        """Number of pipelines."""
+        return self.design.build.pipes
 
     def pipe_of(self, y: np.ndarray) -> np.ndarray:
         """Index of the pipeline of each scanline: y mod `pipes`."""

@@ -1,8 +1,9 @@
 """Designs by name: the methods and reflection models of the command line, the API and the tables."""
 
 from dataclasses import fields, replace
-from typing import Any, Literal, cast
+from typing import Any, cast
 
+from blysk.golden.build import Build, Style
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
@@ -18,7 +19,7 @@ from blysk.golden.methods import (
     renormalise_interpolator,
 )
 from blysk.golden.methods.interpolator import Interpolator, Operand
-from blysk.golden.pipeline import Build, Design
+from blysk.golden.pipeline import Design
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
 from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS, ReflectionModel
 
@@ -131,7 +132,7 @@ def preset(
     lights: int = 1,
     *,
     operand: Operand | None = None,
-    style: Literal["throughput", "compact"] = "throughput",
+    style: Style = "throughput",
     setup_interval: int | None = None,
     exponent: int | None = None,
     roughness: float | None = None,

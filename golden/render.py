@@ -69,13 +69,12 @@ class Renderer:
     Parameters
     ----------
     design : Design
-        The shading pipeline, of a method that takes normals or vectors.
+        The shading pipeline, of a method that takes normals or vectors. If its `Build` has a coarse depth
+        test, that drops a span before shading if all of its pixels are hidden. The picture is the same.
     geometry : Geometry
         The part that makes spans of triangles. It has ``lines`` for a method that takes true lines, and
         ``vectors`` for a method that takes vectors; with several lights ``rotates``, too. By default the
         geometry suits the method.
-    coarse : CoarseDepth, optional
-        Depth test that drops a span before shading if all of its pixels are hidden. The picture is the same.
 
     Raises
     ------
@@ -87,7 +86,6 @@ class Renderer:
 
     design: Design = field(default_factory=Design)
     geometry: Geometry = _OF_THE_METHOD
-    coarse: CoarseDepth | None = None
 
     def __post_init__(self) -> None:
         suits = self.design.interpolator.geometry(self.design.lights)
@@ -96,6 +94,11 @@ class Renderer:
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
             raise ValueError(f"method {self.design.method} takes {taken}, the geometry gives {given}")
+
+    @property
+    def coarse(self) -> CoarseDepth | None:
+        """The coarse depth test, if there is one."""
+        return self.design.build.coarse
 
     @property
     def mirrors(self) -> bool:

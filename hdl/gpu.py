@@ -27,8 +27,6 @@ class GpuUnit(wiring.Component):
     ----------
     parameters : Gpu
         Bit-accurate model, with all contents of memories.
-    setups, compact
-        As for `RenderUnit`.
 
     Members
     -------
@@ -42,9 +40,9 @@ class GpuUnit(wiring.Component):
     Source: docs/theory/video.md#bands.
     """
 
-    def __init__(self, parameters: Gpu, setups: int = 1, compact: bool | None = None):
+    def __init__(self, parameters: Gpu):
         self.parameters = parameters
-        self.draw = DrawUnit(parameters.drawing, setups, compact)
+        self.draw = DrawUnit(parameters.drawing)
         self.display = DisplayUnit(parameters.buffer)
         super().__init__(
             {

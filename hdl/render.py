@@ -82,8 +82,8 @@ class RenderUnit(wiring.Component):
     FIFO (compact without vectors or a coarse test: one in a register), and their depths pass the pipeline in
     another. With a coarse depth test a span also waits in the FIFO for the test's answer, and then leaves, or
     is dropped in one cycle. The units work at the same time: a frame takes as many cycles as the slowest of
-    them alone, if none waits for long. The style of the design's build is that of shading, and that of
-    geometry unless ``compact`` says otherwise.
+    them alone, if none waits for long. The design's `Build` has the styles, the lanes of
+    triangle setup and the coarse test.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
     for the pipeline to be empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
@@ -97,10 +97,6 @@ class RenderUnit(wiring.Component):
         Bit-accurate model.
     size : (int, int) or None
         As for `DepthTestUnit`.
-    setups : int
-        As for `GeometryUnit`.
-    compact : bool or None
-        Style of the geometry; ``None``: that of the design's build.
     clears : bool
         Whether the memory of depths is cleared for each picture, see `DepthTestUnit`. Else the unit is right
         for one picture, unless the memory outside is cleared between two.
@@ -133,23 +129,18 @@ class RenderUnit(wiring.Component):
         self,
         parameters: Renderer | None = None,
         size: tuple[int, int] | None = None,
-        setups: int = 1,
-        compact: bool | None = None,
         clears: bool = False,
     ):
         self.parameters = parameters or Renderer()
         design, geometry = self.parameters.design, self.parameters.geometry
-        grid = geometry.grid
-        compact = design.build.style == "compact" if compact is None else compact
-        rotates = geometry.rotates
-        self.geometry = GeometryUnit(grid, compact, geometry.lines, setups, geometry.vectors, rotates)
+        self.geometry = GeometryUnit(geometry, design.build)
         self.pipeline = ShadingPipelineUnit(design)
-        self._adapters(compact)
+        self._adapters(design.build.compact_geometry)
         coarse, bits = self.parameters.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
         self.depth = DepthTestUnit(*bits, size, clears)
         members = {
-            "i": In(stream.Signature(triangle_shape(grid))),
+            "i": In(stream.Signature(triangle_shape(geometry.grid))),
             "o": Out(stream.Signature(drawn_pixel_shape(design.x_bits, design.y_bits))),
             "write": In(stream.Signature(write_shape())),
             "constants": In(_constants_shape(clears or coarse is not None)),
@@ -208,7 +199,7 @@ class RenderUnit(wiring.Component):
         # There is room whenever the pipeline takes a span.
         connect_late_fifo(m, "depths", entering, waiting, pipeline.spans_inside + 1 + UNCOUNTED)
         pixel = pipeline.o
-        if compact := self.parameters.design.build.style == "compact":
+        if compact := self.parameters.design.build.compact:
             pixel = stream.Signature(pipeline.o.payload.shape()).create(path=("pixel",))
             connect_register(m, "waiting_pixel", pipeline.o, pixel)
         moves = depth.i.valid & depth.i.ready

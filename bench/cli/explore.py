@@ -7,9 +7,9 @@ import click
 
 from blysk.bench.tools.defaults import EXPONENT, SIZE
 from blysk.bench.tools.sweep import COSTS, DEGREES, OPERANDS, SERVED, WORDS, Sweep
+from blysk.golden.build import STYLES
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.pipeline import STYLES
 from blysk.golden.presets import METHODS, PUBLISHED
 from blysk.sim.errors import InputError
 from blysk.sim.frames.error_names import ERRORS

@@ -8,8 +8,8 @@ import click
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F
 from blysk.golden.lighting.intensity import MAX_LIGHTS
-from blysk.sim.api.design import design, renderer_of
-from blysk.sim.api.options import DESIGN, PIPES, PORTS, SETUPS
+from blysk.sim.api.design import built, design
+from blysk.sim.api.options import BUILD, DESIGN
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable
@@ -18,12 +18,12 @@ from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = ["command"]
 
+_BUILD = {name: BUILD[name] for name in ("pipes", "top", "setups")}
+
 
 @click.command()
 @options_of(DESIGN)
-@options_of(PIPES)
-@options_of({"top": PORTS["top"]})
-@options_of(SETUPS)
+@options_of(_BUILD)
 @click.option(
     "--family",
     "family_name",
@@ -77,9 +77,6 @@ def command(
     context,
     family_name,
     lights,
-    pipes,
-    top,
-    setups,
     every_method,
     units,
     target,
@@ -112,26 +109,13 @@ def command(
         blysk fpga --top render --style compact --target 115 --seeds 1
         blysk fpga --top render --style compact --by-unit
     """
-    pipes = pipes or PIPES["pipes"].default
-    family = DEVICES[family_name] if family_name else ECP5_85F if pipes > 1 else ECP5
-    family = replace(family, target=target)
-    chosen = given_options(context, list(DESIGN))
-    top = top or "shader"
-    given = [*chosen, *given_options(context, ["lights", "pipes", "top", "setups", "every_method"])]
+    chosen, build = given_options(context, DESIGN), given_options(context, _BUILD)
+    given = [*chosen, *build, *given_options(context, ["lights", "every_method"])]
     if units and given:
         option = f"--{given[0].replace('_', '-')}"
         raise InputError(option, "is for the pipeline", f"leave out {option} or --unit")
     if every_method and "method" in given:
         raise InputError("--method", "every method is placed", "leave out --method or --every-method")
-    if pipes > 1 and top != "shader":
-        raise InputError(f"--pipes {pipes}", "triangles go to one pipeline", "leave out --pipes or --top")
-    setups = setups or SETUPS["setups"].default
-    if setups > 1 and top == "shader":
-        raise InputError(
-            f"--setups {setups}",
-            "spans need no triangle setup",
-            "leave out --setups, or use --top geometry or render",
-        )
     if by_unit and (placing := given_options(context, ["target", "seeds", "jobs"])):
         raise InputError(
             f"--{next(iter(placing))}", "nothing is placed", "leave it out, or leave out --by-unit"
@@ -141,15 +125,15 @@ def command(
     unknown = [name for name in units if name.split(" ")[0] not in UNITS]
     if unknown:
         raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
-    if not units and not every_method:
-        made = design(lights=lights, **chosen)
-        if top != "shader":
-            renderer_of(made, "top", top)
+    if not units:
+        # Of every method the default stands for all: it serves each core.
+        built(design(lights=lights, **chosen), build)
+    several = build.get("pipes", 1) > 1
+    family = DEVICES[family_name] if family_name else ECP5_85F if several else ECP5
+    family = replace(family, target=target)
     from blysk.bench.tools.fpga import about, count_by_unit, pipelines_of, place, units_of
 
-    designs = list(
-        units_of(units) if units else pipelines_of(chosen, lights, every_method, pipes, top, setups)
-    )
+    designs = list(units_of(units) if units else pipelines_of(chosen, lights, every_method, build))
     # A missing tool is told of before the work.
     about(family)
     if by_unit:

@@ -25,7 +25,8 @@ from blysk.bench.command import progress, run
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.blocks import ENTRIES as UNITS
 from blysk.bench.tools.blocks import Entry, entries_of
-from blysk.golden.pipeline import STYLES, Design
+from blysk.golden.build import STYLES
+from blysk.golden.pipeline import Design
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.scene import Scene

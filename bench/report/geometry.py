@@ -6,7 +6,6 @@ normalises at every pixel.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
@@ -16,7 +15,9 @@ from blysk.bench.report.section import Cell, Drawing, Mark, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
 from blysk.bench.tools.families import DEVICE
+from blysk.bench.tools.fpga import name_of
 from blysk.golden.frames.triangle_frame import triangle_frame
+from blysk.golden.pipeline import Design
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
@@ -26,60 +27,29 @@ from blysk.sim.api.placed import read_store
 from blysk.sim.api.scene import scene
 from blysk.sim.frames.triangles import TriangleSimulator
 
-__all__ = ["CANDIDATES", "Candidate", "measure", "section", "tasks"]
+__all__ = ["CANDIDATES", "measure", "section", "tasks"]
 
 _METHODS = "quotient", "renormalise", "quadratic"
 _EXPONENTS = 1, 20, 100, 1000
 _TRIANGLES = 64, 1000, 10_000, 100_000
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A design from triangles to pixels, with the model `blinn` and one light.
-
-    Parameters
-    ----------
-    method : str
-        Method of shading.
-    style : str
-        Style of geometry and shading.
-    setup_interval : int or None
-        Setup interval of shading.
-    setups : int
-        Lanes of the triangle setup.
-    """
-
-    method: str
-    style: str = "throughput"
-    setup_interval: int | None = None
-    setups: int = 1
-
-    @property
-    def renderer(self) -> Renderer:
-        """Its bit-accurate model, for pictures of up to 1024x512."""
-        options = {"style": self.style, "setup_interval": self.setup_interval}
-        return Renderer(preset(self.method, "blinn", x_bits=10, y_bits=9, **options))
-
-    @property
-    def placed(self) -> str:
-        """Its name in ``blysk fpga``."""
-        style = f", {self.style}" if self.style != "throughput" else ""
-        interval = "" if self.setup_interval is None else f", interval {self.setup_interval}"
-        lanes = f", {self.setups} lanes" if self.setups > 1 else ""
-        return f"render {self.method}, blinn, 1 light{style}{interval}{lanes}"
+def _candidate(method: str, **build: Any) -> Design:
+    """A design for pictures of up to 1024x512, with the model ``blinn`` and one light."""
+    return preset(method, "blinn", x_bits=10, y_bits=9).built(top="render", **build)
 
 
 CANDIDATES = {
-    "quotient": Candidate("quotient"),
-    "quotient, two lanes": Candidate("quotient", setups=2),
-    "renormalise": Candidate("renormalise", setup_interval=2),
-    "renormalise, two lanes": Candidate("renormalise", setup_interval=2, setups=2),
-    "quadratic": Candidate("quadratic"),
-    "quotient, compact": Candidate("quotient", style="compact"),
-    "renormalise, compact": Candidate("renormalise", style="compact"),
-    "quadratic, compact": Candidate("quadratic", style="compact"),
+    "quotient": _candidate("quotient"),
+    "quotient, two lanes": _candidate("quotient", setups=2),
+    "renormalise": _candidate("renormalise", setup_interval=2),
+    "renormalise, two lanes": _candidate("renormalise", setup_interval=2, setups=2),
+    "quadratic": _candidate("quadratic"),
+    "quotient, compact": _candidate("quotient", style="compact"),
+    "renormalise, compact": _candidate("renormalise", style="compact"),
+    "quadratic, compact": _candidate("quadratic", style="compact"),
 }
-"""Designs to compare, by name."""
+"""Designs from triangles to pixels to compare, by name."""
 
 _QUICK = "quotient, compact", "renormalise, compact", "quadratic, compact"
 
@@ -103,11 +73,10 @@ def measure(design: str, triangles: Sequence[int], size: Sequence[int]) -> dict[
         of depths, before synthesis; and of each frame in ``frames`` ``triangles``, ``spans``, ``pixels``,
         ``cycles``, and the figures of `frame_figures`, with ``errors`` by exponent in place of ``error``.
     """
-    candidate, size = CANDIDATES[design], tuple(size)
-    renderer = candidate.renderer
-    unit = RenderUnit(renderer, setups=candidate.setups)
+    renderer, size = Renderer(CANDIDATES[design]), tuple(size)
+    unit = RenderUnit(renderer)
     totals = cost_of(unit).totals
-    simulator = TriangleSimulator(renderer, size, setups=candidate.setups)
+    simulator = TriangleSimulator(renderer, size)
     return {
         "geometry_multipliers": unit.geometry.multipliers,
         **{name: totals[name] for name in ("multipliers", "register_bits", "memory_bits")},
@@ -173,7 +142,7 @@ def _verdict(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -
 
 def _beside(names: Sequence[str], pair: Sequence[Any], rates: Mapping[str, Sequence[float]]) -> str:
     """What the second of two designs takes of the first one's cycles, time and multipliers."""
-    seeds = [rates.get(CANDIDATES[name].placed, ()) for name in names]
+    seeds = [rates.get(name_of(CANDIDATES[name]), ()) for name in names]
     clocks = [median(of) for of in seeds] if all(seeds) else []
     words = []
     for own, rival in zip(*(of["frames"] for of in pair), strict=True):
@@ -200,7 +169,7 @@ def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> 
     columns += ("pixels of another triangle", "largest error, LSB")
     rows: list[tuple[Cell, ...]] = []
     for name, of in designs.items():
-        placed = rates.get(CANDIDATES[name].placed)
+        placed = rates.get(name_of(CANDIDATES[name]))
         errors = [error for frame in of["frames"] for error in frame["errors"].values() if error is not None]
         rows.append(
             (
@@ -229,7 +198,7 @@ def _drawing(designs: Mapping[str, Any]) -> Drawing:
     for name, of in designs.items():
         candidate, frames = CANDIDATES[name], of["frames"]
         style = style_of(candidate.method)
-        dash = ":" if candidate.setups > 1 else "--" if candidate.style == "compact" else "-"
+        dash = ":" if candidate.build.setups > 1 else "--" if candidate.build.compact else "-"
         panel.plot(
             [frame["pixels"] / frame["triangles"] for frame in frames],
             [frame["cycles"] / frame["pixels"] for frame in frames],

@@ -7,7 +7,7 @@ from typing import Any
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.speed import pipes
 from blysk.bench.store import Task
-from blysk.golden.pixel_pipelines import PIPES
+from blysk.golden.build import PIPES
 
 __all__ = ["measure", "section", "tasks"]
 

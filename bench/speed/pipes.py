@@ -18,8 +18,8 @@ import numpy as np
 from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.command import progress
 from blysk.bench.ring import ring
+from blysk.golden.build import PIPES
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.pixel_pipelines import PIPES
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.sim.frames.frame import FrameSimulator
@@ -98,7 +98,7 @@ def measure(
         Method of the design, which has one light.
     """
     design = preset(method, model_of(method))
-    simulator = FrameSimulator(design, "auto", pipes)
+    simulator = FrameSimulator(design.built(pipes=pipes))
     for name in meshes:
         mesh = mesh_of(name)
         scene = scene_for(mesh, _EXPONENT, width, height)

@@ -83,7 +83,7 @@ def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
     """The bitstream of a drawing, see `build`; its steps are shown."""
     rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
     with steps() as show_step:
-        top = BoardTop(board, GpuUnit(gpu, compact=board.compact), plan)
+        top = BoardTop(board, GpuUnit(gpu), plan)
         return build(board, top, rates, seeds, show_step)
 
 
@@ -161,7 +161,7 @@ def simulated(
         rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
         mode = gpu.buffer.mode
         with progress(total=count, unit="frames") as bar:
-            top = OneClock(GpuUnit(gpu, compact=board.compact), rate)
+            top = OneClock(GpuUnit(gpu), rate)
             shown = show(top, mode, count, progress=lambda pixels: bar.update(pixels / mode.cycles - bar.n))
         seconds = perf_counter() - start
         for path, frame in zip(paths, shown.frames, strict=True):
@@ -193,7 +193,7 @@ def simulated(
 def toggled(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
     """Toggled register bits a frame, of the drawing and of the display, which are printed."""
     rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
-    top = ToggleCounter(OneClock(GpuUnit(gpu, compact=board.compact), rate))
+    top = ToggleCounter(OneClock(GpuUnit(gpu), rate))
     counts = show(top, gpu.buffer.mode, count).status
     found = {
         part: round(

@@ -104,7 +104,7 @@ def _design(settings: Settings, scene: Scene, board: Board) -> Design:
         raise settings.refuse("lights", reason, "give directions of lights, and a distant viewer", "")
     if len(scene.lights) > MAX_LIGHTS:
         raise settings.refuse("lights", f"{len(scene.lights)} lights", f"give at most {MAX_LIGHTS}", "")
-    made = design_of(settings, max(1, len(scene.lights)), len(scene.materials))
+    made = design_of(settings, max(1, len(scene.lights)), len(scene.materials)).built(top="render")
     try:
         Renderer(made)
     except ValueError as error:
@@ -112,8 +112,8 @@ def _design(settings: Settings, scene: Scene, board: Board) -> Design:
         raise settings.refuse("method", reason, remedy) from None
     intervals = unit_of(made.interpolator).setup_intervals(made.interpolator)
     if board.compact and settings["setup_interval"] is None and _COMPACT_INTERVAL in intervals:
-        return made.built(setup_interval=_COMPACT_INTERVAL)
-    return made
+        made = made.built(setup_interval=_COMPACT_INTERVAL)
+    return made.built(geometry_style="compact") if board.compact else made
 
 
 def _presets(scene: Scene, up: Any) -> list[Scene]:

@@ -34,7 +34,7 @@ from blysk.bench.tools.design_space import (
     tasks_of,
 )
 from blysk.bench.tools.sweep import COSTS, Candidate, Sweep
-from blysk.golden.pipeline import STYLES
+from blysk.golden.build import STYLES
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.errors import InputError
 from blysk.sim.frames.error_names import ERRORS

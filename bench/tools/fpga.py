@@ -32,17 +32,18 @@ from blysk.bench.tools.families import ECP5, Family, Parts
 from blysk.bench.tools.parts_by_unit import parts_by_unit, sum_parts
 from blysk.bench.tools.place_and_route import Layout, lay_out, versions_of
 from blysk.bench.tools.tool_runner import TooLarge
+from blysk.golden.pipeline import Design
 from blysk.golden.presets import METHODS
-from blysk.hdl.bus.tops import TOPS
-from blysk.sim.api.design import design, renderer_of
-from blysk.sim.api.verilog import pixel_pipelines
-from blysk.sim.errors import InputError
+from blysk.hdl.bus.bus import core_of
+from blysk.sim.api.design import built, design
+from blysk.sim.errors import InputError, OptionError
 from blysk.sim.output import write_json
 from blysk.sim.units.names import UNITS
 
 __all__ = [
     "about",
     "count_by_unit",
+    "name_of",
     "pipelines_of",
     "place",
     "rerouted",
@@ -127,25 +128,40 @@ def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Co
         yield from ((entry.title, entry.variant.unit) for entry in found)
 
 
+def name_of(design: Design, operand: str | None = None) -> str:
+    """Name of a design in tables: core, method, model, lights, and build options that are no defaults."""
+    build = design.build
+    name = [f"{'pipeline' if build.top == 'shader' else build.top} {design.method}"]
+    name += [design.model or "no model"]
+    name += [f"{design.lights} lights" if design.lights != 1 else "1 light"]
+    name += [operand] if operand else []
+    name += [build.style] if build.style != "throughput" else []
+    name += [f"interval {build.setup_interval}"] if build.setup_interval else []
+    name += ["gate"] if design.gate else []
+    name += [f"{build.pipes} pipelines"] if build.pipes > 1 else []
+    name += [f"{build.setups} lanes"] if build.setups > 1 else []
+    return ", ".join(name)
+
+
 def pipelines_of(
-    given: Mapping[str, Any], lights: int, every: bool, pipes: int = 1, top: str = "shader", setups: int = 1
+    given: Mapping[str, Any], lights: int, every: bool, build: Mapping[str, Any] | None = None
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """The pipeline or another core by the given options, with one method or with every method."""
+    """The core by options of design and build, with one method, or with every method that serves it.
+
+    Raises
+    ------
+    OptionError
+        If a value is not accepted, or the only method does not serve the core.
+    """
     for method in METHODS if every else (given.get("method"),):
-        chosen = {**given, "method": method}
-        made = design(lights=lights, **chosen)
-        name = [f"{'pipeline' if top == 'shader' else top} {made.method}", made.model or "no model"]
-        name += [f"{lights} lights" if lights != 1 else "1 light"]
-        name += [chosen[option] for option in ("operand",) if option in chosen]
-        name += [made.build.style] if made.build.style != "throughput" else []
-        name += [f"interval {chosen['setup_interval']}"] if "setup_interval" in chosen else []
-        name += ["gate"] if made.gate else []
-        name += [f"{pipes} pipelines"] if pipes > 1 else []
-        name += [f"{setups} lanes"] if setups > 1 else []
-        if top == "shader":
-            yield ", ".join(name), partial(pixel_pipelines, made, pipes)
-        elif not (made.takes_values or (made.takes_vectors and lights > 1)) or not every:
-            yield ", ".join(name), partial(TOPS[top].unit, renderer_of(made, "top", top), setups=setups)
+        made = design(lights=lights, **{**given, "method": method})
+        try:
+            made = built(made, build or {})
+        except OptionError as error:
+            if every and error.option == "top":
+                continue
+            raise
+        yield name_of(made, given.get("operand")), partial(core_of, made)
 
 
 def about(family: Family) -> dict[str, Any]:

@@ -8,12 +8,13 @@ from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple, get_args
 
+from blysk.golden.build import STYLES
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.middle_normal import MiddleNormal
-from blysk.golden.pipeline import STYLES, Design
+from blysk.golden.pipeline import Design
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED, preset
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ from blysk.golden.render import Renderer
 from blysk.hdl.bus.axi_lite import AxiLite, AxiLiteUnit
 from blysk.hdl.bus.framing import FramingUnit
 from blysk.hdl.bus.registers import RegistersUnit
+from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.bus.wishbone import Wishbone, WishboneUnit
 from blysk.hdl.port_descriptions import COUNTER_TEXTS
 
-__all__ = ["BUSES", "PORT_DESCRIPTIONS", "AxiStream", "BusUnit"]
+__all__ = ["BUSES", "PORT_DESCRIPTIONS", "AxiStream", "BusUnit", "core_of"]
 
 BUSES = {"axi": ("s_axil", AxiLite, AxiLiteUnit), "wishbone": ("wb", Wishbone, WishboneUnit)}
 """Buses by name: the member for registers, its signature, and the unit behind it."""
@@ -55,14 +56,10 @@ class BusUnit(wiring.Component):
 
     Parameters
     ----------
-    bus : str
-        One of `BUSES`.
-    top : str
-        One of `TOPS`.
-    parameters : Design or Renderer
-        Parameters of the core.
+    design : Design
+        Design of the core; its `Build` says which of `TOPS` the core is, and which of `BUSES` the bus.
     **options
-        Keyword arguments of its constructor.
+        Keyword arguments of the core's constructor.
 
     Members
     -------
@@ -83,9 +80,9 @@ class BusUnit(wiring.Component):
     Source: docs/theory/bus.md#streams.
     """
 
-    def __init__(self, bus: str, top: str, parameters: Design | Renderer, **options):
-        self.framing = FramingUnit(top, parameters, **options)
-        member, signature, front = BUSES[bus]
+    def __init__(self, design: Design, **options):
+        self.framing = FramingUnit(design, **options)
+        member, signature, front = BUSES[design.build.bus]
         self._member, self._front = member, front()
         counters = [
             (name, field.shape.width, COUNTER_TEXTS[name])
@@ -94,9 +91,7 @@ class BusUnit(wiring.Component):
         ]
         of_core = self.framing.core.signature.members
         constants = self.framing.constants.shape() if "constants" in of_core else None
-        design, axes = parameters, ()
-        if isinstance(parameters, Renderer):
-            design, axes = parameters.design, parameters.axes
+        axes = Renderer(design).axes if design.build.takes_triangles else ()
         self.map = RegisterMap(
             self.framing.top.title,
             counters,
@@ -154,3 +149,15 @@ class BusUnit(wiring.Component):
         if "memory" in self.signature.members:
             wiring.connect(m, framing.memory, wiring.flipped(self.memory))
         return m
+
+
+def core_of(design: Design) -> wiring.Component:
+    """The core that a design's `Build` asks for: one of `TOPS`, with its own streams or on a bus.
+
+    Raises
+    ------
+    ValueError
+        If the design does not fit triangles (see `Renderer`), or has fewer scanlines than pipelines.
+    """
+    build = design.build
+    return TOPS[build.top].unit(design) if build.bus == "native" else BusUnit(design)

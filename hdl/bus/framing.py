@@ -7,7 +7,6 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.bus.byte_layout import ByteLayout
 from blysk.golden.bus.framing import PACKETS, Framing
 from blysk.golden.pipeline import Design
-from blysk.golden.render import Renderer
 from blysk.hdl.bus.byte_layout import bytes_of, fields_of, layout_of, misfits
 from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.core.stream import skid_buffer
@@ -29,10 +28,6 @@ def made_shape(layout: ByteLayout) -> data.StructLayout:
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1, "first": 1, "end": 1})
 
 
-def _design_of(core) -> Design:
-    return core.parameters.design if isinstance(core.parameters, Renderer) else core.parameters
-
-
 class FramingUnit(wiring.Component):
     """A core between streams of bytes with the borders of frames: `Framing` is the bit-accurate model.
 
@@ -45,12 +40,10 @@ class FramingUnit(wiring.Component):
 
     Parameters
     ----------
-    top : str
-        One of `TOPS`.
-    parameters : Design or Renderer
-        Parameters of the core.
+    design : Design
+        Design of the core; its `Build` says which of `TOPS` the core is.
     **options
-        Keyword arguments of its constructor.
+        Keyword arguments of the core's constructor.
 
     Members
     -------
@@ -68,12 +61,14 @@ class FramingUnit(wiring.Component):
     Source: docs/theory/bus.md#streams; not in the documents.
     """
 
-    def __init__(self, top: str = "shader", parameters: Design | Renderer | None = None, **options):
+    def __init__(self, design: Design | None = None, **options):
+        design = design or Design()
+        top = design.build.top
         self.top, self.packets = TOPS[top], PACKETS[top]
-        self.core = self.top.unit(parameters, **options)
+        self.core = self.top.unit(design, **options)
         payloads = self.core.i.payload.shape(), self.core.o.payload.shape()
         self._without = ("last",) if self.packets == "span" else ()
-        below = {} if top == "geometry" else {"material": _design_of(self.core).materials}
+        below = {} if top == "geometry" else {"material": design.materials}
         given, made = layout_of(payloads[0], below=below), layout_of(payloads[1], self._without)
         self.parameters = Framing(given, made, self.packets)
         counters = {"frames": unsigned(COUNTER_BITS), "misfits": unsigned(COUNTER_BITS), "busy": unsigned(1)}

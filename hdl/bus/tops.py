@@ -1,4 +1,4 @@
-"""Cores that a bus can be put round."""
+"""The cores that a build asks for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from amaranth.hdl import Value
 from amaranth.lib import wiring
 
-from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.pipeline import Design
+from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.render import Renderer
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit
 from blysk.hdl.render import RenderUnit
 
 __all__ = ["TOPS", "Top"]
@@ -25,9 +26,7 @@ class Top:
     title : str
         Its input and its output, as in ``triangles to spans``.
     unit : callable
-        Makes the core from a `Design` or a `Renderer`; keywords go to its constructor.
-    takes_triangles : bool
-        Whether triangles go in, and ``unit`` takes a `Renderer`; else spans go in, and it takes a `Design`.
+        Makes the core from a `Design`; keywords go to the constructor of its unit.
     watch : callable
         Makes a signal from the core, before it is elaborated: high while anything is inside, except a beat
         that waits at ``o``.
@@ -35,28 +34,27 @@ class Top:
 
     title: str
     unit: Callable[..., wiring.Component]
-    takes_triangles: bool
     watch: Callable[[wiring.Component], Value]
 
 
-def _geometry(parameters: Renderer, **options) -> GeometryUnit:
-    geometry: Geometry = parameters.geometry
-    compact = parameters.design.build.style == "compact"
-    return GeometryUnit(geometry.grid, compact, geometry.lines, vectors=geometry.vectors, **options)
+def _geometry(design: Design) -> GeometryUnit:
+    return GeometryUnit(Renderer(design).geometry, design.build)
 
 
-def _shader(parameters: Design) -> ShadingPipelineUnit:
-    return ShadingPipelineUnit(parameters)
+def _shader(design: Design) -> wiring.Component:
+    if design.build.pipes == 1:
+        return ShadingPipelineUnit(design)
+    return (MergedPipelinesUnit if design.build.merged else PixelPipelinesUnit)(PixelPipelines(design))
 
 
-def _render(parameters: Renderer, **options) -> RenderUnit:
-    return RenderUnit(parameters, clears=True, **options)
+def _render(design: Design, **options) -> RenderUnit:
+    return RenderUnit(Renderer(design), clears=True, **options)
 
 
 TOPS = {
     # A write is accepted while no span is inside.
-    "shader": Top("spans to pixels", _shader, False, lambda core: ~core.write.ready),
-    "geometry": Top("triangles to spans", _geometry, True, lambda core: ~core.idle),
-    "render": Top("triangles to pixels", _render, True, lambda core: ~core.idle),
+    "shader": Top("spans to pixels", _shader, lambda core: ~core.write.ready),
+    "geometry": Top("triangles to spans", _geometry, lambda core: ~core.idle),
+    "render": Top("triangles to pixels", _render, lambda core: ~core.idle),
 }
-"""Cores by name; those of `PACKETS`."""
+"""Cores by name, as in `Build`."""

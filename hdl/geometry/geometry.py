@@ -4,10 +4,11 @@ from amaranth.hdl import Array, Module, Signal, Value, unsigned
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.geometry.geometry import COUNTERS
+from blysk.golden.build import Build
+from blysk.golden.geometry.geometry import COUNTERS, Geometry
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.span_halver import SpanHalver
-from blysk.golden.geometry.triangles import ATTRIBUTES, GRID, Grid
+from blysk.golden.geometry.triangles import ATTRIBUTES, Grid
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register, hold_output
@@ -178,26 +179,11 @@ class GeometryUnit(wiring.Component):
 
     Parameters
     ----------
-    grid : Grid
-        Fraction bits of the coordinates.
-    compact : bool
-        The compact style.
-    lines : bool
-        Whether spans have their true line, N/W at both ends, in place of unit normals; then no span is cut
-        into pieces, and no normal is normalised.
-    setups : int
-        Number of lanes, from the edges to the planes, that triangles take in turns: 1 or 2.
-    vectors : bool
-        Whether spans have N/W at the first pixel and its step in place of unit normals: they are cut by
-        `SpanHalver`, and no normal is normalised; not with ``lines``.
-    rotates : bool
-        Whether vectors are to be turned into the frames of further lights, see `VectorAdapter`; only with
-        ``vectors``.
-
-    Raises
-    ------
-    ValueError
-        If ``setups`` is another number, or spans are to have both lines and vectors.
+    parameters : Geometry
+        Bit-accurate model: grid, and what spans have.
+    build : Build
+        Style of the geometry, and ``setups``: the number of lanes, from the edges to the planes, that
+        triangles take in turns.
 
     Members
     -------
@@ -218,26 +204,15 @@ class GeometryUnit(wiring.Component):
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
-    def __init__(
-        self,
-        grid: Grid = GRID,
-        compact: bool = False,
-        lines: bool = False,
-        setups: int = 1,
-        vectors: bool = False,
-        rotates: bool = False,
-    ):
-        if setups not in (1, 2):
-            raise ValueError(f"setups must be 1 or 2, not {setups!r}")
-        if lines and vectors:
-            raise ValueError("spans have true lines or vectors, not both")
-        if rotates and not vectors:
-            raise ValueError("only vectors are turned into the frames of lights")
-        self.grid, self.compact, self.lines, self.vectors = grid, compact, lines, vectors
-        self.rotates = rotates
+    def __init__(self, parameters: Geometry | None = None, build: Build | None = None):
+        self.parameters, build = parameters or Geometry(), build or Build(top="geometry")
+        self.grid, self.compact = self.parameters.grid, build.compact_geometry
+        self.lines, self.vectors = self.parameters.lines, self.parameters.vectors
+        self.rotates = self.parameters.rotates
+        grid, compact, lines, vectors = self.grid, self.compact, self.lines, self.vectors
         self._sort = VertexSortUnit(grid, compact)
-        self._lanes = [_TriangleSetup(grid, compact, not (lines or vectors)) for _ in range(setups)]
-        self.interval = -(-self._lanes[0].interval // setups)
+        self._lanes = [_TriangleSetup(grid, compact, not (lines or vectors)) for _ in range(build.setups)]
+        self.interval = -(-self._lanes[0].interval // build.setups)
         self._attributes, self._walk, self._clip = (
             SpanAttributesUnit(compact, vectors),
             EdgeWalkUnit(grid, skid=not compact),
@@ -249,10 +224,10 @@ class GeometryUnit(wiring.Component):
             shape = vector_spans_shape()
             if compact:
                 # One unit cuts spans and makes their words.
-                self._normals = self._halver = SerialVectorsUnit(rotates)
+                self._normals = self._halver = SerialVectorsUnit(self.rotates)
             else:
-                self._normals = VectorAdapterUnit(VectorAdapter(rotates))
-                self._halver = SpanHalverUnit(SpanHalver(rotates))
+                self._normals = VectorAdapterUnit(VectorAdapter(self.rotates))
+                self._halver = SpanHalverUnit(SpanHalver(self.rotates))
         else:
             self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
         normaliser = 0 if lines or vectors else self._normals.multipliers

@@ -55,8 +55,6 @@ class DrawUnit(wiring.Component):
     ----------
     parameters : Drawing
         Bit-accurate model, with all contents of memories.
-    setups, compact
-        As for `RenderUnit`.
 
     Members
     -------
@@ -74,10 +72,10 @@ class DrawUnit(wiring.Component):
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: Drawing, setups: int = 1, compact: bool | None = None):
+    def __init__(self, parameters: Drawing):
         self.parameters = given = parameters
         design = given.renderer.design
-        self.render = RenderUnit(given.renderer, None, setups, compact)
+        self.render = RenderUnit(given.renderer)
         self.depth = BandDepthUnit(BandDepth((given.size[0], given.lines)), design.x_bits, design.y_bits)
         self.mesh, self.commands = MeshMemoryUnit(given.mesh), DrawCommandsUnit(given.commands)
         self.vertex = VertexUnit(given.transform, given.mesh.index_bits)

@@ -1,22 +1,16 @@
 """Headers and port descriptions of cores on a bus, and of geometry alone."""
 
 from collections.abc import Sequence
-from typing import Any
-
-from amaranth.lib.wiring import Component
 
 from blysk.golden.bus.registers import CONSTANTS
-from blysk.golden.pipeline import Design
-from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import PORT_DESCRIPTIONS, BusUnit
-from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCRIPTIONS
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
 from blysk.sim.api.bus_documents import frame_text, layout_lines
 
-__all__ = ["bus_descriptions", "bus_header", "triangle_descriptions", "unit_of_top"]
+__all__ = ["bus_descriptions", "bus_header", "triangle_descriptions"]
 
 _MARKS = {
     "span": "the last pixel of its span",
@@ -29,23 +23,6 @@ _PATHS = {
     "axi": "AXI4-Lite, s_axil_*",
     "wishbone": "Wishbone B4, wb_*, classic or pipelined; wb_adr counts words",
 }
-
-
-def unit_of_top(top: str, bus: str, parameters: Design | Renderer, **options: Any) -> Component:
-    """The unit of a core, on a bus or with its own ports.
-
-    Parameters
-    ----------
-    top, bus : str
-        Names of the core and the bus; ``"native"`` for its own ports.
-    parameters : Design or Renderer
-        Parameters of the core's constructor.
-    **options
-        Options of the constructor.
-    """
-    return (
-        TOPS[top].unit(parameters, **options) if bus == "native" else BusUnit(bus, top, parameters, **options)
-    )
 
 
 def triangle_descriptions(unit: RenderUnit | GeometryUnit) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """A design as Python gives it: with its cost."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from statistics import median
 from typing import Any
 
@@ -99,12 +99,13 @@ class Design(pipeline.Design):
 
     def placed(self) -> dict[str, Any]:
         """Figures of `DesignCost` from the committed placement of this very design; empty without one."""
+        shading = replace(self, build=self.build.shading)
         for entry in read_store():
             words = design_of(entry["design"])
             if words is None or words[:2] != (self.method, self.model):
                 continue
             operand: Any = words[2] if len(words) > 2 else None
-            if preset(words[0], words[1], operand=operand) == self:
+            if preset(words[0], words[1], operand=operand) == shading:
                 return {
                     **{name: entry[name] for name in ("luts", "flip_flops", "block_rams", "device")},
                     "clock_mhz": median(entry["fmax_mhz"]),

@@ -1,21 +1,26 @@
 """Designs by the options of the command line."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, Unpack
+from typing import Any, TypeVar, Unpack, cast
 
+from blysk.golden.build import BuildError
+from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import Design
+from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED, preset
 from blysk.golden.render import Renderer
 from blysk.sim.api import costed_design
-from blysk.sim.api.options import COUNTS, DESIGN, DesignOptions
-from blysk.sim.api.settings import Settings, read_settings
+from blysk.sim.api.options import BUILD, COUNTS, DESIGN, DesignOptions
+from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.api.signature import with_options
 from blysk.sim.errors import OptionError
 
-__all__ = ["design", "design_of", "refused_counts", "renderer_of"]
+__all__ = ["built", "design", "design_of", "refused_counts"]
+
+AnyDesign = TypeVar("AnyDesign", bound=Design)
 
 
 @with_options({**COUNTS, **DESIGN})
@@ -117,26 +122,46 @@ def _check_parameter(settings: Settings, design: Design) -> None:
             raise settings.refuse(name, f"the model {design.model} has none", remedy)
 
 
-def renderer_of(design: Design, option: str = "geometry", value: str = "hardware") -> Renderer:
-    """A renderer from triangles to pixels with a shading pipeline.
+def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
+    """A design, built by options of `BUILD`; others stay as its `Build` has them.
 
     Parameters
     ----------
     design : Design
-        The pipeline.
-    option, value : str
-        Option and value that ask for it, for the error.
+        The design.
+    given : dict
+        Values by name, unchecked; ``None`` counts as not given.
 
     Raises
     ------
     OptionError
-        If the design does not fit triangles, see `Renderer`.
+        If a value is not accepted, two exclude each other, or the design does not serve the core.
     """
+    values = checked(given, BUILD)
+    hardware = values.pop("geometry", None) == "hardware"
+    if hardware and values.setdefault("top", "render") == "shader":
+        remedy = "leave one of them out"
+        raise OptionError("top", "shader", "it takes spans, and hardware geometry triangles", remedy)
+    if "coarse" in values:
+        values["coarse"] = CoarseDepth(*values["coarse"])
     try:
-        return Renderer(design)
+        made = cast(AnyDesign, design.built(**values))
+    except BuildError as error:
+        value = values.get(error.option, "")
+        shown = value if isinstance(value, int | str) and value is not True else ""
+        raise OptionError(error.option, shown, error.reason, error.remedy) from None
+    try:
+        PixelPipelines(made)
     except ValueError as error:
-        reason, _, remedy = str(error).partition("; ")
-        raise OptionError(option, value, reason, f"{remedy}, or spans from software") from None
+        raise OptionError("pipes", made.build.pipes, str(error), "give fewer") from None
+    if made.build.takes_triangles:
+        try:
+            Renderer(made)
+        except ValueError as error:
+            option, value = ("geometry", "hardware") if hardware else ("top", made.build.top)
+            reason, _, remedy = str(error).partition("; ")
+            raise OptionError(option, value, reason, f"{remedy}, or spans from software") from None
+    return made
 
 
 @contextmanager

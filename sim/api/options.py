@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, ge
 
 import click
 
-from blysk.golden.bus.framing import BUSES, PACKETS
+from blysk.golden.build import PIPES, PORTS, SETUPS, STYLES, TOPS, Style
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
-from blysk.golden.pipeline import STYLES
-from blysk.golden.pixel_pipelines import PIPES as PIPE_COUNTS
 from blysk.golden.presets import METHODS, MODEL_LINES, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
@@ -41,22 +39,19 @@ if TYPE_CHECKING:
     import trimesh
 
 __all__ = [
-    "COARSE",
+    "BUILD",
     "COEFFICIENTS",
     "COUNTS",
     "DESIGN",
     "DOCUMENTS",
     "GEOMETRIES",
-    "GEOMETRY",
     "LIGHTS",
     "MAX_FRAMES",
-    "PIPES",
-    "PORTS",
     "RENDERING",
     "SCENE",
-    "SETUPS",
     "SLOW_SIZE",
     "VIEW_WORDS",
+    "BuildOptions",
     "ColorLike",
     "DesignOptions",
     "Engine",
@@ -352,7 +347,7 @@ DESIGN: dict[str, Option] = {
         Choice("style", STYLES), "throughput", "One pixel a cycle, or few multipliers.", "pipeline.style"
     ),
 }
-"""Options of a design, but for its counts."""
+"""Options of a design, but for its counts; ``setup_interval`` and ``style`` are fields of `Build`."""
 
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
@@ -365,53 +360,38 @@ COUNTS: dict[str, Option] = {
 }
 """Counts of a design, for commands without a scene; a scene gives its own."""
 
-GEOMETRY: dict[str, Option] = {
+BUILD: dict[str, Option] = {
     "geometry": Option(
         Choice("geometry", GEOMETRIES),
         "software",
         "Where triangles become spans: in software, or in the geometry RTL, which also tests depths.",
         "pipeline.geometry",
     ),
-}
-"""Option of a rendering and of Verilog."""
-
-PIPES: dict[str, Option] = {
     "pipes": Option(
-        Few(*PIPE_COUNTS),
+        Few(*PIPES),
         1,
         "Number of pipelines, N. Pipeline k shades the scanlines with y mod N = k.",
         "pipeline.pipes",
     ),
-}
-"""Option of a rendering, of Verilog and of place and route."""
-
-PORTS: dict[str, Option] = {
+    "merged": Option(Truth(), False, "With --pipes: one stream of pixels, in the order of the spans."),
     "top": Option(
-        Choice("core", PACKETS),
+        Choice("core", TOPS),
         None,
         "shader: spans to pixels. geometry: triangles to spans. render: triangles to pixels.  [default: "
         "shader; with hardware geometry render]",
     ),
     "bus": Option(
-        Choice("bus", ("native", *BUSES)),
+        Choice("bus", PORTS),
         "native",
         "Ports of the core. native: its own streams. axi, wishbone: AXI4-Stream, with registers on AXI4-Lite "
         "or Wishbone; -o X.v then also writes X.md, X.h and X.svd.",
     ),
-}
-"""Options of Verilog alone."""
-
-SETUPS: dict[str, Option] = {
     "setups": Option(
-        Few(1, 2),
+        Few(*SETUPS),
         1,
         "Lanes of triangle setup in hardware geometry. Two lanes take twice as many small triangles.",
         "pipeline.setups",
     ),
-}
-"""Option of a rendering, of Verilog and of place and route, for hardware that takes triangles."""
-
-COARSE: dict[str, Option] = {
     "coarse": Option(
         Size(),
         None,
@@ -419,18 +399,19 @@ COARSE: dict[str, Option] = {
         "size. Needs a core from triangles to pixels.",
     ),
 }
-"""Option of Verilog, for a core from triangles to pixels."""
+"""Options of a core, of Verilog: fields of `Build`, which `design.built` sets; ``style`` and
+``setup_interval`` are in `DESIGN`."""
 
 RENDERING: dict[str, Option] = {
-    **GEOMETRY,
-    **SETUPS,
+    **{name: BUILD[name] for name in ("geometry", "setups")},
+    # The picture has a size: the test is for that.
     "coarse": Option(
         Truth(),
         False,
         "With --geometry hardware: add a coarse depth test, which drops hidden spans before shading.",
         "pipeline.coarse",
     ),
-    **PIPES,
+    "pipes": BUILD["pipes"],
     "specialise": Option(
         Truth(),
         False,
@@ -483,7 +464,19 @@ class DesignOptions(TypedDict, total=False):
     operand: Operand
     gate: bool
     setup_interval: int
-    style: Literal["throughput", "compact"]
+    style: Style
+
+
+class BuildOptions(TypedDict, total=False):
+    """Options of a core, by their names in Python: those of `BUILD`."""
+
+    geometry: Literal["software", "hardware"]
+    pipes: Literal[1, 2, 4, 8]
+    merged: bool
+    top: Literal["shader", "geometry", "render"]
+    bus: Literal["native", "axi", "wishbone"]
+    setups: Literal[1, 2]
+    coarse: tuple[int, int] | str
 
 
 class RenderOptions(SceneOptions, DesignOptions, total=False):

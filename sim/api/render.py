@@ -9,11 +9,10 @@ from time import perf_counter
 from typing import Any, Unpack, cast
 
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
-from blysk.sim.api.design import design_of, refused_counts
+from blysk.sim.api.design import built, design_of, refused_counts
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, Engine, RenderOptions, Source
 from blysk.sim.api.rendered_frame import RenderedFrame
 from blysk.sim.api.scene import load, scenes_of
@@ -65,12 +64,6 @@ class Rendering:
         The hardware's simulator; ``None`` where there is no compiler and none is needed.
     seconds : dict
         Seconds of loading and building.
-    pipes : int
-        Number of pipelines.
-    setups : int
-        Lanes of triangle setup, of hardware that takes triangles; 0: it takes spans.
-    coarse : bool
-        Whether that hardware has a coarse depth test.
     """
 
     loaded: LoadedMesh
@@ -80,9 +73,6 @@ class Rendering:
     engine: str
     simulator: FrameSimulator | TriangleSimulator | None
     seconds: dict[str, float]
-    pipes: int = 1
-    setups: int = 0
-    coarse: bool = False
 
     @property
     def design(self) -> Design:
@@ -116,7 +106,7 @@ class Rendering:
         if self.is_specialised:
             details["specialisation"] = {**saving_figures(self.specialisation), "cycles": frame.cycles}
             if vcd is None:
-                whole = FrameSimulator(self.design, self.engine, self.pipes).render(self.scenes[index])
+                whole = FrameSimulator(self.design, self.engine).render(self.scenes[index])
                 details["specialisation"]["full_cycles"] = whole.cycles
                 details["specialisation"] |= difference_figures(cast(SimulatedFrame, frame), whole)
         files = RunFiles.current()
@@ -152,14 +142,14 @@ def prepare_rendering(
     """
     start = perf_counter()
     with settings.located():
-        made = design or _design(settings)
-        _check_geometry(settings, made)
+        made = _built(settings, design or _design(settings))
         stage("loading the mesh")
         loaded = load(settings)
         seconds = {"load": perf_counter() - start}
         simulator, used = None, "cxxrtl"
         while True:
             scenes = tuple(scenes_of(loaded, settings, frames or 1))
+            made = _built(settings, made)
             if design is None:
                 made = made.for_materials(scenes[0].materials, settings["geometry"] == "software")
             _check_lobes(scenes[0], made, settings)
@@ -179,9 +169,7 @@ def prepare_rendering(
                 engine = "pysim"
                 _shrink(settings, error)
     seconds["build"] = perf_counter() - start - seconds["load"]
-    setups = settings["setups"] if settings["geometry"] == "hardware" else 0
-    counts = settings["pipes"], setups, settings["coarse"]
-    return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds, *counts)
+    return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds)
 
 
 def _large(design: Design) -> str:
@@ -195,42 +183,43 @@ def _simulator(
     design: Design, scene: Scene, settings: Settings, engine: str
 ) -> FrameSimulator | TriangleSimulator:
     """The simulator of the geometry that is asked for."""
-    pipes = settings["pipes"]
-    if pipes > scene.height:
+    if settings["pipes"] > scene.height:
         reason = f"the picture has {scene.height} row{'s' * (scene.height > 1)}"
         raise settings.refuse("pipes", reason, "give at most one for each row")
     if settings["geometry"] == "software":
-        return FrameSimulator(design, engine, pipes)
+        return FrameSimulator(design, engine)
     size = scene.width, scene.height
     if scene.width * scene.height > LARGEST_PICTURE:
         reason = f"its simulated memory of depths has at most {LARGEST_PICTURE:,} pixels"
         value = f"hardware at {scene.width}x{scene.height}"
         raise settings.refuse("geometry", reason, "give a smaller size, or use software", value)
-    renderer = Renderer(design, coarse=CoarseDepth(*size) if settings["coarse"] else None)
-    return TriangleSimulator(renderer, size, engine, setups=settings["setups"])
+    return TriangleSimulator(Renderer(design), size, engine)
 
 
-def _check_geometry(settings: Settings, design: Design) -> None:
-    """Refuse options that hardware geometry does not serve, and options that need it."""
-    if settings["geometry"] == "software":
-        remedy = "also give geometry hardware"
-        if settings["setups"] > 1:
-            raise settings.refuse("setups", "spans need no triangle setup", remedy)
-        if settings["coarse"]:
-            raise settings.refuse("coarse", "software leaves hidden spans out", remedy, "")
-        return
-    reason = ""
-    if settings["specialise"]:
-        reason = "a specialised pipeline takes spans; leave out specialise"
-    elif settings["pipes"] > 1:
-        reason = "triangles go to one pipeline; leave out pipes"
+def _built(settings: Settings, design: Design) -> Design:
+    """The design, built by the settings.
+
+    Raises
+    ------
+    OptionError
+        If an option needs hardware geometry, or hardware geometry does not serve it or the design.
+    """
+    hardware, source = settings["geometry"] == "hardware", settings.source
+    if hardware and settings["specialise"]:
+        reason, remedy = "a specialised pipeline takes spans", "leave out specialise, or use software"
+        raise settings.refuse("geometry", reason, remedy)
+    given = {name: settings[name] for name in ("geometry", "setups", "pipes")}
+    if settings["coarse"]:
+        given["coarse"] = (source.width, source.height) if isinstance(source, Scene) else settings["size"]
     try:
-        Renderer(design)
-    except ValueError as error:
-        reason = str(error)
-    if reason:
-        reason, _, remedy = reason.partition("; ")
-        raise settings.refuse("geometry", reason, f"{remedy}, or use software")
+        return built(design, given)
+    except OptionError as error:
+        if hardware and error.option == "pipes":
+            raise settings.refuse("geometry", error.reason, "leave out pipes, or use software") from None
+        if not hardware and error.option in ("setups", "coarse"):
+            remedy = "also give geometry hardware"
+            raise settings.refuse(error.option, error.reason, remedy, error.value) from None
+        raise
 
 
 def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:

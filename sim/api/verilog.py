@@ -2,14 +2,12 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from importlib.metadata import version
-from typing import Literal, cast
+from typing import Unpack
 
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.quotient_spans import MARGIN
 from blysk.golden.frame_constants import address_table
-from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
@@ -17,55 +15,27 @@ from blysk.golden.pipeline import Design
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
-from blysk.hdl.bus.bus import BusUnit
-from blysk.hdl.bus.tops import TOPS
+from blysk.hdl.bus.bus import BusUnit, core_of
 from blysk.hdl.emit.verilog import check_name, emit
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
 from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
 from blysk.hdl.render import RenderUnit
-from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions, unit_of_top
-from blysk.sim.api.design import renderer_of
-from blysk.sim.api.options import COARSE, GEOMETRY, PIPES, PORTS, SETUPS
-from blysk.sim.api.settings import checked
+from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions
+from blysk.sim.api.design import built
+from blysk.sim.api.options import BUILD, BuildOptions
+from blysk.sim.api.signature import with_options
 from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
 
-__all__ = ["ShadingUnit", "header_of", "pixel_pipelines", "verilog", "verilog_and_unit"]
+__all__ = ["ShadingUnit", "header_of", "verilog", "verilog_and_unit"]
 
 _LIMIT = "2048 sin(a / 2), rounded down, for spans of at most the angle a"
 _FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
 
 ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 """A unit from spans to pixels: one pipeline or several."""
-
-
-def pixel_pipelines(design: Design, pipes: int, merged: bool = False) -> ShadingUnit:
-    """One shading pipeline of a design, or several that take spans of different scanlines.
-
-    Parameters
-    ----------
-    design : Design
-        Design of each pipeline.
-    pipes : int
-        Number of pipelines: 1, 2, 4 or 8.
-    merged : bool
-        Whether several give one stream of pixels, in the order of one pipeline.
-
-    Raises
-    ------
-    OptionError
-        If the design cannot have that number of pipelines.
-    """
-    (chosen,) = checked({"pipes": pipes}, PIPES).values()
-    if chosen == 1:
-        return ShadingPipelineUnit(design)
-    try:
-        several = PixelPipelines(design, chosen)
-    except ValueError as error:
-        raise OptionError("pipes", str(pipes), str(error), "give fewer") from None
-    return MergedPipelinesUnit(several) if merged else PixelPipelinesUnit(several)
 
 
 def header_of(unit: ShadingUnit) -> list[str]:
@@ -239,34 +209,8 @@ def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, st
     return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
 
 
-def _top_and_bus(geometry: str, top: str | None, bus: str) -> tuple[str, str]:
-    """The core and the bus, checked.
-
-    Raises
-    ------
-    OptionError
-        If there is no such core or bus, or the core takes spans and geometry is hardware.
-    """
-    checked({"bus": bus} | ({} if top is None else {"top": top}), PORTS)
-    hardware = geometry == "hardware"
-    top = top or ("render" if hardware else "shader")
-    if hardware and not TOPS[top].takes_triangles:
-        remedy = "leave one of them out"
-        raise OptionError("top", top, "it takes spans, and hardware geometry triangles", remedy)
-    return top, bus
-
-
-def verilog(
-    design: Design | None = None,
-    name: str = "blysk",
-    geometry: Literal["software", "hardware"] = "software",
-    pipes: int = 1,
-    merged: bool = False,
-    top: str | None = None,
-    bus: str = "native",
-    setups: int = 1,
-    coarse: tuple[int, int] | None = None,
-) -> str:
+@with_options(BUILD, BuildOptions)
+def verilog(design: Design | None = None, name: str = "blysk", **options: Unpack[BuildOptions]) -> str:
     """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
 
     Parameters
@@ -275,22 +219,8 @@ def verilog(
         The pipeline, as `design` makes it; by default that of the defaults.
     name : str
         Name of the top module.
-    geometry : {"software", "hardware"}
-        Whether the pipeline takes spans, or triangles, with a depth test and a port to a memory of depths.
-    pipes : int
-        Number of pipelines, 1, 2, 4 or 8, that take spans of different scanlines.
-    merged : bool
-        Whether several pipelines give one stream of pixels in place of one each.
-    top : str, optional
-        The core: ``"shader"`` (spans to pixels), ``"geometry"`` (triangles to spans) or ``"render"``
-        (triangles to pixels). By default ``"render"`` if geometry is hardware, else ``"shader"``.
-    bus : {"native", "axi", "wishbone"}
-        Its own ports, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
-    setups : int
-        Lanes of triangle setup, 1 or 2, of a core that takes triangles.
-    coarse : (int, int), optional
-        Largest width and height of a picture for the coarse depth test of a core from triangles to pixels;
-        by default it has none. See `CoarseDepth`.
+    **options
+        Those below, by the names of the command line. ``None`` counts as not given.
 
     Raises
     ------
@@ -298,55 +228,26 @@ def verilog(
         If the name is no Verilog identifier, the method takes values of a span and the core triangles, the
         design cannot have that number of pipelines, or the bus does not serve the core.
     """
-    design = Design() if design is None else design
-    return verilog_and_unit(design, name, geometry, pipes, merged, top, bus, setups, coarse)[0]
+    return verilog_and_unit(built(Design() if design is None else design, options), name)[0]
 
 
 def verilog_and_unit(
-    design: Design,
-    name: str,
-    geometry: str = "software",
-    pipes: int = 1,
-    merged: bool = False,
-    top: str | None = None,
-    bus: str = "native",
-    setups: int = 1,
-    coarse: tuple[int, int] | None = None,
+    design: Design, name: str
 ) -> tuple[str, ShadingUnit | RenderUnit | GeometryUnit | BusUnit]:
-    """The text of `verilog`, and the unit that it was made from."""
-    (chosen,) = checked({"geometry": geometry}, GEOMETRY).values()
-    top, bus = _top_and_bus(chosen, top, bus)
+    """Verilog of the core that the design's `Build` asks for, and the unit that it was made from.
+
+    Raises
+    ------
+    OptionError
+        If the name is no Verilog identifier.
+    """
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "not a Verilog name", "use letters, digits and underscores")
     try:
         check_name(name)
     except ValueError as error:
         raise OptionError("name", name, str(error), "choose another name") from None
-    hardware = TOPS[top].takes_triangles
-    counts = checked({"pipes": pipes, "setups": setups}, PIPES | SETUPS)
-    pipes, setups = counts["pipes"], counts["setups"]
-    if setups > 1 and not hardware:
-        raise OptionError("setups", str(setups), "spans need no triangle setup", "use top geometry or render")
-    if hardware and pipes > 1:
-        raise OptionError(
-            "pipes", str(pipes), "triangles go to one pipeline", "leave out pipes, or use spans"
-        )
-    if merged and pipes == 1:
-        raise OptionError("merged", "", "one pipeline has one stream", "also give pipes")
-    if pipes > 1 and bus != "native":
-        raise OptionError("pipes", str(pipes), f"a core on {bus} has one pipeline", "leave out pipes or bus")
-    asked = ("geometry", chosen) if chosen == "hardware" else ("top", top)
-    parameters = renderer_of(design, *asked) if hardware else design
-    if coarse is not None:
-        if top != "render":
-            raise OptionError("coarse", "", "it is of triangles to pixels", "also give --top render")
-        size = checked({"coarse": coarse}, COARSE)["coarse"]
-        parameters = replace(cast(Renderer, parameters), coarse=CoarseDepth(*size))
-    if hardware or bus != "native":
-        lanes = {"setups": setups} if hardware else {}
-        unit = unit_of_top(top, bus, parameters, **lanes)
-    else:
-        unit = pixel_pipelines(design, pipes, merged)
+    unit = core_of(design)
     p = design
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
@@ -361,10 +262,10 @@ def verilog_and_unit(
     words = [*constants, *example_of(p, renderer)]
     descriptions: Mapping[str, str]
     if isinstance(unit, BusUnit):
-        header, descriptions = bus_header(unit, bus, lines, words), bus_descriptions(unit)
+        header, descriptions = bus_header(unit, p.build.bus, lines, words), bus_descriptions(unit)
     elif isinstance(unit, GeometryUnit):
         header, descriptions = lines, triangle_descriptions(unit)
     else:
         header = [*lines, "", "Frame constants, through the write port:", *words]
-        descriptions = _descriptions(unit, pipes)
+        descriptions = _descriptions(unit, p.build.pipes)
     return emit(unit, name, header=header, descriptions=descriptions), unit

@@ -175,15 +175,7 @@ def _animation(
     """Render and write the frames of a turntable, append their names to ``drawn``; figures of all."""
     start = perf_counter()
     smallest = ready.specialisation
-    animation = Animation(
-        smallest.scenes[0],
-        smallest.design,
-        ready.engine,
-        ready.design,
-        ready.pipes,
-        ready.setups,
-        ready.coarse,
-    )
+    animation = Animation(smallest.scenes[0], smallest.design, ready.engine, ready.design)
     cameras = [scene.camera for scene in ready.scenes]
     if address:
         workers = dask_executor(animation, address)

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import click
 
-from blysk.sim.api.design import design
-from blysk.sim.api.options import COARSE, COUNTS, DESIGN, DOCUMENTS, GEOMETRY, PIPES, PORTS, SETUPS
+from blysk.golden.build import Build
+from blysk.sim.api.design import built, design
+from blysk.sim.api.options import BUILD, COUNTS, DESIGN, DOCUMENTS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
@@ -17,15 +18,22 @@ from blysk.sim.value_types import OutputFile
 __all__ = ["command"]
 
 
+def _check_testbench(build: Build) -> None:
+    """Refuse cores that the test bench does not drive."""
+    if build.pipes > 1 and not build.merged:
+        raise InputError("--testbench", "its bench takes one stream of pixels", "also give --merged")
+    if build.bus != "native":
+        reason = f"its bench drives the native shader, not --bus {build.bus}"
+        raise InputError("--testbench", reason, "leave one out")
+    if build.takes_triangles:
+        reason = f"its bench sends spans, and the core {build.top} takes triangles"
+        raise InputError("--testbench", reason, "leave one out")
+
+
 @click.command()
 @options_of(DESIGN)
 @options_of(COUNTS)
-@options_of(GEOMETRY)
-@options_of(PIPES)
-@click.option("--merged", is_flag=True, help="With --pipes: one stream of pixels, in the order of the spans.")
-@options_of(PORTS)
-@options_of(SETUPS)
-@options_of(COARSE)
+@options_of(BUILD)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
     "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
@@ -37,7 +45,7 @@ __all__ = ["command"]
     help="New or empty folder for the Verilog and a cocotb test bench, which runs without blysk.",
 )
 @click.pass_context
-def command(context, name, output, testbench, geometry, pipes, merged, top, bus, setups, coarse, **_):
+def command(context, name, output, testbench, **_):
     """Emit the pipeline as Verilog-2001 for synthesis, with a table of its ports.
 
     The test bench compares the Verilog with the pixels of a small frame, in Icarus Verilog or Verilator. Run
@@ -51,24 +59,15 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
         blysk verilog --pipes 4 -o four.v
         blysk verilog --top render --bus axi -o core.v
     """
-    geometry = geometry or GEOMETRY["geometry"].default
-    pipes = pipes or PIPES["pipes"].default
-    if testbench is not None and pipes > 1 and not merged:
-        raise InputError("--testbench", "its bench takes one stream of pixels", "also give --merged")
-    bus, setups = bus or PORTS["bus"].default, setups or SETUPS["setups"].default
-    if testbench is not None and (bus != "native" or top not in (None, "shader")):
-        wrong = f"--bus {bus}" if bus != "native" else f"--top {top}"
-        raise InputError("--testbench", f"its bench drives the native shader, not {wrong}", "leave one out")
-    if output and bus != "native" and not output.endswith(".v"):
+    made = built(design(**given_options(context, [*DESIGN, *COUNTS])), given_options(context, BUILD))
+    build = made.build
+    if testbench is not None:
+        _check_testbench(build)
+    if output and build.bus != "native" and not output.endswith(".v"):
         raise InputError(
             f"-o {output}", "X.md, X.h and X.svd are written beside X.v", "use a name that ends in .v"
         )
-    if testbench is not None and geometry == "hardware":
-        raise InputError(
-            "--testbench", "its bench sends spans, and hardware geometry takes triangles", "leave one out"
-        )
-    made = design(**given_options(context, [*DESIGN, *COUNTS]))
-    beside = [f"{output[:-2]}{suffix}" for suffix in DOCUMENTS] if output and bus != "native" else []
+    beside = [f"{output[:-2]}{suffix}" for suffix in DOCUMENTS] if output and build.bus != "native" else []
     check_outputs([], pictures=[], others=[output, *beside])
     check_beside(beside)
     # After the checks of options: the hardware's description takes a second to import.
@@ -80,7 +79,7 @@ def command(context, name, output, testbench, geometry, pipes, merged, top, bus,
         if output and Path(os.path.realpath(output)).is_relative_to(os.path.realpath(testbench)):
             raise InputError(output, "lies in the folder of --testbench", "choose another file")
         check_folder(testbench)
-    text, unit = verilog_and_unit(made, name, geometry, pipes, merged, top, bus, setups, coarse)
+    text, unit = verilog_and_unit(made, name)
     with all_or_none():
         if output:
             write_text(output, text)

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from PIL import Image
 
 from blysk.golden.frames.compare import compare, compare_triangles
-from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.pipeline import Design
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
@@ -126,21 +125,12 @@ class Animation:
     full : Design, optional
         The pipeline that ``design`` is a specialisation of: the frames' errors are against its method and
         model. ``None``: ``design`` itself.
-    pipes : int
-        Number of pipelines.
-    setups : int
-        Lanes of triangle setup, of hardware that takes triangles; 0: it takes spans.
-    coarse : bool
-        Whether that hardware has a coarse depth test.
     """
 
     scene: Scene
     design: Design
     engine: str = "cxxrtl"
     full: Design | None = None
-    pipes: int = 1
-    setups: int = 0
-    coarse: bool = False
 
 
 @dataclass(frozen=True)
@@ -164,16 +154,13 @@ _animation: Animation | None = None
 
 
 @functools.lru_cache(maxsize=1)
-def _simulator(design: Design, engine: str, pipes: int = 1) -> FrameSimulator:
-    return FrameSimulator(design, engine, pipes)
+def _simulator(design: Design, engine: str) -> FrameSimulator:
+    return FrameSimulator(design, engine)
 
 
 @functools.lru_cache(maxsize=1)
-def _triangle_simulator(
-    design: Design, engine: str, size: tuple[int, int], setups: int, coarse: bool
-) -> TriangleSimulator:
-    renderer = Renderer(design, coarse=CoarseDepth(*size) if coarse else None)
-    return TriangleSimulator(renderer, size, engine, setups=setups)
+def _triangle_simulator(design: Design, engine: str, size: tuple[int, int]) -> TriangleSimulator:
+    return TriangleSimulator(Renderer(design), size, engine)
 
 
 def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
@@ -184,14 +171,13 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
     """
     with _ONE_AT_A_TIME:
         scene = replace(animation.scene, camera=camera)
-        if animation.setups:
+        if animation.design.build.takes_triangles:
             design, size = animation.design, (scene.width, scene.height)
-            lanes = animation.setups, animation.coarse
-            simulator = _triangle_simulator(design, animation.engine, size, *lanes)
+            simulator = _triangle_simulator(design, animation.engine, size)
             drawn = simulator.render(scene)
             comparison = compare_triangles(scene, simulator.renderer, drawn.sent, drawn.image)
             return AnimationFrame(drawn.image, triangle_figures(scene, design, drawn, comparison))
-        frame = _simulator(animation.design, animation.engine, animation.pipes).render(scene)
+        frame = _simulator(animation.design, animation.engine).render(scene)
         full = animation.full or animation.design
         return AnimationFrame(frame.image, frame_figures(scene, full, frame, compare(scene, full, frame)))
 

@@ -23,12 +23,10 @@ class MergedDrawUnit(wiring.Component):
     ----------
     parameters : Drawing
         What is drawn.
-    **options
-        As `DrawUnit` has them.
     """
 
-    def __init__(self, parameters: Drawing, **options):
-        self.parameters, self.unit = parameters, DrawUnit(parameters, **options)
+    def __init__(self, parameters: Drawing):
+        self.parameters, self.unit = parameters, DrawUnit(parameters)
         design = parameters.renderer.design
         pixel = drawn_band_pixel_shape(design.x_bits, design.y_bits)
         band = band_shape(parameters.bands)
@@ -107,13 +105,11 @@ class DrawingSimulator:
         What is drawn.
     engine : str
         As `simulate` has it.
-    **options
-        As `DrawUnit` has them.
     """
 
-    def __init__(self, drawing: Drawing, engine: str = "auto", **options):
+    def __init__(self, drawing: Drawing, engine: str = "auto"):
         self.drawing, self.engine = drawing, engine
-        self._unit = MergedDrawUnit(drawing, **options)
+        self._unit = MergedDrawUnit(drawing)
 
     def run(self, bands: Sequence[int], buttons: Sequence[int] | None = None, **stalls) -> DrawnBands:
         """Ask for bands, and collect their pixels.

@@ -46,7 +46,7 @@ def frame_figures(
     visible = int(np.count_nonzero(frame.cut_raster.visible))
     return {
         **_figures(scene, design, frame, raster.triangles, visible),
-        "pipes": frame.pipes,
+        "pipes": design.build.pipes,
         **_errors(comparison, ERRORS),
         "counts": {
             "degenerate_triangles": raster.degenerate,
@@ -86,8 +86,8 @@ def triangle_figures(
     return {
         **_figures(scene, design, frame, len(sent.triangles), frame.visible),
         "geometry": "hardware",
-        "setups": frame.setups,
-        "coarse": frame.coarse,
+        "setups": design.build.setups,
+        "coarse": design.build.coarse is not None,
         "triangle_cycles": frame.input_cycles,
         **_errors(comparison, [name for name in ERRORS if name != "arithmetic"]),
         "counts": {

@@ -35,13 +35,10 @@ class SimulatedFrame(Frame):
         Cycles from the first write of a constant to the last pixel.
     engine : {"cxxrtl", "pysim"}
         The simulator.
-    pipes : int
-        Number of pipelines.
     """
 
     cycles: int
     engine: str
-    pipes: int = 1
 
 
 _IDLE = 1000
@@ -90,11 +87,10 @@ class FrameSimulator:
     Parameters
     ----------
     design : Design
-        The pipeline: method, reflection model, number of lights and so on.
+        The pipeline: method, reflection model, number of lights and so on; its `Build` has the number of
+        pipelines.
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
-    pipes : int
-        Number of pipelines, see `PixelPipelines`.
 
     Attributes
     ----------
@@ -111,13 +107,14 @@ class FrameSimulator:
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
 
-    def __init__(self, design: Design, engine: str = "auto", pipes: int = 1):
+    def __init__(self, design: Design, engine: str = "auto"):
         start = perf_counter()
         self.design = design
         self.engine = engine
-        self.pipes = pipes
-        several = PixelPipelines(design, pipes)
-        self._unit = ShadingPipelineUnit(design) if pipes == 1 else WidePipelinesUnit(several)
+        self._pipes = design.build.pipes
+        self._unit = (
+            ShadingPipelineUnit(design) if self._pipes == 1 else WidePipelinesUnit(PixelPipelines(design))
+        )
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
         run, beats = self._run(spans, constants, expected.y)
@@ -132,17 +129,17 @@ class FrameSimulator:
     ) -> tuple[Run, np.ndarray]:
         """A simulation, and its pixels in the order of the spans; ``y`` are the pixels' scanlines."""
         # How many wide beats come depends on how many pixels leave on a cycle.
-        ends = {"count": len(y)} if self.pipes == 1 else {"count": None, "idle_timeout": _IDLE}
+        ends = {"count": len(y)} if self._pipes == 1 else {"count": None, "idle_timeout": _IDLE}
         run = simulate(
             self._unit,
             beats_of(self._unit, spans),
             write=writes_of(constants),
             engine=self.engine,
-            origin=(self.design, self.pipes),
+            origin=self.design,
             **ends,
             **options,
         )
-        return run, run.beats if self.pipes == 1 else _in_order(run.beats, y)
+        return run, run.beats if self._pipes == 1 else _in_order(run.beats, y)
 
     def render(
         self,
@@ -174,7 +171,7 @@ class FrameSimulator:
         rastered = perf_counter()
         raster = prepared.cut_raster
         count = len(raster.span)
-        report = None if progress is None else lambda done: progress(min(done * self.pipes, count), count)
+        report = None if progress is None else lambda done: progress(min(done * self._pipes, count), count)
         y = raster.pixel // scene.width
         run, beats = self._run(prepared.spans, constants, y, progress=report, vcd=vcd)
         assert run.status is not None
@@ -188,7 +185,6 @@ class FrameSimulator:
             seconds={"raster": rastered - start, "simulate": perf_counter() - rastered},
             cycles=run.total_cycles,
             engine=run.engine,
-            pipes=self.pipes,
         )
 
 

@@ -84,10 +84,6 @@ class SimulatedTriangleFrame:
         The simulator.
     seconds : dict
         Seconds of ``triangles`` (to transform, clip and check them) and of ``simulate``.
-    setups : int
-        Lanes of triangle setup.
-    coarse : bool
-        Whether hidden spans are dropped before they are shaded.
     """
 
     image: np.ndarray
@@ -99,8 +95,6 @@ class SimulatedTriangleFrame:
     input_cycles: int
     engine: str
     seconds: dict[str, float]
-    setups: int = 1
-    coarse: bool = False
 
     @property
     def spans(self) -> int:
@@ -155,8 +149,6 @@ class TriangleSimulator:
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     angle : float, optional
         Widest piece of a span in degrees; by default `SPAN_ANGLE`.
-    setups : int
-        As `GeometryUnit` has it.
 
     Raises
     ------
@@ -172,11 +164,9 @@ class TriangleSimulator:
         size: tuple[int, int],
         engine: str = "auto",
         angle: float | None = None,
-        setups: int = 1,
     ):
         self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
-        self.setups = setups
-        self._origin = renderer, size, setups
+        self._origin = renderer, size
         self._render = RenderUnit(*self._origin)
         self._unit = _Timed(self._render)
         self._check()
@@ -252,7 +242,6 @@ class TriangleSimulator:
                 0,
                 self.engine,
                 seconds,
-                setups=self.setups,
             )
         run = simulate(
             self._unit,
@@ -281,8 +270,6 @@ class TriangleSimulator:
             input_cycles=int(run.input_cycles[-1] - run.input_cycles[0] + 1),
             engine=run.engine,
             seconds={"triangles": ready - start, "simulate": perf_counter() - ready},
-            setups=self.setups,
-            coarse=self.renderer.coarse is not None,
         )
 
     def _longest_silence(self, sent: SceneTriangles) -> int:

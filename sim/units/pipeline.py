@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from blysk.golden.build import Build
 from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import BANK_ADDRESS, LOBE_ADDRESS, FrameConstants, writes_of
 from blysk.golden.lighting.diffuse import Diffuse
@@ -13,7 +14,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE, quantise
-from blysk.golden.pipeline import Build, Design, Spans
+from blysk.golden.pipeline import Design, Spans
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise

@@ -100,7 +100,7 @@ def _variants():
         ("4 pipelines, quotient, 3 materials", 4, 33, preset(materials=3)),
         ("8 pipelines, quadratic, compact", 8, 17, preset("quadratic", "cosquad", style="compact")),
     ):
-        unit = partial(MergedPipelinesUnit, PixelPipelines(design, pipes), waiting)
+        unit = partial(MergedPipelinesUnit, PixelPipelines(design.built(pipes=pipes)), waiting)
         yield name, Variant(unit, long=pipes > 2)
 
 

@@ -96,7 +96,8 @@ def _variants():
         ("quotient, 4 lights, no highlights", {"model": None, "lights": 4}),
     ):
         design = preset(**{"x_bits": 5, "y_bits": 5} | options)
-        renderer = Renderer(design, coarse=CoarseDepth(*_SIZE) if "coarse" in name else None)
+        coarse = CoarseDepth(*_SIZE) if "coarse" in name else None
+        renderer = Renderer(design.built(top="render", coarse=coarse))
         yield name, Variant(partial(RenderUnit, renderer, _SIZE), long=name != "quotient")
 
 

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.prove
 def test_wide_beats_that_wait_stay(prove):
     """Inductive: no lane gets a pixel while the beat of the others waits."""
     design = preset(model="cosquad", lights=0, x_bits=4, y_bits=2, length_bits=2, grey=True)
-    unit = WidePipelinesUnit(PixelPipelines(design, 2), 4)
+    unit = WidePipelinesUnit(PixelPipelines(design.built(pipes=2)), 4)
     harness = Harness(unit)
     stays(harness, unit.o)
     prove(harness)

@@ -5,7 +5,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from blysk.golden.pixel_pipelines import PIPES, PixelPipelines
+from blysk.golden.build import PIPES
+from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import preset
 from blysk.sim.units.pipeline_spans import any_constants, any_spans
 
@@ -18,7 +19,8 @@ def rows(pixels):
 def test_pipelines_together_give_the_pixels_of_one(pipes):
     """In the order of the spans within each scanline; and the counts are sums."""
     rng, design = np.random.default_rng(pipes), preset(y_bits=5)
-    several, spans = PixelPipelines(design, pipes), any_spans(rng, design, rng.integers(0, 9, 300))
+    several = PixelPipelines(design.built(pipes=pipes))
+    spans = any_spans(rng, design, rng.integers(0, 9, 300))
     constants = any_constants(rng, design, spans)
     one, each = several.compute(spans, constants), several.compute_each(spans, constants)
     assert len(each) == pipes
@@ -35,10 +37,10 @@ def test_pipelines_together_give_the_pixels_of_one(pipes):
 @pytest.mark.parametrize("pipes", [0, 3, 6, 16, -1])
 def test_number_of_pipelines_is_checked(pipes):
     with pytest.raises(ValueError, match=f"one of 1, 2, 4, 8, not {pipes}"):
-        PixelPipelines(preset(), pipes)
+        preset().built(pipes=pipes)
 
 
 def test_no_more_pipelines_than_scanlines():
-    PixelPipelines(preset(y_bits=2), 4)
+    PixelPipelines(preset(y_bits=2).built(pipes=4))
     with pytest.raises(ValueError, match="number of scanlines, 4, not 8"):
-        PixelPipelines(preset(y_bits=2), 8)
+        PixelPipelines(preset(y_bits=2).built(pipes=8))

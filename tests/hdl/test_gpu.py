@@ -10,7 +10,7 @@ from blysk.golden.frames.compare import compare_image
 from blysk.golden.gpu import Gpu
 from blysk.golden.video.band_buffer import RGB565, RGB888, BandBuffer
 from blysk.golden.video.display_timing import Axis, DisplayMode
-from blysk.golden.video.draw_unit import Drawing, turned
+from blysk.golden.video.draw_unit import Drawing, board_design, turned
 from blysk.hdl.gpu import GpuUnit
 from blysk.sim.api.scene import scene
 from blysk.sim.frames.display import OneClock, show
@@ -24,13 +24,14 @@ def gpu(blank, bits=RGB888):
     """A small teapot on a display whose lines have so many blank pixels: time to draw."""
     mode = DisplayMode(Axis(64, 4, 8, blank), Axis(48, 2, 2, 8))
     given = scene("teapot", triangles=200, size=mode.size, back_faces="cull")
-    drawing = Drawing.of([given], lines=8)
+    design = board_design().built(top="render", geometry_style="compact")
+    drawing = Drawing.of([given], design, lines=8)
     return Gpu(drawing, BandBuffer(mode, 8, bits, BACKGROUND)), given
 
 
 def shown(made, frames):
     """Frames of its lanes."""
-    top = OneClock(GpuUnit(made, compact=True), Fraction(1, 2))
+    top = OneClock(GpuUnit(made), Fraction(1, 2))
     return show(top, made.buffer.mode, frames)
 
 

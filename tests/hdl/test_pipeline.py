@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from amaranth.hdl import UnusedElaboratable
 
+from blysk.golden.build import STYLES, Build
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.unit_vector import quantise
-from blysk.golden.pipeline import STYLES, Build, Spans
+from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.registry import unit_of

@@ -47,7 +47,7 @@ def assert_lanes(lanes, expected):
 @pytest.fixture(scope="module")
 def wide():
     """Two materials, two pipelines; FIFOs are short enough to be full."""
-    return WidePipelinesUnit(PixelPipelines(preset("linear", "cosquad", materials=2), 2), 5)
+    return WidePipelinesUnit(PixelPipelines(preset("linear", "cosquad", materials=2).built(pipes=2)), 5)
 
 
 @pytest.mark.ci
@@ -71,7 +71,7 @@ def test_each_lane_equals_its_model_under_stalls(wide, shares):
 
 @pytest.mark.long
 def test_both_engines_give_equal_cycles():
-    unit = WidePipelinesUnit(PixelPipelines(PLAIN, 4), 4)
+    unit = WidePipelinesUnit(PixelPipelines(PLAIN.built(pipes=4)), 4)
     rng = np.random.default_rng(3)
     spans = any_spans(rng, PLAIN, rng.integers(0, 6, 40))
     constants = any_constants(rng, PLAIN, spans)
@@ -85,7 +85,7 @@ def test_both_engines_give_equal_cycles():
 @pytest.mark.parametrize("pipes", [1, 2, 4, 8])
 def test_so_many_pixels_a_cycle(pipes):
     """Spans of as many pixels as there are pipelines, from scanline to scanline: no pipeline ever waits."""
-    unit = WidePipelinesUnit(PixelPipelines(PLAIN, pipes), 33)
+    unit = WidePipelinesUnit(PixelPipelines(PLAIN.built(pipes=pipes)), 33)
     rng, count = np.random.default_rng(5), 240
     spans = replace(any_spans(rng, PLAIN, np.full(count, 9)), y=np.arange(count) % 16)
     lanes, run = shade(unit, spans, any_constants(rng, PLAIN, spans))
@@ -98,7 +98,7 @@ def test_so_many_pixels_a_cycle(pipes):
 
 def test_merged_stream_is_that_of_one_pipeline():
     """The first pixel after `latency` cycles, then one a cycle."""
-    unit = MergedPipelinesUnit(PixelPipelines(PLAIN, 4), 9)
+    unit = MergedPipelinesUnit(PixelPipelines(PLAIN.built(pipes=4)), 9)
     rng = np.random.default_rng(6)
     spans = any_spans(rng, PLAIN, rng.integers(4, 9, 40))
     constants = any_constants(rng, PLAIN, spans)
@@ -113,7 +113,7 @@ def test_merged_stream_is_that_of_one_pipeline():
 
 @pytest.mark.long
 def test_counters_are_sums_that_stop():
-    unit = WidePipelinesUnit(PixelPipelines(PLAIN, 2), 4)
+    unit = WidePipelinesUnit(PixelPipelines(PLAIN.built(pipes=2)), 4)
     rng, few = np.random.default_rng(8), 300
     spans = any_spans(rng, PLAIN, np.r_[np.zeros(few, dtype=int), 1])
     for repeats, expected in ((1, few), (1 << 16, 65535)):
@@ -132,7 +132,7 @@ def bench(unit, process):
 
 def test_a_port_that_waits_stops_its_pipeline_alone():
     """Until its FIFO is full; its pixel stays meanwhile, and nothing is lost."""
-    unit, found = PixelPipelinesUnit(PixelPipelines(PLAIN, 2), 4), ([], [])
+    unit, found = PixelPipelinesUnit(PixelPipelines(PLAIN.built(pipes=2)), 4), ([], [])
     rng = np.random.default_rng(9)
     spans = any_spans(rng, PLAIN, np.full(60, 2))
     # Three in a row for the first, whose port waits; the rest for the other.
@@ -168,7 +168,7 @@ def test_a_port_that_waits_stops_its_pipeline_alone():
 
 def test_writes_between_frames():
     """A write that comes while spans wait is accepted after their pixels, and before any new span."""
-    unit = MergedPipelinesUnit(PixelPipelines(PLAIN, 4), 5)
+    unit = MergedPipelinesUnit(PixelPipelines(PLAIN.built(pipes=4)), 5)
     rng = np.random.default_rng(10)
     frames = []
     # Of a single span nothing but its FIFO tells that it is inside, at first.

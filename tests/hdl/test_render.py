@@ -9,6 +9,7 @@ from amaranth.lib import data
 from amaranth.lib.wiring import Out
 
 from blysk.bench.quality.mutation import Wrapped
+from blysk.golden.build import Build
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.geometry.geometry import GeometryUnit
@@ -20,12 +21,13 @@ from blysk.sim.units.registry import RECORDS
 from ..checks import assert_beats_equal
 
 DESIGN = preset(x_bits=5, y_bits=5)
+COMPACT = DESIGN.built(top="render", geometry_style="compact")
 UNITS = {
     "geometry": ("geometry", GeometryUnit),
-    "geometry, two lanes": ("geometry", partial(GeometryUnit, setups=2)),
-    "geometry, compact": ("geometry", partial(GeometryUnit, compact=True)),
+    "geometry, two lanes": ("geometry", partial(GeometryUnit, build=Build(top="geometry", setups=2))),
+    "geometry, compact": ("geometry", partial(GeometryUnit, build=Build("compact"))),
     "render": ("render", partial(RenderUnit, Renderer(DESIGN), (32, 24))),
-    "render, compact": ("render", partial(RenderUnit, Renderer(DESIGN), (32, 24), compact=True)),
+    "render, compact": ("render", partial(RenderUnit, Renderer(COMPACT), (32, 24))),
 }
 
 

@@ -14,7 +14,6 @@ from cocotb_tools.runner import get_results, get_runner
 from blysk.golden.bus.registers import CONSTANTS
 from blysk.golden.frame_constants import MATERIAL_ADDRESS
 from blysk.golden.presets import preset
-from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import BusUnit
 from blysk.hdl.emit.verilog import emit
 from blysk.sim.units.bus.framing import RECORD
@@ -24,8 +23,8 @@ from .verilog_bench import SIMULATORS, missing_tool, without_initial_values
 SMALL = {"x_bits": 5, "y_bits": 5}
 CORES = {
     "shader": preset("linear", "cosquad"),
-    "render": Renderer(preset("linear", "cosquad", **SMALL)),
-    "geometry": Renderer(preset("linear", "cosquad", **SMALL)),
+    "render": preset("linear", "cosquad", **SMALL),
+    "geometry": preset("linear", "cosquad", **SMALL),
 }
 SIZES = {"render": {"size": (32, 24)}}
 BUSES = {"axi": "axi", "wishbone": "wishbone", "wishbone, classic": "wishbone"}
@@ -70,7 +69,7 @@ def check(tmp_path, monkeypatch):
     def check(top, bus, simulator):
         if missing_tool(simulator):
             pytest.skip(missing_tool(simulator))
-        unit = BusUnit(BUSES[bus], top, CORES[top], **SIZES.get(top, {}))
+        unit = BusUnit(CORES[top].built(top=top, bus=BUSES[bus]), **SIZES.get(top, {}))
         text = emit(unit, "core")
         if simulator == "icarus":
             text = without_initial_values(text)

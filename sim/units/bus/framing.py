@@ -8,7 +8,6 @@ import numpy as np
 
 from blysk.golden.bus.byte_layout import ByteLayout
 from blysk.golden.presets import preset
-from blysk.golden.render import Renderer
 from blysk.hdl.bus.framing import FramingUnit
 from blysk.sim.units.geometry.geometry import RECORD as GEOMETRY
 from blysk.sim.units.pipeline import RECORD as SHADER
@@ -113,10 +112,10 @@ def _misfits(unit, rng, count):
 
 
 def _variants():
-    yield "shader", Variant(partial(FramingUnit, "shader", preset(model="cosquad", lights=0)))
+    yield "shader", Variant(partial(FramingUnit, preset(model="cosquad", lights=0)))
     design = preset("linear", "cosquad", x_bits=5, y_bits=5)
-    yield "render", Variant(partial(FramingUnit, "render", Renderer(design), size=(32, 24)), long=True)
-    yield "geometry", Variant(partial(FramingUnit, "geometry", Renderer(design)), long=True)
+    yield "render", Variant(partial(FramingUnit, design.built(top="render"), size=(32, 24)), long=True)
+    yield "geometry", Variant(partial(FramingUnit, design.built(top="geometry")), long=True)
 
 
 RECORD = Record(

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from blysk.golden.build import Build
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import Frame, Grid, Triangles
 from blysk.hdl.geometry.geometry import GeometryUnit
@@ -16,9 +17,7 @@ __all__ = ["RECORD"]
 
 @once
 def _spans(unit, case):
-    return Geometry(unit.grid, unit.lines, unit.vectors).compute(
-        Triangles(**case.beats), frame_of(case.constants)
-    )
+    return unit.parameters.compute(Triangles(**case.beats), frame_of(case.constants))
 
 
 def _small(unit, rng, count):
@@ -87,20 +86,24 @@ def _largest(unit, rng, count):
     return Case(ended(triangles, unit.grid).beats, small_frame(rng).codes)
 
 
+def _unit(model=None, **build):
+    return partial(GeometryUnit, model, Build(top="geometry", **build))
+
+
 RECORD = Record(
     name="geometry",
     title="Triangles to spans with unit normals and depth",
     source="[T] figure 4.10",
     variants={
         "": Variant(GeometryUnit),
-        "compact": Variant(partial(GeometryUnit, compact=True), long=True),
-        "compact, two lanes": Variant(partial(GeometryUnit, compact=True, setups=2), long=True),
-        "compact, true lines": Variant(partial(GeometryUnit, compact=True, lines=True), long=True),
-        "compact, vectors": Variant(partial(GeometryUnit, compact=True, vectors=True), long=True),
-        "true lines": Variant(partial(GeometryUnit, lines=True), long=True),
-        "vectors": Variant(partial(GeometryUnit, vectors=True), long=True),
-        "two lanes": Variant(partial(GeometryUnit, setups=2), long=True),
-        "4 fraction bits": Variant(partial(GeometryUnit, Grid(4)), long=True),
+        "compact": Variant(_unit(style="compact"), long=True),
+        "compact, two lanes": Variant(_unit(style="compact", setups=2), long=True),
+        "compact, true lines": Variant(_unit(Geometry(lines=True), style="compact"), long=True),
+        "compact, vectors": Variant(_unit(Geometry(vectors=True), style="compact"), long=True),
+        "true lines": Variant(_unit(Geometry(lines=True)), long=True),
+        "vectors": Variant(_unit(Geometry(vectors=True)), long=True),
+        "two lanes": Variant(_unit(setups=2), long=True),
+        "4 fraction bits": Variant(_unit(Geometry(Grid(4))), long=True),
     },
     expect=lambda unit, case: _spans(unit, case)[0].beats,
     status=lambda unit, case: _spans(unit, case)[1],

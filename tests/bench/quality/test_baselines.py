@@ -19,9 +19,9 @@ from blysk.bench.quality.baselines import (
     read,
 )
 from blysk.bench.tools.blocks import ENTRIES as UNITS
+from blysk.golden.build import STYLES
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
-from blysk.golden.pipeline import STYLES
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.normals.dot_product import DotProductUnit

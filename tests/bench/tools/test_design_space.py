@@ -24,10 +24,10 @@ from blysk.bench.tools.design_space import (
     tasks_of,
 )
 from blysk.bench.tools.sweep import COSTS, Candidate, Sweep
+from blysk.golden.build import STYLES
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.prepare import prepare
-from blysk.golden.pipeline import STYLES
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.renderer import render
 from blysk.hdl.emit.cost import cost_of

@@ -178,7 +178,7 @@ def test_designs():
         (["--unit", "gpq", "--pipes", "2"], "--pipes: is for the pipeline; leave out --pipes or --unit"),
         (
             ["--setups", "2"],
-            "--setups 2: spans need no triangle setup; leave out --setups, or use --top geometry",
+            "--setups 2: spans need no triangle setup; use top geometry or render",
         ),
         (["--seeds", "0"], "--seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "--jobs no: not a whole number; give"),

@@ -84,7 +84,7 @@ def test_frames_are_the_same(back_faces, least):
     scene = blysk.scene("teapot", triangles=1000, size=(160, 120), back_faces=back_faces)
     design = preset("renormalise", "blinn")
     plain = triangle_frame(scene, Renderer(design))
-    frame = triangle_frame(scene, Renderer(design, coarse=CoarseDepth(160, 120)))
+    frame = triangle_frame(scene, Renderer(design.built(top="render", coarse=CoarseDepth(160, 120))))
     np.testing.assert_array_equal(frame.image, plain.image)
     np.testing.assert_array_equal(frame.owner, plain.owner)
     dropped = frame.counts["dropped"]

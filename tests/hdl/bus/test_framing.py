@@ -14,13 +14,15 @@ from blysk.sim.units.operands import unit_codes
 
 SIZE = 16, 8
 STEPS = 256
-DESIGN = preset("linear", "cosquad", x_bits=4, y_bits=4, materials=3)
+DESIGN = preset("linear", "cosquad", x_bits=4, y_bits=4, materials=3).built(
+    top="render", coarse=CoarseDepth(*SIZE, tag_bits=2)
+)
 
 
 @pytest.fixture(scope="module")
 def unit():
     """With both memories of depths: that of the pixels, and that of the coarse test."""
-    return FramingUnit("render", Renderer(DESIGN, coarse=CoarseDepth(*SIZE, tag_bits=2)), size=SIZE)
+    return FramingUnit(DESIGN, size=SIZE)
 
 
 def triangles(count, depth, right=40, material=0):
@@ -62,7 +64,7 @@ def run(unit, frames, keep, expected):
             words[name] = columns[name]
         data.append(words.view(np.uint8).reshape(len(each), -1))
         ends += [0] * (len(each) - 1) + [1]
-    made = [Renderer(DESIGN).compute(each, frame, codes).beats for each in expected]
+    made = [Renderer(DESIGN.built(coarse=None)).compute(each, frame, codes).beats for each in expected]
     wanted = np.concatenate([layouts.made.pack(each) for each in made])
     found = simulate(
         unit,

@@ -1,24 +1,36 @@
 """The Python interface: scenes, designs, frames and Verilog by the words of the command line."""
 
 import base64
+import dataclasses
 import io
 import re
 import subprocess
 import sys
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import blysk
+from blysk.golden.build import Build
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.pipeline import Build
 from blysk.golden.presets import METHODS, preset
-from blysk.sim.api.options import DESIGN, RENDERING, SCENE, DesignOptions, RenderOptions, SceneOptions
+from blysk.sim.api.options import (
+    BUILD,
+    DESIGN,
+    RENDERING,
+    SCENE,
+    BuildOptions,
+    DesignOptions,
+    RenderOptions,
+    SceneOptions,
+)
 from blysk.sim.cli.main import main
 from blysk.sim.errors import OptionError
 from blysk.sim.meshes.mesh import load_mesh
+from blysk.sim.value_types import Choice, Few, Truth
 
 TINY = {"triangles": 100, "size": (16, 12)}
 
@@ -41,12 +53,33 @@ def test_import_is_quick():
 def test_every_option_has_a_type_for_checkers():
     assert SceneOptions.__annotations__.keys() == SCENE.keys()
     assert DesignOptions.__annotations__.keys() == DESIGN.keys()
+    assert BuildOptions.__annotations__.keys() == BUILD.keys()
     assert RenderOptions.__annotations__.keys() == SCENE.keys() | DESIGN.keys() | RENDERING.keys()
     options = {**SCENE, **DESIGN, **RENDERING}
+    for table, types in ((options, RenderOptions), (BUILD, BuildOptions)):
+        for name, kind in get_type_hints(types).items():
+            of = table[name].kind
+            if get_origin(kind) is Literal:
+                assert set(get_args(kind)) == set(of.names if isinstance(of, Choice) else of.numbers)
+            else:
+                assert (kind is bool) == isinstance(of, Truth)
+                assert not isinstance(of, Few)
     # A scene file has all lights in [[lights]].
     assert {name for name, of in options.items() if not of.key} == {"point_lights", "spot_lights"}
     keys = [option.key for option in options.values() if option.key]
     assert len(set(keys)) == len(keys)
+
+
+def test_options_of_a_build_are_its_fields():
+    """With the same defaults; of a core ``None`` is what the geometry says, of the coarse test a size."""
+    fields = {field.name: field.default for field in dataclasses.fields(Build)}
+    assert fields.keys() - BUILD.keys() - DESIGN.keys() == {"exponent", "geometry_style"}
+    for name, option in (BUILD | DESIGN).items():
+        if name in fields and name != "top":
+            assert option.default == fields[name]
+    of_design = {field.name for field in dataclasses.fields(blysk.Design)}
+    assert BUILD.keys() - fields.keys() == {"geometry"}
+    assert not of_design & fields.keys()
 
 
 def test_a_scene_warns_of_what_is_not_read(tmp_path):

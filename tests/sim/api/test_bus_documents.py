@@ -8,7 +8,6 @@ from shutil import which
 import pytest
 
 from blysk.golden.presets import preset
-from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import BusUnit
 from blysk.sim.api.bus_documents import FRAME, documents_of
 
@@ -16,14 +15,14 @@ pytestmark = pytest.mark.filterwarnings("ignore::amaranth.hdl._ir.UnusedElaborat
 
 CORES = {
     "shader": preset("quotient", "blinn", 2, materials=3),
-    "render": Renderer(preset()),
-    "geometry": Renderer(preset("linear", "cosquad")),
+    "render": preset(),
+    "geometry": preset("linear", "cosquad"),
 }
 
 
 @pytest.fixture(scope="module", params=CORES)
 def unit(request):
-    return BusUnit("axi", request.param, CORES[request.param])
+    return BusUnit(CORES[request.param].built(top=request.param, bus="axi"))
 
 
 def test_map_has_no_overlap(unit):

@@ -30,8 +30,7 @@ def accepted(settings):
     """Whether a rendering is prepared up to the model; refusals come before it."""
     try:
         read = rendering.rendering_settings("teapot", {"size": (16, 12), "triangles": 220, **settings})
-        made = rendering._design(read)
-        rendering._check_geometry(read, made)
+        rendering._built(read, rendering._design(read))
     except OptionError:
         return False
     return True

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import METHODS, MODELS
 from blysk.golden.reference.lighting import Light
+from blysk.sim.api.options import DESIGN, RENDERING, SCENE
 from blysk.sim.api.scene_file import MAX_BYTES, read_scene_file
 from blysk.sim.errors import InputError
 
@@ -65,6 +66,21 @@ def test_documented_example(write):
     assert file.keys["mesh"] == "mesh.file"
     assert file.keys["exponent"] == "material.exponent"
     assert file.keys["lights"] == "lights"
+
+
+def test_documented_example_has_every_key(write):
+    """That of an option that is left out stands in a comment; in [pipeline] with its default."""
+    parts = re.split(r"^\[+(\w+)\]+.*$", EXAMPLE, flags=re.M)
+    sections = dict(zip(["", *parts[1::2]], parts[::2], strict=True))
+    for option in (SCENE | DESIGN | RENDERING).values():
+        section, _, key = option.key.rpartition(".")
+        if option.key != "lights":
+            assert not key or re.search(rf"^(# )?(\w+, )?{key}\b", sections[section], re.M)
+    pipeline = re.sub(r"^# ", "", sections["pipeline"], flags=re.M)
+    values = read_scene_file(write(f"{MESH}[pipeline]\n{pipeline}")).values
+    shown = {"method": "quotient", "operand": "cosine", "setup_interval": 4}
+    for name, option in (DESIGN | RENDERING).items():
+        assert values[name] == shown.get(name, option.default)
 
 
 def test_only_what_is_there(write):

@@ -174,7 +174,7 @@ UNKNOWN = "use one of software, hardware"
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
         # It would send spans.
         ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
-        ((*VERILOG, "--coarse", "64x48"), "--coarse", "also give --top render"),
+        ((*VERILOG, "--coarse", "64x48"), "--coarse", "also give top render"),
         ((*VERILOG, "--setups", "2"), "--setups 2", NO_SETUP + "use top geometry or render"),
         ((*VERILOG, "--setups", "3"), "--setups 3", "give one of 1, 2"),
     ],

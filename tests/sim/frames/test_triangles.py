@@ -61,7 +61,7 @@ def test_vectors(style, model):
 def test_small_triangles_with_two_lanes():
     """Every triangle of the teapot is sent: 1.1 cycles a shaded pixel at most."""
     size = 640, 480
-    frame = TriangleSimulator(Renderer(design()), size, setups=2).render(
+    frame = TriangleSimulator(Renderer(design().built(top="render", setups=2)), size).render(
         scene("teapot", size=size, triangles=10_000)
     )
     assert len(frame.sent.triangles) == 10_712

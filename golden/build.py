@@ -1,0 +1,152 @@
+"""How a design is built: options that change cost and cycles, and no pixel."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from blysk.golden.bus.framing import BUSES, PACKETS
+from blysk.golden.geometry.coarse_depth import CoarseDepth
+from blysk.golden.lighting.highlight_operand import MAX_EXPONENT
+
+__all__ = ["PIPES", "PORTS", "SETUPS", "STYLES", "TOPS", "Build", "BuildError", "Style"]
+
+Style = Literal["throughput", "compact"]
+"""Name of a style."""
+
+STYLES: tuple[Style, ...] = ("throughput", "compact")
+"""Styles: one pixel a cycle, or few multipliers."""
+
+PIPES = (1, 2, 4, 8)
+"""Numbers of shading pipelines."""
+
+SETUPS = (1, 2)
+"""Numbers of lanes of triangle setup."""
+
+TOPS = tuple(PACKETS)
+"""Cores: spans to pixels, triangles to spans, triangles to pixels."""
+
+PORTS = ("native", *BUSES)
+"""Ports of a core: its own streams, or a bus."""
+
+
+class BuildError(ValueError):
+    """Two options of a build exclude each other.
+
+    Parameters
+    ----------
+    option : str
+        Field of `Build` that does not suit the others.
+    reason, remedy : str
+        Why, and an action that mends it.
+    """
+
+    def __init__(self, option: str, reason: str, remedy: str):
+        super().__init__(option, reason, remedy)
+        self.option, self.reason, self.remedy = option, reason, remedy
+
+    def __str__(self) -> str:
+        return f"{self.option}: {self.reason}; {self.remedy}"
+
+
+@dataclass(frozen=True)
+class Build:
+    """Build options of a design: they change its cost and its cycles, and no pixel.
+
+    A gate is no build option: it has a bit-accurate model, and frame constants of its own. See `Design`.
+
+    Parameters
+    ----------
+    style : {"throughput", "compact"}
+        One pixel a cycle, or few multipliers.
+    setup_interval : int or None
+        Least number of cycles from a span to the next, for methods with this choice. A smaller number needs
+        more multipliers. ``None``: the largest up to 4 (``renormalise``: 3), or the largest of all in the
+        compact style.
+    exponent : int or None
+        Specular exponent, fixed at build time; ``None``: the exponent is a frame constant.
+    pipes : {1, 2, 4, 8}
+        Number of pipelines, see `PixelPipelines`.
+    merged : bool
+        Whether several pipelines give one stream of pixels in place of one each.
+    top : {"shader", "geometry", "render"}
+        The core: spans to pixels, triangles to spans, or triangles to pixels.
+    setups : {1, 2}
+        Lanes of triangle setup of a core that takes triangles.
+    geometry_style : {"throughput", "compact"} or None
+        Style of the geometry of a core that takes triangles; ``None``: ``style``.
+    coarse : CoarseDepth or None
+        Depth test that drops hidden spans before shading, of a core from triangles to pixels.
+    bus : {"native", "axi", "wishbone"}
+        Ports: the core's own streams, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
+
+    Raises
+    ------
+    ValueError
+        If a value is unknown or out of range. Of two options that exclude each other it is a `BuildError`.
+    """
+
+    style: Style = "throughput"
+    setup_interval: int | None = None
+    exponent: int | None = None
+    pipes: int = 1
+    merged: bool = False
+    top: str = "shader"
+    setups: int = 1
+    geometry_style: Style | None = None
+    coarse: CoarseDepth | None = None
+    bus: str = "native"
+
+    def __post_init__(self) -> None:
+        for name, values in _CHOICES.items():
+            if getattr(self, name) not in values:
+                known = ", ".join(str(value) for value in values if value is not None)
+                raise ValueError(f"{name} must be one of {known}, not {getattr(self, name)!r}")
+        if self.exponent is not None and not 1 <= self.exponent <= MAX_EXPONENT:
+            raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {self.exponent}")
+        self._check_pairs()
+
+    def _check_pairs(self) -> None:
+        """Refuse options that exclude each other: none is ignored."""
+        if self.takes_triangles and self.pipes > 1:
+            raise BuildError("pipes", "triangles go to one pipeline", "leave out pipes, or use spans")
+        if self.bus != "native" and self.pipes > 1:
+            raise BuildError("pipes", f"a core on {self.bus} has one pipeline", "leave out pipes or bus")
+        if self.merged and self.pipes == 1:
+            raise BuildError("merged", "one pipeline has one stream", "also give pipes")
+        triangles = "use top geometry or render"
+        if self.setups > 1 and not self.takes_triangles:
+            raise BuildError("setups", "spans need no triangle setup", triangles)
+        if self.geometry_style is not None and not self.takes_triangles:
+            raise BuildError("geometry_style", "spans need no geometry", triangles)
+        if self.coarse is not None and self.top != "render":
+            raise BuildError("coarse", "it is of triangles to pixels", "also give top render")
+
+    @property
+    def shading(self) -> "Build":
+        """The options that one shading pipeline reads; the others at their defaults."""
+        return Build(self.style, self.setup_interval, self.exponent)
+
+    @property
+    def takes_triangles(self) -> bool:
+        """Whether triangles go into the core; else spans do."""
+        return self.top != "shader"
+
+    @property
+    def compact(self) -> bool:
+        """Whether shading has the compact style."""
+        return self.style == "compact"
+
+    @property
+    def compact_geometry(self) -> bool:
+        """Whether geometry has the compact style."""
+        return (self.geometry_style or self.style) == "compact"
+
+
+_CHOICES = {
+    "style": STYLES,
+    "pipes": PIPES,
+    "top": TOPS,
+    "setups": SETUPS,
+    "geometry_style": (None, *STYLES),
+    "bus": PORTS,
+}
+"""Values of the fields that have few."""
