@@ -160,7 +160,8 @@ def _criteria(quick: bool) -> list[Claim]:
 
 
 def _cycles(quick: bool) -> list[Claim]:
-    scenes = [(_SIZES[0], triangles, method) for method in METHODS for triangles in _TRIANGLES]
+    # Methods of a scene follow each other, so that a process rasterises it once.
+    scenes = [(_SIZES[0], triangles, method) for triangles in _TRIANGLES for method in METHODS]
     scenes += [(_SIZES[1], triangles, _METHOD) for triangles in _TRIANGLES[: -1 if quick else None]]
     return [
         _claim(

@@ -8,7 +8,6 @@ import pytest
 from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.polynomials import largest_error, minimax
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 
@@ -52,47 +51,6 @@ def test_slope_of_the_epicentre_fit(n):
     )
     assert own[blinn >= 0.5].max() < refitted[blinn >= 0.5].max() / 2
     assert refitted.max() < 0.56 * own.max()
-
-
-# Reflection models.
-
-
-def test_zone_of_the_relative_errors():
-    """[C] does not define its zone: 0.594 gives f2 7.90 %, and the lower bound 0.59363 the 7.92 % shown."""
-    worst = {}
-    for bound in (0.594, 0.59363):
-        worst[bound] = max(
-            float(1 - REFLECTION_MODELS["cosquad"].reflect(bound ** (1 / n), n) / bound)
-            for n in range(2, 1001)
-        )
-    assert [f"{value:.2%}" for value in worst.values()] == ["7.90%", "7.92%"]
-
-
-def test_printed_energy_coefficients_are_not_the_factors():
-    """[C] prints n for pi and n/2 for -n/2; what is printed does not normalise."""
-    for n in (10, 100):
-        printed_phong = (n + 2) / (2 * n)
-        printed_blinn = (n + 2) * (n + 4) / (8 * n * (2 ** (n / 2) + n))
-        assert abs(printed_phong / REFLECTION_MODELS["phong"].energy_factor(n) - 1) > 0.3
-        assert abs(printed_blinn / REFLECTION_MODELS["blinn"].energy_factor(n) - 1) > 0.3
-
-
-# arccos, table 3.1.
-
-
-@pytest.mark.parametrize(
-    ("degree", "absolute", "relative"), [(2, "9.2e-04", "8.7e-04"), (3, "6.8e-05", "6.5e-05")]
-)
-def test_octave_segments(degree, absolute, relative):
-    """arccos x in octaves of ``1 - x``, the widest of them, [1/2, 1], by a polynomial of least error.
-
-    Neither is the 1.7e-4 rad that is quoted for octave segments: quadratics are five times worse
-    and cubics better. From one octave to the next the error falls by sqrt 2 and no relative one grows.
-    """
-    error = largest_error(np.arccos, minimax(np.arccos, 0.0, 0.5, degree), 0.0, 0.5)
-    assert [f"{value:.1e}" for value in error] == [absolute, relative]
-    next_one = largest_error(np.arccos, minimax(np.arccos, 0.5, 0.75, degree), 0.5, 0.75)
-    assert next_one[0] < error[0]
 
 
 def test_half_chord_keeps_its_precision():
