@@ -14,11 +14,11 @@ class AttributeSerialiser:
     """The components of N/W and the depth of sorted triangles, one after the other, and `least`.
 
     ``least`` is a lower bound of the length m of N/W in the triangle: ``m >= max(9/16 M, L, 0)``. Components
-    are cut to 11 fraction bits, and the bits of one that is negative at the first corner are inverted at all
-    three. M is the smallest of the corners' sums of components. For L the smallest value at the corners is
-    taken of each component, and L is the largest of these three. A vector is at least as long as its largest
-    component, and as ``1/sqrt(3) > 9/16`` of the sum of its components. Every N/W in the triangle is a
-    weighted mean of the corners' N/W, so that the bound holds there too.
+    are cut to 11 fraction bits. If a component is negative at the first corner, its bits are inverted at all
+    three corners. M is the smallest of the corners' sums of components. L is the largest of three values: the
+    smallest value of each component at the corners. A vector is at least as long as its largest component,
+    and as ``1/sqrt(3) > 9/16`` of the sum of its components. Every N/W in the triangle is a weighted mean of
+    the corners' N/W. So the bound holds there too.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

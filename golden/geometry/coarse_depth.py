@@ -1,4 +1,6 @@
-"""Coarse depth test: spans that are hidden for their whole length, by a bound of the depths of each block."""
+"""Coarse depth test, which drops spans that are hidden for their whole length, by a bound of each block's
+depths.
+"""
 
 from dataclasses import dataclass
 
@@ -17,22 +19,25 @@ BLOCKS = (4, 8, 16)
 
 @dataclass(frozen=True)
 class CoarseDepth:
-    """Bounds of the depths in blocks of pixels; a span behind the bounds of all its blocks is hidden.
+    """Bounds of the depths in blocks of pixels. A span behind the bounds of all its blocks is hidden.
 
     A block has a bound b, a candidate c and a mask. No depth that `DepthTest` has stored in the block is
-    deeper than b. A span's pixels in the block lie between ``lo`` and ``hi``, as depth is linear: they are
-    hidden if ``lo > b``. If ``hi < b``, they are marked in the mask and c becomes the larger of c and ``hi``;
-    once all pixels of the block are marked, c is the new b and the mask is empty. Depths are compared by
-    their upper bits. A span may therefore be kept that could be dropped, but never the reverse: of two
-    depths whose upper bits differ the larger is deeper. The part of a span that is behind the bound of its
-    block changes nothing in the block's word, so that a dropped span leaves no trace.
+    deeper than b. Depth is linear, so a span's pixels in the block lie between ``lo`` and ``hi``.
+
+    - If ``lo > b``, they are hidden.
+    - If ``hi < b``, they are marked in the mask, and c becomes the larger of c and ``hi``. When all pixels of
+      the block are marked, c is the new b and the mask is empty.
+
+    Depths are compared by their upper bits: of two depths with different upper bits the larger is deeper. So
+    the test may keep a span that could be dropped, but never the reverse. A part of a span behind the bound
+    of its block leaves the block's word as it is. So a dropped span leaves no trace.
 
     A word also has a tag, the number of the picture in which it was written, modulo ``2^tag_bits``. A word
-    with the tag of another picture counts as cleared. With each picture `swept` words are cleared, those
-    first that were cleared longest ago, so that every word is cleared before its tag comes up again.
+    with the tag of another picture counts as cleared. With each picture `swept` words are cleared, the words
+    cleared longest ago first. So every word is cleared before its tag comes up again.
 
-    Spans go on to shading and to `DepthTest` in the order in which they came, so that the depths under a
-    bound are stored before those of a later span are tested. Pictures with and without this test are equal.
+    Spans go on to shading and to `DepthTest` in the order in which they came. So the depths under a bound are
+    stored before the depths of a later span are tested. Pictures with and without this test are equal.
 
     Parameters
     ----------
@@ -81,7 +86,7 @@ class CoarseDepth:
 
     @property
     def deepest(self) -> int:
-        """Bound of a cleared block, which is that of no depth."""
+        """Bound of a cleared block, behind every depth."""
         return (1 << self.depth_bits) - 1
 
     @property
@@ -114,7 +119,7 @@ class CoarseDepth:
         depth_step : int64 array, shape (S,)
             Step of the depth from a pixel to the next, SQ(25, 9).
         picture : int or int array, shape (S,), optional
-            Number of each span's picture. Where it differs from that of the span before, a new picture
+            Number of each span's picture. If it differs from the number of the span before, a new picture
             begins, with all bounds cleared.
 
         Returns
@@ -140,7 +145,7 @@ class CoarseDepth:
         return np.logical_and.reduceat(behind, first) if len(first) else np.zeros(0, dtype=bool)
 
     def _behind(self, place: np.ndarray, lo: np.ndarray, hi: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """Whether each part of a span is behind the bound of its block; parts in the order of the spans."""
+        """Whether each part of a span is behind the bound of its block, in the order of the spans."""
         order = np.argsort(place, kind="stable")
         _, block, count = np.unique(place[order], return_inverse=True, return_counts=True)
         rank = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)

@@ -1,4 +1,4 @@
-"""Depth test: the depth of every pixel of spans, and which of them are in front of what came before."""
+"""Depth test: the depth of every pixel of spans, and whether it is in front of the pixels before it."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ __all__ = ["DepthTest"]
 
 @dataclass(frozen=True)
 class DepthTest:
-    """``floor(z + k step)`` at pixel k of a span; a pixel is drawn if this depth is less than the stored one.
+    """``floor(z + k step)`` at pixel k of a span. If this is less than the stored depth, the pixel is drawn.
 
-    The sum is exact. It saturates to 0 and to `FARTHEST`, one less than `CLEARED`, the depth that a picture
-    is cleared to, so that the first pixel at a place is always drawn. Of equal depths the first stays.
+    The sum is exact. It saturates to 0 and to `FARTHEST`. A picture is cleared to the depth `CLEARED`, one
+    more. So the first pixel at a place is always drawn. Of equal depths the first stays.
 
     The step is rounded to nine fraction bits; this error, at most 2^-10, adds up along a span. Together with
     it the depth of a pixel is off by at most ``2^23`` times `GradientSetup.error`, and 1 for the cut.
@@ -50,7 +50,7 @@ class DepthTest:
         return found
 
     def drawn(self, pixel: np.ndarray, depth: np.ndarray) -> np.ndarray:
-        """Whether each pixel is drawn: its depth is less than those of all earlier pixels at its place.
+        """Whether each pixel is drawn, because its depth is less than all earlier depths at its place.
 
         Parameters
         ----------

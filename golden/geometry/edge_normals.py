@@ -49,7 +49,7 @@ class PlacedSpans:
 
     @classmethod
     def of(cls, pieces: Pieces, **others: np.ndarray) -> Self:
-        """Spans of this class: places and depths from ``pieces``, its other fields from ``others``."""
+        """Spans of this class, with places and depths from ``pieces`` and other fields from ``others``."""
         placed = {name: getattr(pieces, name) for name in ("x", "y", "length", "material", "triangle")}
         depths = {name: getattr(pieces, name).codes for name in ("depth", "depth_step")}
         return cls(**placed, **depths, **others)
@@ -66,10 +66,10 @@ class TrueSpans(PlacedSpans):
     depth_last : int64 array, shape (S,)
         Depth at the last pixel, UQ(24, 9).
     normal_left, normal_right : int64 arrays, shape (S, 3)
-        Unit normals, SQ(1, 17), at the first pixel's centre and at the last one's.
+        Unit normals, SQ(1, 17), at the centres of the first and of the last pixel.
     line_left, line_right : int64 arrays, shape (S, 3)
         N/W at the first and at the last pixel, `SPAN_NORMAL`: the normals with their magnitudes. The straight
-        line between them is perspective-correct. Where ``flip`` is set they point against the unit normals.
+        line between them is perspective-correct. If ``flip`` is set, they point against the unit normals.
     flip : bool array, shape (S,)
         Whether the unit normals are negated.
     """
@@ -86,11 +86,11 @@ class TrueSpans(PlacedSpans):
 class EdgeNormals:
     """Unit normals of pieces by `VectorNormaliser`: left, and right from 2 pixels on.
 
-    N/W is linear along a scanline, and normalising takes 1/W away: both are the perspective-correct normals.
+    N/W is linear along a scanline, and normalising takes 1/W away. So both normals are perspective-correct.
 
-    A normal is lost where opposite normals cancel, or where a corner has none. It is repaired: the normal
-    before it takes its place, in the order of the pieces and within a piece of left, right. Before the first
-    of all stands (0, 0, `ONE`), `FIRST`. Repaired normals are counted.
+    A normal is lost where opposite normals cancel, or where a corner has no normal. The normal before it
+    takes its place, in the order of the pieces and within a piece of left, right. Before the first normal
+    stands (0, 0, `ONE`), `FIRST`. These *repaired* normals are counted.
 
     Parameters
     ----------

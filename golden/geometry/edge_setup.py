@@ -85,8 +85,8 @@ class EdgeSetup:
 
         x = ceil((X - h) / P) = ceil(((x0 - h) d + (x1 - x0) k) / (P d))
 
-    From a scanline to the next k grows by P, and the numerator by ``P (x1 - x0)``. As ``x`` is also
-    ``ceil(ceil(numerator / P) / d)``, the factor P drops out, and the walk is
+    From a scanline to the next k grows by P, and the numerator by ``P (x1 - x0)``. ``x`` is also
+    ``ceil(ceil(numerator / P) / d)``. So the factor P drops out, and the walk is
     ``x += step; error += error_step; if error >= d: x += 1; error -= d`` with
     ``step, error_step = divmod(x1 - x0, d)``, exactly.
 
@@ -95,11 +95,12 @@ class EdgeSetup:
         g + k step = P a + b,    u = floor((b d + k error_step - 1) / P),    -1 <= u < 2 d - 1
         x = c + a + n,    error = u + d (1 - n),    n = 0 if u < 0, 1 if u < d, else 2
 
-    Both bounds of a span come from the same x: it is the first column of a left edge, and the first after
-    the span at a right one. So a sample on an edge that two triangles share belongs to the right one only,
-    and no sample between them is missed.
+    Both bounds of a span come from the same x. At a left edge x is the first column, at a right edge the
+    first column after the span. So a sample on an edge that two triangles share belongs to the right triangle
+    only, and no sample between them is missed.
 
-    The words of an edge without scanlines have no meaning; they are those of the hardware, where x wraps.
+    The words of an edge without scanlines have no meaning. They equal the words of the hardware, where x
+    wraps.
 
     Parameters
     ----------

@@ -54,16 +54,16 @@ class Rows:
 
 @dataclass(frozen=True)
 class EdgeWalk:
-    """Walks the long edge of a triangle, and beside it first the upper edge, then the lower one.
+    """Walks the long edge of a triangle, and beside it first the upper edge, then the lower edge.
 
-    On a scanline between its first and its last corner a triangle, a convex figure, reaches from the long
-    edge to the short one that crosses the scanline. The third edge lies above or below it. So the larger of
-    the left bounds and the smaller of the right ones, of all edges, are those of these two. An edge from y0
-    to y1 has the scanlines whose centres are at y0 or below it, and above y1: this is the top-left rule for
-    corners and for horizontal edges.
+    A triangle is convex. On a scanline between its first and its last corner it reaches from the long edge to
+    the short edge that crosses the scanline. The third edge lies above or below the scanline. So these two
+    edges give the larger of all left bounds and the smaller of all right bounds. An edge from y0 to y1 has
+    the scanlines whose centres are at y0 or below it, and above y1. This is the top-left rule for corners and
+    for horizontal edges.
 
-    Columns follow ``x += step; error += error_step; if error >= height: x += 1; error -= height``, of which
-    this model has the closed form.
+    Columns follow ``x += step; error += error_step; if error >= height: x += 1; error -= height``. This model
+    has the closed form.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
@@ -78,7 +78,7 @@ class EdgeWalk:
         triangles : SortedTriangles
             The triangles of the edges.
         frame : Frame
-            The picture: scanlines below it are not walked.
+            The picture. Scanlines below it are left out.
 
         Returns
         -------

@@ -35,19 +35,19 @@ class Geometry:
     grid : Grid
         Fraction bits of the coordinates.
     lines : bool
-        Whether spans have their true line, N/W at both ends, in place of unit normals; then no span is cut
+        Whether spans have their true line, N/W at both ends, in place of unit normals. Then no span is cut
         into pieces, and no normal is normalised.
     vectors : bool
-        Whether spans have N/W at the first pixel and its step in place of unit normals: they are cut by
-        `SpanHalver`, and no normal is normalised. Not with ``lines``.
+        Whether spans have N/W at the first pixel and its step in place of unit normals. `SpanHalver` then
+        cuts spans, and no normal is normalised. Not with ``lines``.
     rotates : bool
-        Whether vectors are to be turned into the frames of further lights, see `VectorAdapter`; only with
+        Whether vectors will be turned into the frames of further lights, see `VectorAdapter`. Only with
         ``vectors``.
 
     Raises
     ------
     ValueError
-        If spans are to have both lines and vectors, or to be turned without vectors.
+        If both ``lines`` and ``vectors`` are given, or ``rotates`` without ``vectors``.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -65,7 +65,7 @@ class Geometry:
 
     @property
     def gives(self) -> str:
-        """What spans have: unit normals, true lines, vectors, or vectors for several lights."""
+        """Kind of spans: unit normals, true lines, vectors, or vectors for several lights."""
         vectors = "vectors for several lights" if self.rotates else "vectors"
         return "true lines" if self.lines else vectors if self.vectors else "unit normals"
 
@@ -137,7 +137,7 @@ class Geometry:
         return replace(spans, triangle=drawn.source[spans.triangle]), counts
 
     def _shaded(self, pieces: Pieces) -> tuple[TrueSpans | LineSpans | VectorSpans, int]:
-        """What the pipeline reads of pieces, and the number of normals that were repaired."""
+        """The part of pieces that the pipeline reads, and the number of repaired normals."""
         if self.lines or self.vectors:
             return (LineAdapter() if self.lines else VectorAdapter(self.rotates)).compute(pieces), 0
         return EdgeNormals().compute(pieces)

@@ -26,8 +26,8 @@ class Gradients:
     inward : Fixed, SQ(2, 32)
         Step from a pixel to the next one away from the long edge.
     size : int64 array
-        Upper bound of ``|inward|`` before it is taken modulo 4, in 2^-20, 1 to ``2^20 - 1``; the largest
-        stands for all larger ones.
+        Upper bound of ``|inward|`` before it is taken modulo 4, in 2^-20, 1 to ``2^20 - 1``. The largest
+        stands for all larger bounds.
     """
 
     start: Fixed
@@ -49,17 +49,17 @@ class GradientSetup:
     """The plane of an attribute v in the form that the walk along the long edge needs.
 
     The corners' values are v0, v1, v2 from the top. ``r`` is the step of v along the long edge per scanline,
-    ``g`` the step per pixel away from that edge; neither subtracts large numbers that nearly cancel:
+    ``g`` the step per pixel away from this edge. Both avoid differences of large numbers that nearly cancel:
 
         r = (v2 - v0) / D,    g = (v1 - v0 - r D1) / W
 
-    D is the height, D1 that of the middle corner, W the width there. Every value in the triangle is
-    ``v0 + r (y - y0) + g |x - X(y)|``, a mean of corners' values whose weights are off by little, however
-    thin the triangle is.
+    D is the height, D1 the height of the middle corner, W the width there. Every value in the triangle is
+    ``v0 + r (y - y0) + g |x - X(y)|``. This is a mean of the corners' values, and its weights are off by
+    little even in a thin triangle.
 
-    The pixel at the long edge moves by whole columns, so that v moves by ``short = r - f g`` a scanline,
-    ``f`` the fraction of the edge's step, and by ``long = short + g`` with the walk's carry. Where the edge
-    is on the right, g has the other sign in both: ``short = r + f g``, ``long = short - g``. The start is
+    The pixel at the long edge moves by whole columns. So v moves by ``short = r - f g`` a scanline, ``f`` the
+    fraction of the edge's step, and by ``long = short + g`` with the walk's carry. If the edge is on the
+    right, g has the other sign in both: ``short = r + f g``, ``long = short - g``. The start is
     ``v0 + (k short + n g) / 256`` with ``k = down`` of `Edges`, and with ``n = along`` if the edge is on the
     left, ``n = 256 - along`` if it is on the right.
 
@@ -79,8 +79,9 @@ class GradientSetup:
     k short, n g fraction 28  one sum, cut after the division by 256
     ============ ============ =====================================================================
 
-    Finished sums are taken modulo 4. Attributes are in [-1, 1), so that the values at covered pixels are
-    right even where a step or a value on the way wraps. `error` is the bound. Twelve multiplications.
+    Finished sums are taken modulo 4. Attributes are in [-1, 1). So the values at covered pixels are right
+    even where a step or a value on the way wraps. `error` is the bound. The setup takes twelve
+    multiplications.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -101,13 +102,7 @@ class GradientSetup:
     def error(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
         """Bound on the error of an attribute at any pixel that a triangle covers, before it is cut.
 
-        E is the error of `Reciprocal`, L that of a `wide_product`, w the relative error of 1/W. As v2 - v0 is
-        below 2, ``r D'`` is off by ``e1 = 2 E + L``, ``v1 - v0 - r D1`` by ``2 e1 + L``, and ``g W'`` by
-        ``e2 = 2 e1 + L + 2 w + L``. Over the height the error of ``r D'`` counts ``D/D'`` times, over the
-        width that of ``g W'`` counts ``W/W'`` times: both factors are at most 2. Each scanline adds the
-        roundings of r, f g and g, 2^-33 each. It also adds the errors of f, 2^-33, and of the product
-        ``f g W'``, 2^-33 + 2^-39, times ``2/W`` at most. Each column adds the rounding of g, and the start
-        four cuts at 2^-28.
+        docs/theory/bounds.md#gradients derives it.
 
         Parameters
         ----------

@@ -17,9 +17,9 @@ class HalfwayVector:
     """``H = (L + V) / |L + V|``; 0 where L and V are opposite.
 
     The sum is exact, and half of it is normalised by `VectorNormaliser`. So the length of H is off by at most
-    `VectorNormaliser.LENGTH_ERROR`, and its direction, against that of the exact sum of the operands, by at
-    most `VectorNormaliser.DIRECTION_ERROR`. L and V count as opposite if all components of their sum are in
-    [-2^-15, 2^-15).
+    `VectorNormaliser.LENGTH_ERROR`. Its direction is off by at most `VectorNormaliser.DIRECTION_ERROR` from
+    the exact sum of the operands. If all components of the sum are in [-2^-15, 2^-15), L and V count as
+    opposite.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class HalfwayVector:
         halfway : Fixed, shape (..., 3), SQ(1, 17)
             H.
         opposite : bool array, shape (...)
-            Whether L and V are opposite; then H is 0.
+            Whether L and V are opposite. Then H is 0.
         """
         half = (light + viewer).wrap(self.SUM_FORMAT).scale(-1).extend(SPAN_NORMAL)
         halfway, opposite = self.normaliser.compute(half, np.zeros(half.shape[:-1], dtype=bool))

@@ -15,9 +15,9 @@ __all__ = ["LightAdapter"]
 class LightAdapter:
     """Components of `SpanVectors` in the frames of further lights, from x, y, z in the frame of the first.
 
-    A component is the product of a row of three codes, an axis of the light's frame, and the vector: three
-    products of 18 bits, whose exact sum is rounded half up to 17 fraction bits. Start and step have the same
-    rows. Of a span of one pixel, whose step has no meaning, the step has the components of the start.
+    A component is the dot product of the vector and a row of three codes, an axis of the light's frame. The
+    exact sum of three products of 18 bits is rounded half up to 17 fraction bits. Start and step have the
+    same rows. In a span of one pixel the step has no meaning, and gets the components of the start.
 
     ========== ============ =====================================================================
     word       format       why
@@ -27,9 +27,9 @@ class LightAdapter:
     component  SQ(1, 17)    modulo 2; no axis makes it longer than the vector, so that none wraps
     ========== ============ =====================================================================
 
-    A code of an axis is off by 2^-18, or by 2^-17 for 1 and -1, where the axis's others are 0: a vector is
-    turned, or stretched, by ``3 2^-18`` of its length at most. A component is rounded by half a step; that of
-    the step counts as the step's own rounding does, see `VectorAdapter`.
+    A code of an axis is off by 2^-18. For 1 and -1, where the axis's other codes are 0, it is off by 2^-17.
+    So a vector is turned, or stretched, by ``3 2^-18`` of its length at most. A component is rounded by half
+    a step. The rounding of the step's components counts as the step's own rounding, see `VectorAdapter`.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -52,7 +52,7 @@ class LightAdapter:
         return found
 
     def compute(self, spans: VectorSpans, axes: np.ndarray) -> VectorSpans:
-        """Bit-accurate spans: the three components that they have, and those of each row.
+        """Bit-accurate spans: their three components, and a component for each row.
 
         Parameters
         ----------

@@ -15,15 +15,15 @@ __all__ = ["MirrorAdapter"]
 class MirrorAdapter:
     """Components x, ``y cos a``, z and ``y sin a`` of `SpanVectors`, from x, y and z.
 
-    Those of further lights stay as they are, before ``y sin a``.
+    Components of further lights stay as they are, before ``y sin a``.
 
-    Start and step are multiplied by the codes of sin a and cos a that the pipeline has as direction to the
-    light, and rounded half up to 17 fraction bits: products of 18 bits. Of a span of one pixel, whose step
-    has no meaning, the step has the products of the start.
+    The pipeline has the codes of sin a and cos a as direction to the light. Start and step are multiplied by
+    them, products of 18 bits, and rounded half up to 17 fraction bits. In a span of one pixel the step has no
+    meaning, and gets the products of the start.
 
-    The codes are off by 2^-18, and both have the scale `QuotientSpans.ONE`: that is an error of y and of a by
-    less than 2^-16 of themselves, and of psi by less than 2^-15. A product is rounded by half a step, beside
-    the error of y.
+    The codes are off by 2^-18, and both have the scale `QuotientSpans.ONE`. So y and a are off by less than
+    2^-16 of themselves, and psi by less than 2^-15. A product is rounded by half a step, beside the error of
+    y.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

@@ -38,24 +38,24 @@ class Planes:
 
 @dataclass(frozen=True)
 class PlaneAssembler:
-    """Finds the largest power of two of pixels over which the unit normal turns by no more than a limit.
+    """Finds the largest power of two of pixels over which the unit normal turns by at most a limit.
 
-    Unit vectors along a and b are at most ``2 |a - b| / (|a| + |b|)`` apart (Dunkl and Williams), so that
-    over p pixels of a scanline the chord is at most ``p |g| / m``, g the step of N/W per pixel and m the
-    least length of N/W in the triangle. Both are bounded:
+    Unit vectors along a and b are at most ``2 |a - b| / (|a| + |b|)`` apart (Dunkl and Williams). Let g be
+    the step of N/W per pixel, and m the least length of N/W in the triangle. Over p pixels of a scanline the
+    chord is at most ``p |g| / m``. Both are bounded:
 
     - ``|g| <= (largest + sum) / 2``, of the absolute values of the three components of g: at most
       ``sqrt(3/2) < 1.23`` times too large;
     - ``m >= least`` of `AttributeSerialiser`.
 
     ``piece`` is the largest number from 1 to 12 for which ``2^piece (largest + sum) / 2`` is at most
-    ``least`` times the frame's limit, or 0 if there is none. A piece of one pixel has no chord, so that every
-    triangle can be cut to the limit.
+    ``least`` times the frame's limit. It is 0 if there is no such number. A piece of one pixel has no chord,
+    so every triangle can be cut to the limit.
 
     Parameters
     ----------
     cuts : bool
-        Whether spans are cut; else ``piece`` is 12: a span has fewer than 2^12 pixels.
+        Whether spans are cut. If not, ``piece`` is 12: a span has fewer than 2^12 pixels.
 
     Source: docs/theory/geometry.md#normals; C. F. Dunkl, K. S. Williams, *A simple norm inequality*, 1964.
     """

@@ -32,7 +32,7 @@ class PlaneScales:
     width_reciprocal : Fixed, shape (T,), UQ(0, 25)
         Mantissa of the reciprocal of the width; 0 for a sliver.
     row_shift, column_shift : int64 arrays, shape (T,)
-        Places by which steps per scanline and per column are shifted right, 0 to 19; the column shift of a
+        Places by which steps per scanline and per column are shifted right, 0 to 19. The column shift of a
         sliver is any number modulo 32, without meaning.
     fraction, down, along, right
         Of `Edges` and `SortedTriangles`, unchanged.
@@ -64,19 +64,20 @@ class PlaneScales:
 
 @dataclass(frozen=True)
 class PlaneSetup:
-    """``1/D`` and ``1/W`` of a triangle: D its height, W its width at the middle corner, its largest width.
+    """``1/D`` and ``1/W`` of a triangle, D its height, W its width at the middle corner, its largest width.
 
-    With ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2, the width in pixels is
-    ``a / (D 2^s)``, so that ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and ``1/A``, the
-    latter of A cut to 25 fraction bits; ``d / A`` is one `wide_product`, and is halved where it is 1 or more.
+    Let ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2. The width in pixels is
+    ``a / (D 2^s)``, so ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and ``1/A``; A is cut to
+    25 fraction bits. ``d / A`` is one `wide_product`. If it is 1 or more, it is halved.
 
-    For a difference v of attributes the step per scanline is ``2^s v / D = (v / d) 2^(s - e)``, the step per
-    column ``v / W``. `GradientSetup` multiplies the mantissas by 2^8, and shifts right by
-    ``row_shift = 8 - s + e`` and by ``column_shift``, which is 8 less the exponent of ``1/W``, -11 to 8.
+    For a difference v of attributes the step per scanline is ``2^s v / D = (v / d) 2^(s - e)``. The step per
+    column is ``v / W``. `GradientSetup` multiplies the mantissas by 2^8. It shifts right by
+    ``row_shift = 8 - s + e`` and by ``column_shift``, 8 less the exponent of ``1/W``, which is -11 to 8.
     Triangles of ``W <= 1/256`` are slivers. Their ``1/W`` is 0: they have the attributes of the long edge.
 
-    Relative errors: ``1/d`` is off by `HEIGHT_ERROR`, 2 `Reciprocal.ERROR`; ``1/W`` by that, by 2^-25 for the
-    cut of A, and by 2^-24 for the `wide_product`: `WIDTH_ERROR`, 2^-22.7. Seven multiplications.
+    The relative error of ``1/d`` is `HEIGHT_ERROR`, 2 `Reciprocal.ERROR`. The cut of A adds 2^-25 and the
+    `wide_product` 2^-24: the relative error of ``1/W`` is `WIDTH_ERROR`, 2^-22.7. The setup takes seven
+    multiplications.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ __all__ = ["Reciprocal"]
 
 
 class Reciprocal:
-    """``1/x`` for ``1 <= x < 2``, as ``c0 - u (c1 - u c2)``; u is the distance from the segment's middle.
+    """``1/x`` for ``1 <= x < 2``, as ``c0 - u (c1 - u c2)``, u the distance from the segment's middle.
 
     ============ ============ =====================================================================
     word         format       why
@@ -25,9 +25,9 @@ class Reciprocal:
     1/x          UQ(1, 25)    rounded; 1 for x = 1
     ============ ============ =====================================================================
 
-    The error is at most `ERROR`, 0.875 steps of the result: 2^-27 for the rounding of the slope, 2^-18 times
-    2^-9; less than 2^-28 for the fit and the rounding of c0; 2^-26 for the last rounding. Two
-    multiplications.
+    The error is at most `ERROR`, 0.875 steps of the result. It is the sum of 2^-27 for the rounding of the
+    slope, 2^-18 times 2^-9; less than 2^-28 for the fit and the rounding of c0; and 2^-26 for the last
+    rounding. The unit takes two multiplications.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

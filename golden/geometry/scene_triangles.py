@@ -25,19 +25,19 @@ class SceneTriangles:
     Parameters
     ----------
     triangles : Triangles
-        In the order of the mesh; the pieces of a clipped one follow each other.
+        In the order of the mesh. The pieces of a clipped triangle follow each other.
     frame : Frame
         The picture.
     source : int64 array, shape (T,)
-        Index of the mesh face that each triangle is, or is a piece of.
+        Index of the mesh face of each triangle or piece.
     clipped : int
         Number of faces from which the near plane or the guard band cut a part off.
     outside : int
         Number of faces left out because they have no part inside the near plane and the guard band.
     far : int
         Number of triangles that reach to over 1,000 times the least W of the frame, in a perspective. A depth
-        is off by up to 16 steps of 2^-24 of the range of 1/W, which at r times the least W is ``r 2^-20`` of
-        W: where r is over 1,000, surfaces 0.1 % apart may change places.
+        is off by up to 16 steps of 2^-24 of the range of 1/W. At r times the least W this is ``r 2^-20`` of
+        W. If r is over 1,000, surfaces 0.1 % apart may change places.
     """
 
     triangles: Triangles
@@ -48,7 +48,7 @@ class SceneTriangles:
     far: int = 0
 
     def by_material(self) -> "SceneTriangles":
-        """The same triangles sorted by material; those of one material stay in their order."""
+        """The same triangles sorted by material. Triangles of a material stay in their order."""
         order = np.argsort(self.triangles.material, kind="stable")
         return replace(self, triangles=self.triangles[order], source=self.source[order])
 
@@ -58,23 +58,22 @@ def scene_triangles(
 ) -> SceneTriangles:
     """Transform a scene's triangles, clip and round them.
 
-    Vertices go through the camera in float64. A triangle is cut by the near plane and by the guard band, so
-    that its coordinates fit the grid; those inside both stay whole. Positions are rounded to the nearest step
-    of the grid. A normal is divided by W over the largest 1/W of its triangle and rounded to `ATTRIBUTE`. The
-    depth is ``-1/W`` in a perspective, or the distance along the line of sight: linear on the screen, from 0
-    at the nearest corner of the frame to 2^24 - 2 at the farthest, rounded.
+    Vertices go through the camera in float64. The near plane and the guard band cut a triangle, so that its
+    coordinates fit the grid. Triangles inside both stay whole. Positions are rounded to the nearest step of
+    the grid. A normal is divided by W over the largest 1/W of its triangle and rounded to `ATTRIBUTE`. The
+    depth is ``-1/W`` in a perspective, or the distance along the line of sight. It is linear on the screen,
+    scaled to 0 at the nearest corner of the frame and 2^24 - 2 at the farthest, and rounded.
 
     Parameters
     ----------
     scene : Scene
-        At most 4095 pixels wide and high; the picture is in the middle of the grid.
+        Scene of at most 4095 pixels in width and height. The picture is in the middle of the grid.
     grid : Grid
         Fraction bits of the coordinates.
     limit : int
         `Frame.limit`.
     axes : float64 array, shape (3, 3), optional
-        Unit vectors x, y and z of the frame that normals are given in, see `vector_axes`; ``None``: the
-        scene's.
+        Unit vectors x, y and z of the frame of the normals, see `vector_axes`. ``None``: the scene's frame.
 
     Returns
     -------
@@ -139,10 +138,10 @@ def scene_triangles(
 
 
 def _turned(scene: Scene, triangles: Triangles, source: np.ndarray) -> Triangles:
-    """Triangles, those without area in the world turned to the side that their normals face.
+    """Triangles. Those without area in the world are turned to the side that their normals face.
 
-    Rounding alone gives them an orientation, by which the hardware negates normals. Where it culls, those
-    that rounding turns to the front stay: they may close a seam.
+    Rounding alone gives these an orientation, by which the hardware negates normals. If the hardware culls,
+    triangles that rounding turns to the front stay, because they may close a seam.
     """
     plane, flat = planes_of(scene.mesh)
     chosen = np.flatnonzero(np.isin(source, flat))

@@ -1,4 +1,4 @@
-"""The span adapter: what the shading pipeline reads of the spans that geometry makes."""
+"""The span adapter: the part of geometry's spans that the shading pipeline reads."""
 
 from dataclasses import dataclass
 
@@ -38,9 +38,9 @@ class LineAdapter:
     """Ends of a span's true line for `LineSetup`: N/W at both, shifted together and rounded.
 
     The six components are shifted left by the same number of places: the sign copies that all of them have,
-    at most `LARGEST_SHIFT`. They are negated where ``flip`` is set, rounded half up to 22 fraction bits, and
-    saturate to ``+-(1 - 2^-22)``. A factor that all six share does not change a direction, so that the unit
-    normals along the line are those of N/W:
+    at most `LARGEST_SHIFT`. If ``flip`` is set, they are negated. They are rounded half up to 22 fraction
+    bits, and saturate to ``+-(1 - 2^-22)``. A factor that all six share does not change a direction. So the
+    unit normals along the line are those of N/W:
 
     ========== ============ =====================================================================
     word       format       why
@@ -49,8 +49,8 @@ class LineAdapter:
     ends       SQ(1, 22)    of `LineSetup`; the largest component is 1/2 or more where the shift reaches
     ========== ============ =====================================================================
 
-    Rounding moves a component of an end by at most `ERROR`, 2^-23; saturation, for components within 2^-23 of
-    -1 or 1, by at most 2^-22. The error of N/W itself is added to that.
+    Rounding moves a component of an end by at most `ERROR`, 2^-23. Saturation moves components within 2^-23
+    of -1 or 1 by at most 2^-22. The error of N/W is added.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
@@ -99,13 +99,13 @@ class LineAdapter:
 
 
 def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
-    """Spans of the shading pipeline: first pixel, length, material, and normals, the true line or vectors.
+    """Spans of the shading pipeline, with first pixel, length, material, and normals, true line or vectors.
 
     Parameters
     ----------
     spans : TrueSpans, LineSpans or VectorSpans
-        From `EdgeNormals`, with left and right unit normals; from `LineAdapter`; or from
-        `VectorAdapter`: their normals are 0.
+        From `EdgeNormals`, with left and right unit normals, from `LineAdapter`, or from `VectorAdapter`,
+        with normals of 0.
     """
     if isinstance(spans, VectorSpans):
         none = np.zeros_like(spans.start[:, :3])

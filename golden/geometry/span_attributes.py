@@ -1,4 +1,4 @@
-"""Span attributes: N/W and depth at both ends of every span, and of every piece of a wide one."""
+"""Span attributes: N/W and depth at both ends of every span, and of every piece of a wide span."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -38,9 +38,9 @@ class Pieces:
     depth, depth_last : Fixed, shape (S,), UQ(24, 9)
         Depth at the first and at the last pixel.
     depth_step : Fixed, shape (S,), SQ(25, 9)
-        Step of the depth from a pixel to the next; without meaning in a span of one pixel.
+        Step of the depth from a pixel to the next, without meaning in a span of one pixel.
     flip : bool array, shape (S,)
-        Whether the normals are to be negated.
+        Whether the normals have to be negated.
     material : int64 array, shape (S,)
         Index of the material.
     triangle : int64 array, shape (S,)
@@ -130,23 +130,24 @@ class WholeSpans:
 
 @dataclass(frozen=True)
 class SpanAttributes:
-    """Accumulators along the long edge, and from there along each span by shifts and additions.
+    """Accumulators along the long edge. From the long edge, shifts and additions go along each span.
 
-    From a scanline to the next `Gradients.short` is added to the value at the long edge's pixel or, with the
-    walk's carry, `Gradients.long`: no product. Along a scanline the value n pixels from the long edge is
-    ``n inward`` more, a sum of shifts of ``inward`` for the ones of n. Pixels that the picture's border cuts
-    off at the long edge are skipped in the same way.
+    From a scanline to the next `Gradients.short` is added to the value at the long edge's pixel, or, with the
+    walk's carry, `Gradients.long`. This takes no product. Along a scanline the value n pixels from the long
+    edge is ``n inward`` more, a sum of shifts of ``inward`` for the ones of n. Pixels that the picture's
+    border cuts off at the long edge are skipped in the same way.
 
-    A span of more than ``2^piece`` pixels is cut into pieces of ``2^piece`` pixels, from the long edge on,
-    and a last one of the pixels that are left. Each is a span of its own, with the true N/W at both its ends.
+    A span of more than ``2^piece`` pixels is cut into pieces of ``2^piece`` pixels, from the long edge on.
+    The remaining pixels are the last piece. Each piece is a span of its own, with the true N/W at both its
+    ends.
 
-    Values are exact sums of the gradients' codes, modulo 4. They are cut to the pieces' formats, and saturate
-    where errors carry them out of range.
+    Values are exact sums of the gradients' codes, modulo 4. They are cut to the pieces' formats. Where errors
+    carry them out of range, they saturate.
 
     Parameters
     ----------
     whole : bool
-        Whether spans are given whole, as `WholeSpans`, for `SpanHalver`; else in pieces.
+        Whether the unit gives whole spans, as `WholeSpans`, for `SpanHalver`, in place of pieces.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """

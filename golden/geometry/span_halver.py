@@ -1,4 +1,4 @@
-"""The span halver: spans cut where N/W grows too short along them for a method that takes vectors."""
+"""The span halver, which cuts spans where N/W grows too short for a method that takes vectors."""
 
 from dataclasses import dataclass
 
@@ -18,33 +18,33 @@ __all__ = ["SpanHalver"]
 
 @dataclass(frozen=True)
 class SpanHalver:
-    """Pieces of spans along which N/W stays long: halves, and halves of those, where a simple test says so.
+    """Pieces of spans along which N/W stays long, by repeated halving where a simple test asks for it.
 
     The components of N/W at both ends of a span are shifted left by the places that none of them needs, at
-    most `LARGEST_SHIFT`. Of each the first `BITS` bits of its magnitude are looked at, ``m``, so that it is
-    at least ``m 2^-BITS``. A span *fits* if at both ends
+    most `LARGEST_SHIFT`. The test reads the first `BITS` bits ``m`` of each magnitude, which is at least
+    ``m 2^-BITS``. A span *fits* if at both ends
 
     - a component that keeps its sign has a magnitude of `AXIS` or more;
     - or the magnitudes of two components that keep their signs have the sum `PAIR` or more;
-    - or none has 1/2: both ends are under 2^-8, too short for any words.
+    - or no component has 1/2: both ends are under 2^-8, too short for any words.
 
-    A span of two pixels with a component that changes its sign, and is 1/2 or more at an end, does not fit:
-    its step might not. A span of one pixel fits.
+    A span of one pixel fits. A span of two pixels fits only if no component of 1/2 or more at an end changes
+    its sign. Else its step might outgrow its word.
 
-    Along a span the component, or the sum of the two components with their signs, is linear and at both ends
-    on the same side of 0. So ``|N/W|`` is at least ``AXIS``, or ``PAIR/sqrt(2)``, at every pixel: `SHORTEST`,
-    5/16, where the largest component of both ends is 1/2 to 1.
+    Along a span the component, or the sum of the two components with their signs, is linear. At both ends it
+    is on the same side of 0. So ``|N/W|`` is at least ``AXIS``, or ``PAIR/sqrt(2)``, at every pixel:
+    `SHORTEST`, 5/16, where the largest component of both ends is 1/2 to 1.
 
-    A span that does not fit is tried again: with one pixel less if it has an even number of pixels, else from
-    its first pixel to the one in the middle, whose N/W is the mean of both ends. The pixels that are left are
-    tried together.
+    A span that does not fit is tried again as a shorter piece. With an even number of pixels the piece is one
+    pixel shorter. Else it ends at the pixel in the middle, whose N/W is the mean of both ends. The remaining
+    pixels are tried together.
 
     Parameters
     ----------
     rotates : bool
-        Whether vectors are to be turned into other frames, see `VectorAdapter`. Then a span of two pixels
-        fits only if no component of its ends differs by 9/16 or more, as its step has to be shorter than 1:
-        the first `BITS` bits of the components, with their signs, are at most `STEEP` apart.
+        Whether vectors will be turned into other frames, see `VectorAdapter`. The step of a span of two
+        pixels then has to be shorter than 1. So the span fits only if no component of its ends differs by
+        9/16 or more: the first `BITS` bits of the components, with their signs, are at most `STEEP` apart.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

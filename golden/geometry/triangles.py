@@ -42,7 +42,7 @@ MATERIAL_BITS = 10
 
 @dataclass(frozen=True)
 class Grid:
-    """The grid of corners: fractions of a pixel, and what follows from them.
+    """The grid of corners: fractions of a pixel, and words that follow from them.
 
     Pixel i has its centre at ``i + 1/2``, which is ``i 2^s + 2^(s-1)`` in steps of the grid.
 
@@ -54,7 +54,7 @@ class Grid:
     Raises
     ------
     ValueError
-        If it is neither.
+        If it is another number.
     """
 
     subpixel_bits: int = 8
@@ -99,13 +99,13 @@ class Frame:
     Parameters
     ----------
     left, top, right, bottom : int
-        The picture, in pixels of the grid: columns ``left`` to ``right - 1``, scanlines ``top`` to
-        ``bottom - 1``, each at least one and at most 4095; from -2048 to 2048.
+        The picture, in pixels of the grid, from -2048 to 2048: columns ``left`` to ``right - 1``, scanlines
+        ``top`` to ``bottom - 1``. It has 1 to 4095 of each.
     back_faces : str
         Treatment of back faces, one of `BACK_FACES`.
     limit : int
-        Largest chord between the unit normals of a span's ends, in 1/1024: 0 to 1023. See
-        `PlaneAssembler`; `limit_of` gives it for an angle. Spans of true lines or vectors do not read it.
+        Largest chord between the unit normals of a span's ends, in 1/1024: 0 to 1023. See `PlaneAssembler`;
+        `limit_of` gives it for an angle. Spans of true lines or vectors ignore it.
 
     Raises
     ------
@@ -135,7 +135,7 @@ class Frame:
 
     @classmethod
     def centred(cls, width: int, height: int, **options: Any) -> "Frame":
-        """Frame with the picture in the middle of the grid, so that the guard band is equal on all sides.
+        """Frame with the picture in the middle of the grid. The guard band is then equal on all sides.
 
         Parameters
         ----------
@@ -174,14 +174,14 @@ class Triangles:
     x, y : int64 arrays, shape (T, 3)
         Corners in steps of the grid, y down.
     depth : int64 array, shape (T, 3)
-        0 to 2^24 - 1, linear on the screen; the nearer the smaller.
+        0 to 2^24 - 1, linear on the screen. Nearer corners have smaller depths.
     normal : int64 array, shape (T, 3, 3)
         Components of N/W over the largest 1/W of the triangle, `ATTRIBUTE`; the last axis is x, y, z.
     material : int64 array, shape (T,)
         Index of the material.
     two_sided : bool array, shape (T,)
-        Whether the triangle is drawn with negated normals, not culled, if its back is seen in a frame that
-        culls back faces.
+        Whether a frame that culls back faces draws the triangle's back with negated normals, in place of
+        culling it.
     """
 
     x: np.ndarray

@@ -41,11 +41,11 @@ class VectorAdapter:
     """Words of `SpanVectors` from N/W at both ends of a span and its step: shifts and roundings alone.
 
     The components of both ends and of the step are shifted left by the same number s of places: the sign
-    copies that all components of the ends have, `SpanHalver.shift`. Then each word x becomes
-    ``x - 2^-14 x``, cut: so 8 steps of 2^-17 are left to 1, which no pixel may reach, and nothing saturates.
-    The step is shifted left by e places more: as many as leave it under 1, at most 15. The start is negated
-    where ``flip`` is set, the step where either ``flip`` or ``turned`` is, and both are rounded half up to 17
-    fraction bits.
+    copies that all components of the ends have, `SpanHalver.shift`. Then each word x becomes ``x - 2^-14 x``,
+    cut. So 8 steps of 2^-17 are left to 1, which no pixel may reach, and nothing saturates. The step is
+    shifted left by e places more: as many as leave it under 1, at most 15. If ``flip`` is set, the start is
+    negated. If exactly one of ``flip`` and ``turned`` is set, the step is negated. Both are rounded half up
+    to 17 fraction bits.
 
     ========== ============ =====================================================================
     word       format       why
@@ -58,25 +58,25 @@ class VectorAdapter:
     exponent   UQ(4, 0)     e
     ========== ============ =====================================================================
 
-    `SpanHalver` cuts spans. A step of a piece of three pixels or more is half of the difference of its ends
-    at most, and fits; that of a piece of two fits, as no component of 1/2 or more changes its sign. Along a
-    piece ``|N/W|`` is at least 5/16 in the scale of the words, if an end reaches `SHORTEST`. The method asks
-    for 0.2236, and needs no other cuts.
+    `SpanHalver` cuts spans. A step of a piece of three pixels or more is at most half of the difference of
+    its ends, and fits. In a piece of two pixels no component of 1/2 or more changes its sign, so its step
+    fits, too. Along a piece ``|N/W|`` is at least 5/16 in the scale of the words, if an end reaches
+    `SHORTEST`. The method asks for 0.2236. So it needs no other cuts.
 
-    Rounding moves a component of the start by half a step of its word: `ERROR` times the length of the longer
-    end at most, if that is at least `SHORTEST`. Rounding of the step adds `ERROR` times the distance of the
-    ends at the right end, or a sixteenth of a step, and its cut up to an eighth. The errors of N/W and of the
-    triangle's gradient are added to that. All together are under 4 steps.
+    Rounding moves a component of the start by half a step of its word. If the longer end is at least
+    `SHORTEST`, this is at most `ERROR` times its length. At the right end rounding of the step adds `ERROR`
+    times the distance of the ends, or a sixteenth of a step. Its cut adds up to an eighth. The errors of N/W
+    and of the triangle's gradient are added. All together are under 4 steps.
 
     Parameters
     ----------
     rotates : bool
-        Whether vectors are to be turned into other frames, so that lengths, and not components alone, have to
-        be under 1: those of the vectors and of their steps. Then the shift and e are one less, where they are
-        not 0. N/W has to be no longer than 1, as `scene_triangles` makes it, and spans are cut by
-        `SpanHalver` with ``rotates``. A start keeps its rounding where the shift is 0, else it is twice as
-        large for its length. That of the step is an eighth of a step, or twice the distance of the ends. The
-        margin is 2^-12, 32 steps of 2^-17, as the errors of both add up.
+        Whether vectors will be turned into other frames. Then the lengths of the vectors and of their steps
+        have to be under 1, and not components alone. If the shift and e are not 0, they are one less. N/W may
+        be at most 1 long, as `scene_triangles` makes it, and `SpanHalver` with ``rotates`` cuts spans. A
+        start keeps its rounding if the shift is 0. Else the rounding is twice as large for its length. The
+        rounding of the step is an eighth of a step, or `ERROR` times twice the distance of the ends. The
+        errors of both add up, so the margin is 2^-12, 32 steps of 2^-17.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
@@ -133,7 +133,7 @@ class VectorAdapter:
         return np.maximum(shift - 1, 0) if self.rotates else shift
 
     def _rounded(self, codes: np.ndarray, flip: np.ndarray, point: int) -> np.ndarray:
-        """Codes with ``point`` fraction bits, negated where told, in `FORMAT`."""
+        """Codes with ``point`` fraction bits, negated where ``flip`` is set, in `FORMAT`."""
         cut = point - self.FORMAT.fraction_bits
         return (np.where(flip, -codes, codes) + (1 << (cut - 1))) >> cut
 

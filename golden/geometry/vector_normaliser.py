@@ -36,17 +36,13 @@ class VectorNormaliser:
     v / |v|      SQ(1, 17)    rounded half up; saturates to ONE
     ============ ============ =====================================================================
 
-    A vector whose components are all in [-2^-16, 2^-16) is *lost*: it has too few bits for a direction.
+    A vector whose components are all in [-2^-16, 2^-16) is *lost*, because it has too few bits for a
+    direction.
 
-    The length of the result is off by at most `LENGTH_ERROR`, 2^-15.7, the sum of: the relative error of f,
-    which is `FIT`, 2^-20 for the cut of s' and 2^-20 for the roundings; the rounding of e, 2^-18, times the
-    length of the shifted vector, below 1.74; and the rounding of the three components, ``sqrt(3) 2^-18``.
-    `FIT` is a sixteenth of the second derivative, 24 at most, times the square of a segment's width, over
-    f = 2, and the roundings of c0 and c1. The direction is off by at most `DIRECTION_ERROR`, 2^-15.6: by the
-    rounding of the components of the result, and by that of the shifted components, whose length is at
-    least 1/2.
+    The length of the result is off by at most `LENGTH_ERROR`, 2^-15.7, its direction by at most
+    `DIRECTION_ERROR`, 2^-15.6. docs/theory/bounds.md#vector-normaliser derives both.
 
-    Six multiplications, and one of 12 by 11 bits that is made of adders.
+    The unit takes six multiplications, and a product of 12 by 11 bits that is made of adders.
 
     Parameters
     ----------
@@ -84,7 +80,7 @@ class VectorNormaliser:
         return Fixed(c0.format, np.r_[unused, c0.codes]), Fixed(c1.format, np.r_[unused, c1.codes])
 
     def shifted(self, vector: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Components shifted left together until one fills the word, SQ(1, 17); and whether each is lost."""
+        """Components shifted left together until one fills the word, SQ(1, 17), and flags of lost vectors."""
         codes, width = vector.codes, self.format.width - 1
         ones = np.bitwise_or.reduce(np.where(codes < 0, ~codes, codes), axis=-1)
         length = np.frexp(ones.astype(np.float64))[1].astype(np.int64)
@@ -122,7 +118,7 @@ class VectorNormaliser:
         Returns
         -------
         normal : Fixed, shape (..., 3), SQ(1, 17)
-            From ``-ONE`` to ``ONE``; of a lost vector it means nothing.
+            From ``-ONE`` to ``ONE``; without meaning for a lost vector.
         lost : bool array, shape (...)
             Whether the vector has no direction.
 

@@ -1,4 +1,4 @@
-"""Vertex sort ([T] figure 4.10): corners from top to bottom, orientation, and what is not drawn at all."""
+"""Vertex sort ([T] figure 4.10): corners from top to bottom, orientation, and dropped triangles."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,7 @@ __all__ = ["SortedTriangles", "VertexSort"]
 
 @dataclass(frozen=True)
 class SortedTriangles:
-    """Triangles to be drawn, their corners from top to bottom, and from left to right on one height.
+    """Triangles to draw. Their corners go from top to bottom, and on one height from left to right.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class SortedTriangles:
     right : bool array, shape (T,)
         Whether the long edge, from the first corner to the last, is on the right.
     flip : bool array, shape (T,)
-        Whether the normals are to be negated.
+        Whether the normals have to be negated.
     source : int64 array, shape (T,)
         Index of each in the triangles before the sort.
     """
@@ -69,12 +69,12 @@ class VertexSort:
     grid: Grid = GRID
 
     def order(self, triangles: Triangles) -> np.ndarray:
-        """Indices of the corners sorted by y, then x, shape (T, 3); equal corners stay in their order."""
+        """Indices of the corners sorted by y, then x, shape (T, 3). Equal corners stay in their order."""
         key = (triangles.y << (self.grid.bits + 1)) + triangles.x
         return np.argsort(key, axis=1, kind="stable")
 
     def compute(self, triangles: Triangles, frame: Frame) -> tuple[SortedTriangles, dict[str, int]]:
-        """Triangles to be drawn, and the counts of the others.
+        """Triangles to draw, and the counts of the others.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class VertexSort:
         Returns
         -------
         sorted : SortedTriangles
-            The triangles to be drawn, in the order of ``triangles``.
+            The triangles to draw, in the order of ``triangles``.
         counts : dict of str to int
             ``empty``, ``zero_area`` and ``culled``.
 

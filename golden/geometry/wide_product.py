@@ -5,10 +5,10 @@ from blysk.golden.number.fixed import UQ, Fixed, Format
 __all__ = ["GUARD_BITS", "LOST", "halves", "low_format", "wide_product"]
 
 GUARD_BITS = 3
-"""Bits that the three products keep below the result's last one."""
+"""Bits that the three products keep below the result's last bit."""
 
 LOST = 2.0**-1 + 3 * 2.0**-GUARD_BITS
-"""Error of a `wide_product` in steps of the result, but for the omitted product: rounding, three cuts."""
+"""Error of a `wide_product` in steps of the result, without the omitted product: rounding, three cuts."""
 
 
 def low_format(format: Format, low_bits: int) -> Format:
@@ -39,8 +39,8 @@ def wide_product(a: Fixed, b: Fixed, a_low: int, b_low: int, fraction_bits: int)
     Returns
     -------
     Fixed
-        The product. It is off by at most `LOST` steps of the result, and by less than ``2^(a_low + b_low)``
-        steps of the exact product, for the omitted one.
+        The product. It is off by at most `LOST` steps of the result. The omitted product adds less than
+        ``2^(a_low + b_low)`` steps of the exact product.
     """
     (a_high, a_rest), (b_high, b_rest) = halves(a, a_low), halves(b, b_low)
     keep = fraction_bits + GUARD_BITS

@@ -21,8 +21,8 @@ __all__ = ["METHODS", "PUBLISHED", "AngularInterpolator"]
 class AngularInterpolator(EndNormalInterpolator):
     """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
 
-    Formats and error bounds are those of `AngularSetup` and `HighlightCosine`. N·L is 1 minus the
-    result, ``SQ(2, 25)``. Spans over 150 degrees are flagged.
+    Formats and error bounds are those of `AngularSetup` and `HighlightCosine`. N·L, ``SQ(2, 25)``, is 1 minus
+    the result. Spans over 150 degrees are flagged.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ class AngularInterpolator(EndNormalInterpolator):
 
     @property
     def serves_gate(self) -> bool:
-        """Whether a highlight gate can be used: not with an arccosine."""
+        """Whether the method serves a highlight gate. With an arccosine it serves none."""
         return self.setup.angle == "half_chord"
 
     @property
     def highlight_excess(self) -> float:
-        """Sum of the errors of setup, cosine and its cut, as ``cos gamma(t)`` is that of the great circle."""
+        """Sum of the errors of setup, cosine and its cut; the curve is the great circle."""
         angles = np.linspace(1e-4, self.gate_angle, 1000)
         setup = AngularSetup.error(angles).max()
         return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step

@@ -18,7 +18,7 @@ __all__ = ["METHODS", "PUBLISHED", "BisectionInterpolator"]
 
 @dataclass(frozen=True)
 class BisectionInterpolator(NormalInterpolator):
-    """Normals on straight lines over ``2^k`` arcs of the great circle, with the least k within the threshold.
+    """Normals on straight lines over ``2^k`` arcs of the great circle; k is the least within the threshold.
 
     Formats and error bounds are those of `AdaptiveNormaliser`, for spans to 90 degrees.
 
@@ -58,7 +58,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     @property
     def serves_gate(self) -> bool:
-        """Whether a highlight gate can be used: not with the published polynomials."""
+        """Whether the method serves a highlight gate. With the published polynomials it serves none."""
         return not self.bisection.as_published
 
     @property
@@ -103,7 +103,7 @@ class BisectionInterpolator(NormalInterpolator):
 
 @cache
 def _normaliser(threshold: float, bisection: Bisection) -> AdaptiveNormaliser:
-    """The bit-accurate model, kept because fitting its polynomials takes half a second."""
+    """The bit-accurate model, cached because the fit of its polynomials takes half a second."""
     return AdaptiveNormaliser(threshold, bisection)
 
 

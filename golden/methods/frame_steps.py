@@ -1,7 +1,7 @@
-"""Steps of a frame among which a method chooses: how spans are cut, filled, shaded exactly and bounded.
+"""Steps of a frame that a method chooses from: to cut, fill, shade exactly and bound its spans.
 
 `blysk.golden.frames` gives a method an object of each interface, for its scene and design. The method calls
-the way that suits it.
+the step that suits it.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ __all__ = ["ErrorBounds", "ExactShading", "SpanCutter", "SpanFiller"]
 
 
 class SpanCutter(Protocol):
-    """Ways to cut the spans of a frame; each gives the spans, and how many of those given were cut."""
+    """Ways to cut the spans of a frame. Each gives the spans, and the number of given spans that were cut."""
 
     def by_error(self) -> tuple[Raster, int]:
         """Until the method's curve keeps its tolerance, see `cut_by_error`."""
@@ -25,7 +25,7 @@ class SpanCutter(Protocol):
         """Until no span is wider than `Interpolator.widest_span`, see `cut_by_angle`."""
 
     def by_length(self, largest_ratio: float) -> tuple[Raster, int]:
-        """Until no pixel's normal is too short beside an end's, see `cut_by_length`."""
+        """Until no pixel's normal is too short beside the ends' normals, see `cut_by_length`."""
 
     def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
         """Until the two ends are alike, see `cut_by_ends`."""
@@ -64,7 +64,7 @@ class ErrorBounds(Protocol):
     """Ways to bound the error of a frame, in LSB; ``None`` where no bound is known."""
 
     def by_tolerance(self) -> float | None:
-        """From the tolerances by which spans are cut, see `error_bound`."""
+        """From the tolerances of cut spans, see `error_bound`."""
 
     def by_vectors(self) -> float | None:
         """From the vectors of the spans, see `quotient_bound`."""

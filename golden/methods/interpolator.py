@@ -41,7 +41,7 @@ class Operands(NamedTuple):
     highlight : Fixed, shape (pixels, lights)
         N·H, 1 - N·H, or the place in a lobe's table.
     out_of_range : bool array, shape (spans,)
-        Whether the angle of the span is larger than the method serves: its operands mean nothing.
+        Whether the angle of the span is larger than the method serves. Its operands are then without meaning.
     factor : Fixed, shape (pixels, fading lights), optional
         Factor of each light that fades, of methods with `Interpolator.TAKES_VALUES`.
     """
@@ -54,7 +54,7 @@ class Operands(NamedTuple):
 
 @dataclass(frozen=True)
 class Interpolator(ABC):
-    """A method that computes the operands of the pixels of spans; each method is a subclass.
+    """A method that computes the operands of the pixels of spans. Each method is a subclass.
 
     A subclass states its formats; `compute` is its bit-accurate model, `exact_normals` its curve in float64.
 
@@ -66,27 +66,27 @@ class Interpolator(ABC):
         N·L of equal unit vectors in exact arithmetic: 1, or `ONE_SQUARED`, the product of the codes of length
         1.
     MAX_ANGLE : float
-        Largest angle, in degrees, of a span that the method serves. Most methods flag every span over it. The
-        linear method flags a span in which a component of ``N_r - N_l`` is 1 or more: none under 60 degrees,
-        half of the spans at 75.
+        Largest angle, in degrees, of a span that the method serves. Most methods flag every span with a
+        larger angle. The linear method flags a span with a component of ``N_r - N_l`` of 1 or more: none
+        under 60 degrees, half of the spans at 75.
     CURVE : str
         The curve of `CURVES` on which the method's normals lie in exact arithmetic.
     ORIGIN : str
-        ``"documents"``, ``"own"``, or ``"baseline"``: where the method comes from, for tables.
+        Origin of the method, for tables: ``"documents"``, ``"own"``, or ``"baseline"``.
     TAKES_VALUES : bool
         Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
         differ from pixel to pixel.
     TAKES_VECTORS : bool
         Whether spans carry vectors ``N/W`` at the first pixel and their step, in the frame of each light.
     CUT_BY_ERROR : bool
-        Whether spans are cut until the curve keeps its tolerance, a quarter of an LSB, where checked; else
-        they are cut by their angle alone.
+        Whether spans are cut until the curve keeps its tolerance, a quarter of an LSB, at the checked places.
+        If not, spans are cut by their angle alone.
     END_FORMAT : Format
-        Format of the normals at a span's ends: ``SQ(1, 17)`` for unit normals; another format for ends of the
-        true line, which have lengths, relative to the larger one.
+        Format of the normals at a span's ends: ``SQ(1, 17)`` for unit normals. Ends of the true line have
+        lengths, relative to the larger length, and another format.
     CHECKED_AT : tuple of float
-        Places t in a span at which the method's curve is compared with exact normals, to decide whether the
-        span is cut.
+        Places t in a span at which the method's curve is compared with exact normals. The comparison decides
+        whether the span is cut.
     """
 
     COSINE_FORMAT: ClassVar[Format] = DotProduct().result_format
@@ -112,7 +112,7 @@ class Interpolator(ABC):
 
     @property
     def scale(self) -> int:
-        """Scale s of the operand, see `Lobe`; if it is over 0, the specular unit takes ``min(2^s u, 1)``."""
+        """Scale s of the operand, see `Lobe`. If it is over 0, the specular unit takes ``min(2^s u, 1)``."""
         return 0
 
     @property
@@ -161,7 +161,7 @@ class Interpolator(ABC):
         return self
 
     def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
-        """The specular unit that takes the method's operand, in its scale, with the model of a given unit.
+        """The specular unit with the model of a given unit that takes the method's operand, in its scale.
 
         Raises
         ------
@@ -171,7 +171,7 @@ class Interpolator(ABC):
         return specular.for_operand(self.operand, self.scale)
 
     def fitted(self, lobe: Lobe, parameters: Sequence[float | None]) -> "Interpolator":
-        """The method for a lobe and the parameters of its tables, where spans are cut for the method.
+        """The method for a lobe and the parameters of its tables, for spans that are cut for the method.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class Interpolator(ABC):
         Parameters
         ----------
         specular : HighlightOperand
-            Model of the unit that is gated.
+            Model of the gated unit.
 
         Raises
         ------
@@ -215,14 +215,14 @@ class Interpolator(ABC):
         raise ValueError(f"method {self.name} takes no vectors")
 
     def check(self, spans: Spans, lights: int, factors: int) -> None:
-        """Refuse spans that lack what the method takes.
+        """Refuse spans that lack operands of the method.
 
         Parameters
         ----------
         spans : Spans
             The spans.
         lights, factors : int
-            Number of lights, 1 at least, and of those that fade.
+            Number of lights, 1 at least, and number of fading lights.
 
         Raises
         ------
@@ -251,7 +251,7 @@ class Interpolator(ABC):
         Raises
         ------
         ValueError
-            If triangles do not give what the method takes.
+            If triangles cannot give the operands of the method.
         """
         raise ValueError(f"triangles do not give what {self.name} takes; use another method")
 
@@ -261,11 +261,11 @@ class Interpolator(ABC):
 
     @abstractmethod
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
-        """The spans of a frame, cut as the method needs them, and how many of those given were cut."""
+        """The spans of a frame, cut for the method, and the number of given spans that were cut."""
 
     @abstractmethod
     def filled(self, filler: SpanFiller) -> Spans:
-        """The beats of cut spans, with what the method takes."""
+        """The beats of cut spans, with the operands of the method."""
 
     @abstractmethod
     def exact_frame(self, shading: ExactShading) -> np.ndarray:

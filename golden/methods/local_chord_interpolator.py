@@ -32,35 +32,41 @@ class LocalChordInterpolator(Interpolator):
     """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, with L and H of the pixel.
 
     A span brings three values of N·L and three of u: at the first pixel centre, in the middle and at the last
-    pixel centre, computed where positions are known. `ChordSetup` computes the quadratics through them, with
-    a bound of the drift, and accumulators of 49 bits the pixels. The specular unit takes u as its ``1 - cos
-    gamma``. In a span of one or two pixels each pixel has its own values, and needs no setup.
+    pixel centre. The source of spans computes them, where positions are known. `ChordSetup` computes the
+    quadratics through them, with a bound of the drift. Accumulators of 49 bits compute the pixels. The
+    specular unit takes u as its ``1 - cos gamma``. In a span of one or two pixels each pixel has its own
+    values, and needs no setup.
 
-    The quadratic is good for short spans only. Spans should be cut until
+    The quadratic is good only for short spans. Cut spans until
 
     - the normals at their ends are at most 30 degrees apart;
-    - N, V and each light's L change by at most `MAX_VECTOR_ANGLE` degrees from end to end, and ``|dV| +
-      |dL|`` is at most `MAX_HALFWAY_CHANGE` of ``|L + V|``: where L is nearly -V, H changes fast;
-    - the errors of the quadratics at t = 1/4 and 3/4, times `MARGIN` for the positions between, are within
-      `highlight_tolerance` and `diffuse_tolerance` minus the bounds of the arithmetic. In place of `MARGIN`
-      stands the ratio of the normals' lengths at the two ends, if it is larger. These factors were found by
-      search: with equal lengths the largest error at any t was 1.31 times that at 1/4 and 3/4, and with
-      lengths in the ratio g up to ``1.03 max(4/3, g)`` times.
+    - N, V and each light's L change by at most `MAX_VECTOR_ANGLE` degrees from end to end;
+      - ``|dV| + |dL|`` is at most `MAX_HALFWAY_CHANGE` of ``|L + V|``, because H changes fast where L is
+        nearly -V;
+    - the errors of the quadratics at t = 1/4 and 3/4 are within `highlight_tolerance` and `diffuse_tolerance`
+      minus the bounds of the arithmetic. `MARGIN` multiplies the errors, for the positions between. If the
+      ratio of the normals' lengths at the two ends is larger, it takes the place of `MARGIN`. These factors
+      were found by search. With equal lengths the largest error at any t was 1.31 times the error at 1/4 and
+      3/4. With lengths in the ratio g it was up to ``1.03 max(4/3, g)`` times.
 
-    The budget of fit and arithmetic together is 0.4 LSB against exactly normalised interpolation in the
-    specular term and 0.12 in the diffuse one, at full reflection. It is checked at these places, and not
-    proved for every pixel; see `blysk.golden.frames.compare.error_bound` for what a frame keeps.
+    Fit and arithmetic together have a budget against exactly normalised interpolation, at full reflection:
+    0.4 LSB in the specular term and 0.12 in the diffuse term. The budget is checked at these places; a proof
+    for every pixel is missing. `blysk.golden.frames.compare.error_bound` has the bound of a frame.
 
-    Where N·L changes its sign the highlight ends, however bright it is. A pixel whose N·L is as near to 0 as
-    the error may have the highlight or not; a span with such pixels where `is_lit` should be cut further.
+    Where N·L changes its sign the highlight ends at any brightness. A pixel whose N·L is within the error of
+    0 may have the highlight or not. Where `is_lit`, cut a span with these pixels further.
 
-    A light that fades, by its distance or as a spot, has a factor a. Its values of N·L are multiplied by a
-    before, ``a N·L``; its specular term is multiplied by a at each pixel (`Factor`), where a is a third
-    quadratic of the light, in the formats of N·L. Spans are cut until three conditions hold at every pixel
-    that such a light reaches: the error of ``a N·L`` is within `DIFFUSE_BUDGET`; where the highlight shows,
-    the error of a is within `FACTOR_BUDGET`; and the errors of a, and of u times the largest a of the span,
-    are together within `HIGHLIGHT_BUDGET`. A light that fades may be brighter than white: all errors are
-    multiplied by the largest channel of its colour, if that is over 1.
+    A light that fades, by its distance or as a spot, has a factor a. Its values of N·L contain the factor,
+    ``a N·L``. At each pixel a multiplies its specular term (`Factor`). There a is a third quadratic of the
+    light, in the formats of N·L. Spans are cut until three conditions hold at every pixel that the light
+    reaches:
+
+    - the error of ``a N·L`` is within `DIFFUSE_BUDGET`;
+    - where the highlight shows, the error of a is within `FACTOR_BUDGET`;
+    - the errors of a, and of u times the largest a of the span, are together within `HIGHLIGHT_BUDGET`.
+
+    A light that fades may be brighter than white. If the largest channel of its colour is over 1, it
+    multiplies all errors.
 
     ========== ========== ========================================
     word       format     why
@@ -75,7 +81,7 @@ class LocalChordInterpolator(Interpolator):
     fraction_bits : int
         Fraction bits of the setup's words.
     scale : int
-        s: the words of u are ``min(2^s u, 1)``, for a lobe that is 0 from ``2^-s`` on: a small u keeps s bits
+        s. The words of u are ``min(2^s u, 1)``, for a lobe that is 0 from ``2^-s`` on. A small u keeps s bits
         more, at the cost of wires alone; see `Lobe.scale_of`.
 
     Raises
@@ -145,7 +151,7 @@ class LocalChordInterpolator(Interpolator):
         return ValueGate(specular)
 
     def geometry(self, lights: int) -> Geometry:
-        """Raise `ValueError`: triangles give no values."""
+        """Raise `ValueError`, because triangles give no values."""
         raise ValueError(f"triangles give normals, and {self.name} takes values; use another method")
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
@@ -161,7 +167,7 @@ class LocalChordInterpolator(Interpolator):
         return shading.by_values(self.exact_operands)
 
     def bound(self, bounds: ErrorBounds) -> float | None:
-        """Bound from the tolerances by which spans are cut."""
+        """Bound from the tolerances of cut spans."""
         return bounds.by_tolerance()
 
     def check(self, spans: Spans, lights: int, factors: int) -> None:
@@ -175,7 +181,7 @@ class LocalChordInterpolator(Interpolator):
     def operands(self, spans: Spans, constants: FrameConstants, highlights: bool) -> Operands:
         """Bit-accurate operands from the values of spans, see `compute_values`.
 
-        Without specular light u counts as 0, so that no u is out of range.
+        Without specular light u counts as 0. So no u is out of range.
         """
         if spans.values is None:
             raise ValueError(f"method {self.name} takes spans with values")
@@ -198,7 +204,7 @@ class LocalChordInterpolator(Interpolator):
         }
 
     def widest_span(self, exponent: int) -> float:
-        """Largest angle of a span, in degrees, whatever the light."""
+        """Largest angle of a span, in degrees, for every light."""
         return 30.0
 
     def operand_error(self, length: int, degrees: float) -> float:
@@ -215,8 +221,8 @@ class LocalChordInterpolator(Interpolator):
         Parameters
         ----------
         values : SpanValues
-            Values of each span and light; those in the middle have an effect from 3 pixels on, those at the
-            end from 2.
+            Values of each span and light. The values in the middle have an effect from 3 pixels on, the
+            values at the end from 2.
         length : int array, shape (spans,)
             Pixels, 1 to 4095.
         factors : int64 array, shape (spans, fading lights, 3), optional
@@ -268,7 +274,7 @@ class LocalChordInterpolator(Interpolator):
         Returns
         -------
         cosine, one_minus_cosine : float64 arrays, shape (pixels, lights)
-            1 - N·H without the scale; because of the scale it is good up to ``2^-s`` only.
+            1 - N·H without the scale. Because of the scale it is good only up to ``2^-s``.
         factor : float64 array, shape (pixels, fading lights)
             Only if ``factors`` are given.
         """
@@ -289,10 +295,10 @@ class LocalChordInterpolator(Interpolator):
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Largest error of u that keeps `HIGHLIGHT_BUDGET`, where no smaller u occurs.
 
-        The slope of a term over u is about n at the peak, and smaller farther off: ``n (1 - n u/2)`` for the
-        cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With ``x = (n - 1) u`` neither is more
-        than ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other models are at most 1.25 times
-        this bound, and 1.6 times for n = 1.
+        The slope of a term over u is about n at the peak, and smaller farther off. It is ``n (1 - n u/2)``
+        for the cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With ``x = (n - 1) u`` both are
+        at most ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other models are at most 1.25
+        times this bound, and 1.6 times for n = 1.
 
         Parameters
         ----------
@@ -309,8 +315,8 @@ class LocalChordInterpolator(Interpolator):
     def is_lit(exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
 
-        Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``, which is under a quarter of an LSB from
-        ``x = 7`` on; the other models reach 0 earlier, or decrease as fast.
+        Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``. From ``x = 7`` on this is under a quarter of
+        an LSB. The other models reach 0 earlier, or decrease as fast.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Methods whose spans carry normals at their ends, and those of them that find the normal of each pixel."""
+"""Methods whose spans carry normals at their ends, and methods that find the normal of each pixel."""
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ __all__ = ["EndNormalInterpolator", "NormalInterpolator", "difference_rounding"]
 
 
 def difference_rounding(pixel: int) -> float:
-    """Bound of the rounding error of a normal by forward differences: of the result and of both differences.
+    """Bound of the rounding error of a normal by forward differences, of the result and of both differences.
 
     ``sqrt(3) (2^-18 + 2^-42 (k + k^2/2))`` at pixel k, as derived in `DifferenceSetup`.
 
@@ -57,7 +57,7 @@ class EndNormalInterpolator(Interpolator):
 
     @property
     def highlight_excess(self) -> float:
-        """Bound of the excess of N·H over that of the great circle, for spans up to `gate_angle`.
+        """Bound of the excess of N·H over N·H of the great circle, for spans up to `gate_angle`.
 
         With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
         `ONE_SQUARED`, no pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under ``shortest_normal
@@ -72,7 +72,7 @@ class EndNormalInterpolator(Interpolator):
 
     @property
     def gate_limits(self) -> GateLimits:
-        """What a highlight gate relies on: `highlight_excess`, `shortest_normal` and `gate_angle`."""
+        """`highlight_excess`, `shortest_normal` and `gate_angle`, for a highlight gate."""
         return GateLimits(self.highlight_excess, self.shortest_normal, self.gate_angle)
 
     def gate(self, specular: HighlightOperand) -> Gate:
@@ -125,13 +125,13 @@ class EndNormalInterpolator(Interpolator):
 
 @dataclass(frozen=True)
 class NormalInterpolator(EndNormalInterpolator):
-    """A method that computes normals, and the products of these with L and H.
+    """A method that computes normals, and their products with L and H.
 
     Parameters
     ----------
     operand : str
-        ``"cosine"``: the operand of the specular unit is N·H. ``"one_minus_cosine"``: it is half the squared
-        chord, ``|N - H|^2 / 2`` of `Chord`, in which the length of N counts only at second order.
+        Operand of the specular unit. ``"cosine"``: N·H. ``"one_minus_cosine"``: half the squared chord,
+        ``|N - H|^2 / 2`` of `Chord`. The length of N then counts only at second order.
 
     Raises
     ------
@@ -166,10 +166,11 @@ class NormalInterpolator(EndNormalInterpolator):
 
     @property
     def highlight_excess(self) -> float:
-        """`normal_error`; with half the squared chord, as ``|N - H| <= 2``, twice the error, and the cut.
+        """`normal_error`. With half the squared chord, twice the error, as ``|N - H| <= 2``, and the cut.
 
-        On a curve of length r, where c is the cosine to H, half the squared chord is ``(1 - r)^2/2 + r (1 -
-        c)``, which is at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from 1.
+        Let r be the length of the curve and c the cosine to H. Half the squared chord is
+        ``(1 - r)^2/2 + r (1 - c)``, at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from
+        1.
         """
         if not self.uses_chord:
             return self.normal_error
@@ -184,7 +185,7 @@ class NormalInterpolator(EndNormalInterpolator):
     def normals(
         self, normal_left: Fixed, normal_right: Fixed, length: np.ndarray
     ) -> tuple[Fixed, np.ndarray]:
-        """Bit-accurate normals of every pixel, and which spans are out of range.
+        """Bit-accurate normals of every pixel, and flags of spans out of range.
 
         Parameters
         ----------

@@ -21,11 +21,15 @@ __all__ = ["METHODS", "PUBLISHED", "QuadraticInterpolator"]
 class QuadraticInterpolator(NormalInterpolator):
     """Normals on a quadratic through the exactly normalised middle normal, for spans to 45 degrees.
 
-    The units are the middle normal, G/P/Q, and, by ``form``, forward differences (setup and accumulator,
-    figures 2.11 and 2.10) or the evaluator of figure 2.9 a (``direct``) or b (``horner``). Formats and error
-    bounds are those of the units; nothing is rounded in between.
+    The units are the middle normal, G/P/Q, and, by ``form``,
 
-    Ends must be of unit length to 1/256; longer ones may saturate without a flag.
+    - forward differences: setup and accumulator, figures 2.11 and 2.10;
+    - ``direct``: the evaluator of figure 2.9 a;
+    - ``horner``: the evaluator of figure 2.9 b.
+
+    Formats and error bounds are those of the units. Nothing is rounded between them.
+
+    Ends must be of unit length to 1/256. Longer ends may saturate without a flag.
 
     Parameters
     ----------
@@ -66,7 +70,7 @@ class QuadraticInterpolator(NormalInterpolator):
 
     @property
     def serves_gate(self) -> bool:
-        """Whether a highlight gate can be used: only with the default fit of the middle normal."""
+        """Whether the method serves a highlight gate: only with the default fit of the middle normal."""
         return self.middle_normal == MiddleNormal()
 
     @property

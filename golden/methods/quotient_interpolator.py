@@ -30,10 +30,10 @@ class QuotientInterpolator(Interpolator):
     """Exact N·L and highlights from ``v = N/W``, without a unit normal: quotients of quadratics.
 
     v is linear on the screen. A highlight is the place of ``sin^2 gamma`` in a lobe's table. `QuotientSpans`
-    computes the words of each pixel by forward differences, `Quotient` the operands. The curve is the exact
-    one: normals are those of a perspective-correct interpolation, at every angle and width.
+    computes the words of each pixel by forward differences, `Quotient` the operands. The curve is exact:
+    normals are those of a perspective-correct interpolation, at every angle and width.
 
-    A source of spans has to halve a span of three pixels or more, and to split a span of two, where
+    A source of spans has to halve a span of three pixels or more, and to split a span of two pixels, if
 
     - the lengths of v at its ends differ by a factor over `LARGEST_RATIO`;
     - or the angle between them is over 90 degrees.
@@ -44,7 +44,7 @@ class QuotientInterpolator(Interpolator):
     Parameters
     ----------
     mirror : bool
-        Whether the highlight is one of R·V, as Phong's; else of N·H.
+        Whether the highlight is of R·V, as Phong's, in place of N·H.
 
     Source: docs/theory/quotient.md.
     """
@@ -81,17 +81,17 @@ class QuotientInterpolator(Interpolator):
         return self if mirror == self.mirror else replace(self, mirror=mirror)
 
     def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
-        """The unit itself if it takes places; else a `QuotientLobe` of its model, with the same tables."""
+        """The unit, if it takes places. Else a `QuotientLobe` of its model, with the same tables."""
         if specular.operand == self.operand:
             return specular
         return QuotientLobe(specular.model, **specular.table_options)
 
     def geometry(self, lights: int) -> Geometry:
-        """Geometry that makes vectors, which are turned if there are several lights."""
+        """Geometry that makes vectors. With several lights it turns them."""
         return Geometry(vectors=True, rotates=lights > 1)
 
     def constants_for(self, scene: Scene, constants: Sequence[FrameConstants]) -> list[FrameConstants]:
-        """Constants with L in the frame of each light, and no H; L of a light that is off is 0."""
+        """Constants with L in the frame of each light, and without H. L of a light that is off is 0."""
         lights = len(constants[0].direction)
         codes = np.zeros((lights, 3), dtype=np.int64)
         for index, frame in enumerate(light_frames(scene, lights)[: len(scene.lights)]):
@@ -157,7 +157,7 @@ class QuotientInterpolator(Interpolator):
         return QuotientErrors.of(vectors, length, self.mirror)
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """Bound of the error of N·L for every span that is cut as the method asks."""
+        """Bound of the error of N·L for every span that is cut for the method."""
         return QuotientErrors.worst(length, self.mirror).cosine
 
 
@@ -167,13 +167,13 @@ class QuotientErrors:
 
     With K pixels, D the largest component of the difference of the ends, in steps of 2^-17, and i the pixel:
 
-    - a component of v is off by ``eps <= 1/2 + max(1/16, D 2^-17)`` steps: its first value is rounded by half
-      a step; the difference is rounded by half of ``2^-e``, which is under ``2 D/(K - 1) 2^-17`` where its
-      word is full, and else at most ``1/(8 (K - 1))``;
-    - so the direction of v is off by ``asin(sqrt(3) eps / |v|)``;
-    - the accumulators are off by ``(i + i^2/2) 2^-47``, so that s is off by twice as much over q;
-    - words of a further light are rounded by themselves, and q is that of the first light: it is off, beside
-      ``|v|^2`` of the further light's words, by the sum of both errors.
+    - A component of v is off by ``eps <= 1/2 + max(1/16, D 2^-17)`` steps.
+    - So the direction of v is off by ``asin(sqrt(3) eps / |v|)``.
+    - The accumulators are off by ``(i + i^2/2) 2^-47``. So s is off by twice as much over q.
+    - Words of a further light are rounded by themselves, and q comes from the first light. Beside ``|v|^2``
+      of the further light's words, q is off by the sum of both errors.
+
+    docs/theory/quotient.md#bound proves these bounds.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class QuotientErrors:
     drift : float
         Largest error of s by the accumulators.
     mismatch : float
-        Largest relative error of q beside a light's own words; 0 for the first light.
+        Largest relative error of q beside a light's own words. It is 0 for the first light.
 
     Source: docs/theory/quotient.md#bound.
     """
@@ -198,7 +198,7 @@ class QuotientErrors:
     def of(
         cls, vectors: SpanVectors, length: np.ndarray, mirror: bool = False, further: bool = False
     ) -> "QuotientErrors":
-        """The largest bounds of some spans.
+        """The largest bounds of some spans, one at least.
 
         Parameters
         ----------
@@ -209,7 +209,7 @@ class QuotientErrors:
         mirror : bool
             Whether the highlight is one of R·V.
         further : bool
-            Whether the bounds are those of a further light.
+            Whether the bounds are for a further light.
         """
         # The components whose squares are q, in the frame of the first light.
         places = [0, 1, 2, -1] if mirror else [0, 1, 2]
@@ -228,7 +228,7 @@ class QuotientErrors:
 
     @classmethod
     def worst(cls, length: int, mirror: bool = False) -> "QuotientErrors":
-        """The bounds of every span up to a length that is cut as the method asks.
+        """The bounds of every span up to a length that is cut for the method.
 
         Parameters
         ----------
@@ -250,7 +250,7 @@ class QuotientErrors:
         mirror: bool = False,
         first: np.ndarray | None = None,
     ) -> "QuotientErrors":
-        """The largest bounds of some spans whose words are off by more than their rounding.
+        """The largest bounds of spans whose words are off by more than their rounding.
 
         Parameters
         ----------
@@ -263,7 +263,7 @@ class QuotientErrors:
         mirror : bool
             Whether the highlight is one of R·V.
         first : float array, shape (spans,), optional
-            Of a further light: ``component`` of the first light, whose words make q.
+            For a further light: ``component`` of the first light, whose words make q.
         """
         angle = np.arcsin(np.minimum(np.sqrt(3) * component / shortest, 1))
         # Of R and V the angle turns twice as fast, and y cos a is rounded once more.
@@ -278,17 +278,20 @@ class QuotientErrors:
 
     @property
     def cosine(self) -> float:
-        """Largest error of N·L: by the normal, the codes of L, and the words of a pixel."""
+        """Largest error of N·L, by the normal, the codes of L, and the words of a pixel."""
         words = 2.0**-16 + 2.0**-17.5 + Quotient.COSINE_ERROR
         found: float = self.angle + self.drift + self.mismatch / 2 + words
         return found
 
     def highlight(self, model: ReflectionModel, parameter: float | None) -> float:
-        """Largest error of the specular term, without that of the lobe's table.
+        """Largest error of the specular term, without the error of the lobe's table.
 
-        The lobe's steepest slope a radian times the error of its angle; its slope over s times the drift, but
-        at most that of the angle ``asin(sqrt(drift))``; the relative error of s; and, of a further light,
-        what the error of q changes.
+        It is the sum of
+
+        - the lobe's steepest slope a radian times the error of its angle;
+        - its slope over s times the drift, but at most the error by the angle ``asin(sqrt(drift))``;
+        - the relative error of s;
+        - for a further light, the change by the error of q.
 
         Parameters
         ----------

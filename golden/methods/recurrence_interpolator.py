@@ -24,14 +24,14 @@ class RecurrenceInterpolator(EndNormalInterpolator):
 
     Formats and error bounds are those of `RecurrenceSetup` and `Recurrence`, whose results have 25 fraction
     bits here: N·L unchanged, ``SQ(2, 25)``, and ``1 - N·H``, ``UQ(1, 25)``, saturated. The error e of 1 - N·H
-    does not depend on its size, so that the error of the specular term is about ``n e`` at the peak: at
-    n = 1000, 0.08 LSB for spans of 1 degree (e = 3e-7) and 3 LSB for spans of 45 degrees (e = 1.2e-5). Spans
-    over 90 degrees are flagged.
+    does not depend on its size. So the error of the specular term is about ``n e`` at the peak. At n = 1000
+    it is 0.08 LSB for spans of 1 degree (e = 3e-7) and 3 LSB for spans of 45 degrees (e = 1.2e-5). Spans over
+    90 degrees are flagged.
 
     Parameters
     ----------
     form : str
-        Form of the recurrence: ``"reinsch"``, or ``"direct"`` as published, which is unstable; see
+        Form of the recurrence: ``"reinsch"``, or ``"direct"`` as published, which is unstable. See
         `Recurrence`.
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.1, 3.3, figure 3.5.
@@ -56,7 +56,7 @@ class RecurrenceInterpolator(EndNormalInterpolator):
 
     @property
     def serves_gate(self) -> bool:
-        """Whether a highlight gate can be used: not with the direct form, which is unstable."""
+        """Whether the method serves a highlight gate. The direct form, which is unstable, serves none."""
         return self.form == "reinsch"
 
     @cached_property

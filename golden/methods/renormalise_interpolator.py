@@ -24,15 +24,15 @@ __all__ = ["METHODS", "RenormaliseInterpolator"]
 class RenormaliseInterpolator(NormalInterpolator):
     """``(1-t) m_l N_l + t m_r N_r``, divided by its length at every pixel: the baseline.
 
-    A span carries the two ends with their lengths, which include ``1/W``, relative to the larger one, so that
-    the line between them is the true one on the screen: no span is cut for its angle. Line setup, accumulator
-    and renormaliser follow; the specular operand is half the squared chord, in which an error of the normal's
-    length counts at second order only.
+    A span carries the two ends with their lengths, relative to the larger length. The lengths include
+    ``1/W``. So the line between the ends is the true line on the screen, and no span is cut for its angle.
+    Line setup, accumulator and renormaliser follow. The specular operand is half the squared chord. An error
+    of the normal's length counts there only at second order.
 
     The words of a vector of length m, the larger end being 1, turn it by up to ``(LineSetup.ERROR + sqrt(3)
     2^-23)/m``. At `LARGEST_RATIO`, m = 1/64, this is 2.7e-5 radians, 0.17 LSB on the steepest flank of n =
-    1000. Spans with shorter vectors should be cut: ends at very different W have them, and nearly opposite
-    ends. A span is flagged if every component of a pixel's vector is under 1/256; its pixel is wrong.
+    1000. Cut spans with shorter vectors. Ends at very different W have them, and nearly opposite ends. If
+          every component of a pixel's vector is under 1/256, the span is flagged, and the pixel is wrong.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class RenormaliseInterpolator(NormalInterpolator):
 
     @property
     def serves_gate(self) -> bool:
-        """``False``: a gate takes unit normals."""
+        """``False``, because a gate takes unit normals."""
         return False
 
     def geometry(self, lights: int) -> Geometry:
@@ -93,7 +93,7 @@ class RenormaliseInterpolator(NormalInterpolator):
         return DifferenceAccumulator(self.END_FORMAT, format, format, self.END_FORMAT)
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """For ends of unit length: the error of the line over its length, plus that of the renormaliser."""
+        """For ends of unit length: error of the line over its length, plus error of the renormaliser."""
         shortest = np.cos(np.radians(min(degrees, 170.0)) / 2)
         line = LineSetup.ERROR + np.sqrt(3) * self.END_FORMAT.step
         own = Renormaliser.DIRECTION_ERROR + Renormaliser.LENGTH_ERROR
