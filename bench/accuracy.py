@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS, PUBLISHED
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
@@ -49,7 +49,7 @@ def scene_for(mesh: Mesh, exponent: int, width: int = 640, height: int = 480) ->
 
 def measure(
     mesh: Mesh,
-    design: Design,
+    design: ShadingPipeline,
     exponents: Sequence[int] = EXPONENTS,
     width: int = 640,
     height: int = 480,

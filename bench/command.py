@@ -24,13 +24,13 @@ class _Lines(tqdm):
     """Progress without a terminal: a line on standard error each `_SECONDS`, and none of shorter work."""
 
     def __init__(self, *arguments, **options):
-        self.told = time.monotonic()
+        self._printed = time.monotonic()
         super().__init__(*arguments, file=io.StringIO(), ncols=0, **options)
 
     def display(self, msg=None, pos=None):
         """Print the state, if the last line is long ago; the empty state at the end is left out."""
-        if msg is None and time.monotonic() - self.told >= _SECONDS:
-            self.told = time.monotonic()
+        if msg is None and time.monotonic() - self._printed >= _SECONDS:
+            self._printed = time.monotonic()
             print(self, file=sys.stderr, flush=True)
 
 

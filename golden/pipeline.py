@@ -23,11 +23,11 @@ from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.reference.lighting import Material
 
-__all__ = ["Design", "Pixels", "Spans"]
+__all__ = ["Pixels", "ShadingPipeline", "Spans"]
 
 
 @dataclass(frozen=True)
-class Design:
+class ShadingPipeline:
     """A shading pipeline: an interpolator, diffuse and specular terms of each light, and the intensity.
 
     `presets.preset` makes a design by names. `compute`, the bit-accurate model, composes the models of the
@@ -127,15 +127,15 @@ class Design:
 
     def highlight_parameter(self, material: Material) -> float | None:
         """Exponent or roughness of a material, as the model takes it; the exponent without a model."""
-        return material.parameter(self.specular.model) if self.specular else material.exponent
+        return material.parameter(self.specular.reflection) if self.specular else material.exponent
 
     def steepness(self, material: Material) -> float:
         """Exponent that decides how fine spans must be, see `ReflectionModel.steepness`."""
         if self.specular is None:
             return material.exponent
-        return self.specular.model.steepness(self.highlight_parameter(material))
+        return self.specular.reflection.steepness(self.highlight_parameter(material))
 
-    def for_materials(self, materials: Sequence[Material], scaled: bool = True) -> "Design":
+    def for_materials(self, materials: Sequence[Material], scaled: bool = True) -> "ShadingPipeline":
         """The same design for the materials of a scene.
 
         The lobe has a bank for each different table, at most `Lobe.MAX_BANKS`, and the steps for them.
@@ -155,7 +155,7 @@ class Design:
             specular, interpolator = lobe, interpolator.fitted(lobe, lobes) if scaled else interpolator
         return replace(self, materials=len(materials), specular=specular, interpolator=interpolator)
 
-    def built(self, **changes: Any) -> "Design":
+    def built(self, **changes: Any) -> "ShadingPipeline":
         """The same design with other values of its `Build`."""
         return replace(self, build=replace(self.build, **changes))
 
@@ -187,7 +187,7 @@ class Design:
     @property
     def mirror(self) -> bool:
         """Whether the highlight is of R·V in place of N·H."""
-        return self.specular is not None and self.specular.model.MIRROR
+        return self.specular is not None and self.specular.reflection.MIRROR
 
     @property
     def span_members(self) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.pipeline import Design, Pixels, Spans
+from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
 
 __all__ = ["PixelPipelines"]
 
@@ -20,7 +20,7 @@ class PixelPipelines:
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         Design of every pipeline; its `Build` has their number, at most the scanlines that the design has.
 
     Raises
@@ -31,7 +31,7 @@ class PixelPipelines:
     Source: docs/theory/units.md#pipeline.
     """
 
-    design: Design = field(default_factory=lambda: Design().built(pipes=4))
+    design: ShadingPipeline = field(default_factory=lambda: ShadingPipeline().built(pipes=4))
 
     def __post_init__(self) -> None:
         if self.pipes > 1 << self.design.y_bits:
@@ -48,7 +48,7 @@ class PixelPipelines:
         return np.asarray(y) % self.pipes
 
     def compute(self, spans: Spans, constants: FrameConstants | Sequence[FrameConstants]) -> Pixels:
-        """Bit-accurate pixels of the merged stream, in the order of the spans; see `Design.compute`."""
+        """Bit-accurate pixels of the merged stream in the order of the spans; see `ShadingPipeline`."""
         return self.design.compute(spans, constants)
 
     def compute_each(
@@ -59,7 +59,7 @@ class PixelPipelines:
         Parameters
         ----------
         spans, constants
-            As for `Design.compute`.
+            As for `ShadingPipeline.compute`.
         """
         pipe = self.pipe_of(spans.y)
         return tuple(self.design.compute(spans[pipe == k], constants) for k in range(self.pipes))

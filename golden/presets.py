@@ -19,7 +19,7 @@ from blysk.golden.methods import (
     renormalise_interpolator,
 )
 from blysk.golden.methods.interpolator import Interpolator, Operand
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
 from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS, ReflectionModel
 
@@ -88,8 +88,8 @@ MIRROR_LOBES: dict[str, Lobe] = {PHONG.name: QuotientLobe(PHONG)}
 """Specular units of models of R·V, by name; the method ``quotient`` serves each."""
 
 MODEL_LINES: dict[str, str] = {
-    **{lobe.name: f"{lobe.model.summary}, from a table" for lobe in LOBES.values()},
-    **{name: unit.model.summary for name, unit in MODELS.items()},
+    **{lobe.name: f"{lobe.reflection.summary}, from a table" for lobe in LOBES.values()},
+    **{name: unit.reflection.summary for name, unit in MODELS.items()},
     "blinn_product": f"{BLINN.summary}, by repeated squaring",
     PHONG.name: f"{PHONG.summary}, from a table; needs the method quotient",
 }
@@ -137,7 +137,7 @@ def preset(
     exponent: int | None = None,
     roughness: float | None = None,
     **options: Any,
-) -> Design:
+) -> ShadingPipeline:
     """Make a design by names.
 
     Parameters
@@ -156,17 +156,17 @@ def preset(
     exponent, roughness : optional
         Parameter fixed at build time: `Build.exponent`, or the parameter of a lobe's table (`Lobe.fixed`).
     **options
-        Further fields of `Design`, of the lobe, or of the method; ``None``: the default. A lobe has as many
-        ``banks`` as there are materials, at most `Lobe.MAX_BANKS`.
+        Further fields of `ShadingPipeline`, of the lobe, or of the method; ``None``: the default. A lobe has
+        as many ``banks`` as there are materials, at most `Lobe.MAX_BANKS`.
 
     Returns
     -------
-    Design
+    ShadingPipeline
 
     Raises
     ------
     ValueError
-        If a name is unknown, the method lacks an option, or `Design` refuses a value.
+        If a name is unknown, the method lacks an option, or `ShadingPipeline` refuses a value.
     """
     if method is None:
         method = default_method(model, options.get("gate", False), operand, setup_interval)
@@ -176,7 +176,7 @@ def preset(
     interpolator = (METHODS | PUBLISHED)[method]
     if operand not in (None, interpolator.operand):
         interpolator = interpolator.with_operand(operand)
-    of_design = {field.name for field in fields(Design)}
+    of_design = {field.name for field in fields(ShadingPipeline)}
     own = {name: options.pop(name) for name in list(options) if name not in of_design}
     own = {name: value for name, value in own.items() if value is not None}
     if specular is not None and specular.has_table:
@@ -189,7 +189,7 @@ def preset(
     if unknown := sorted(own.keys() - {field.name for field in fields(interpolator)}):
         raise ValueError(f"method {method} has no option {unknown[0]}")
     build = Build(style, setup_interval, exponent)
-    return Design(replace(interpolator, **own), specular, lights, build=build, **options)
+    return ShadingPipeline(replace(interpolator, **own), specular, lights, build=build, **options)
 
 
 def _specular(model: str | ReflectionModel | None) -> Specular | Power | Lobe | None:
@@ -206,7 +206,7 @@ def _specular(model: str | ReflectionModel | None) -> Specular | Power | Lobe | 
 def _with_fixed_table(lobe: Lobe, exponent: int | None, roughness: float | None) -> Lobe:
     """The lobe with a table fixed at build time for the exponent or roughness, if one is given."""
     for name, value in (("exponent", exponent), ("roughness", roughness)):
-        if value is not None and name != lobe.model.PARAMETER:
+        if value is not None and name != lobe.reflection.PARAMETER:
             raise ValueError(f"model {lobe.name} has no {name} to fix")
         if value is not None:
             lobe = replace(lobe, fixed=(value,), banks=1)

@@ -7,15 +7,15 @@ import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, by_material
 from blysk.golden.geometry.coarse_depth import CoarseDepth
-from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.geometry.edge_normals import TrueSpans
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.mirror_adapter import MirrorAdapter
 from blysk.golden.geometry.span_adapter import LineSpans, shading_spans
-from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.geometry.triangles import FrameSettings, Triangles
 from blysk.golden.geometry.vector_adapter import VectorSpans
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 
 __all__ = ["DrawnPixels", "Renderer"]
 
@@ -68,7 +68,7 @@ class Renderer:
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         The shading pipeline, of a method that takes normals or vectors. If its `Build` has a coarse depth
         test, that drops a span before shading if all of its pixels are hidden. The picture is the same.
     geometry : Geometry
@@ -84,7 +84,7 @@ class Renderer:
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
-    design: Design = field(default_factory=Design)
+    design: ShadingPipeline = field(default_factory=ShadingPipeline)
     geometry: Geometry = _OF_THE_METHOD
 
     def __post_init__(self) -> None:
@@ -118,7 +118,7 @@ class Renderer:
         return len(self.axes) * (self.design.lights - 1)
 
     def compute(
-        self, triangles: Triangles, frame: Frame, constants: FrameConstants | Sequence[FrameConstants]
+        self, triangles: Triangles, frame: FrameSettings, constants: FrameConstants | Sequence[FrameConstants]
     ) -> DrawnPixels:
         """Bit-accurate pixels.
 
@@ -126,10 +126,10 @@ class Renderer:
         ----------
         triangles : Triangles
             In the order of drawing.
-        frame : Frame
+        frame : FrameSettings
             The picture.
         constants : FrameConstants or sequence of FrameConstants
-            As for `Design.compute`; with several lights and vectors they have axes, as
+            As for `ShadingPipeline.compute`; with several lights and vectors they have axes, as
             `triangle_frame.triangle_constants` gives them.
 
         Raises
@@ -146,7 +146,7 @@ class Renderer:
             spans = replace(spans, **{name: value[~hidden] for name, value in vars(spans).items()})
         spans = self._for_lights(spans, by_material(constants)[0])
         pixels = self.design.compute(shading_spans(spans), constants)
-        test = DepthTest()
+        test = DepthTester()
         depth = test.depths(spans.length, spans.depth, spans.depth_step)
         x, y = (np.asarray(place, dtype=np.int64) for place in (pixels.x, pixels.y))
         drawn = test.drawn((y << self.design.x_bits) + x, depth)

@@ -25,7 +25,7 @@ class GpuUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Gpu
+    model : Gpu
         Bit-accurate model, with all contents of memories.
 
     Members
@@ -40,10 +40,10 @@ class GpuUnit(wiring.Component):
     Source: docs/theory/video.md#bands.
     """
 
-    def __init__(self, parameters: Gpu):
-        self.parameters = parameters
-        self.draw = DrawUnit(parameters.drawing)
-        self.display = DisplayUnit(parameters.buffer)
+    def __init__(self, model: Gpu):
+        self.model = model
+        self.draw = DrawUnit(model.drawing)
+        self.display = DisplayUnit(model.buffer)
         super().__init__(
             {
                 "buttons": In(self.draw.signature.members["buttons"].shape),

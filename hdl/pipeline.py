@@ -10,7 +10,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
@@ -25,7 +25,7 @@ from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pix
 __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 
 
-def span_shape(parameters: Design) -> data.StructLayout:
+def span_shape(model: ShadingPipeline) -> data.StructLayout:
     """Shape of a raster span: first pixel, pixels, and what the method takes.
 
     Unit normals at the first and last pixel centre; the ends of the true line; values of each light; or
@@ -33,25 +33,25 @@ def span_shape(parameters: Design) -> data.StructLayout:
 
     Parameters
     ----------
-    parameters : Design
+    model : ShadingPipeline
         Design of the pipeline.
     """
     members = {
-        "x": unsigned(parameters.x_bits),
-        "y": unsigned(parameters.y_bits),
-        "length": unsigned(parameters.length_bits),
+        "x": unsigned(model.x_bits),
+        "y": unsigned(model.y_bits),
+        "length": unsigned(model.length_bits),
     }
-    if parameters.lights:
-        unit = unit_of(parameters.interpolator)
+    if model.lights:
+        unit = unit_of(model.interpolator)
         members |= unit.span_shape(
-            parameters.lights,
-            highlights=parameters.specular is not None,
-            length_bits=parameters.length_bits,
-            **({"factors": len(parameters.factors)} if parameters.factors else {}),
-            **unit.span_options(parameters.interpolator),
+            model.lights,
+            highlights=model.specular is not None,
+            length_bits=model.length_bits,
+            **({"factors": len(model.factors)} if model.factors else {}),
+            **unit.span_options(model.interpolator),
         ).members
-    if parameters.materials > 1:
-        members["material"] = Shape.cast(range(parameters.materials))
+    if model.materials > 1:
+        members["material"] = Shape.cast(range(model.materials))
     return data.StructLayout(members)
 
 
@@ -76,7 +76,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     An interpolator takes spans to the operands of their pixels; a light unit for each light takes these to
     terms, and the intensity unit to colours. The setup of the next spans overlaps the pixels of this one; a
-    FIFO carries the coordinates of the spans past both. `Design` is the bit-accurate model.
+    FIFO carries the coordinates of the spans past both. `ShadingPipeline` is the bit-accurate model.
 
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
     each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles, and in the
@@ -110,7 +110,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Design
+    model : ShadingPipeline
         Method, reflection model, numbers of lights and materials, and build options.
 
     Raises
@@ -120,7 +120,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     Members
     -------
-    i : :py:`In(stream.Signature(span_shape(parameters)))`
+    i : :py:`In(stream.Signature(span_shape(model)))`
         Spans.
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
         Pixels.
@@ -137,8 +137,8 @@ class ShadingPipelineUnit(wiring.Component):
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: Design | None = None):
-        self.parameters = p = parameters or Design()
+    def __init__(self, model: ShadingPipeline | None = None):
+        self.model = p = model or ShadingPipeline()
         super().__init__(
             {
                 "i": In(stream.Signature(span_shape(p))),
@@ -160,7 +160,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     def _make_units(self) -> None:
         """Units from spans to colours, and the times that follow from them."""
-        p = self.parameters
+        p = self.model
         compact, setup_interval, product_interval = p.build.style == "compact", p.build.setup_interval, 1
         method = unit_of(p.interpolator)
         if compact:
@@ -200,7 +200,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     def _light_units(self, compact: bool) -> list:
         """Light units, or diffuse units without specular light; and the slopes or tables that they share."""
-        p = self.parameters
+        p = self.model
         exponent, diffuse = p.build.exponent, Diffuse(p.interpolator.COSINE_FORMAT)
         if p.specular is None:
             return [DiffuseUnit(diffuse) for _ in range(p.lights)]
@@ -244,7 +244,7 @@ class ShadingPipelineUnit(wiring.Component):
     def elaborate(self, platform):
         """Frame constants, units from spans to colours, coordinates past them, admission, counters."""
         m = Module()
-        p = self.parameters
+        p = self.model
         # Whether a write was taken on the cycle before.
         self._written = Signal(name="written")
         m.submodules.pixel_assembler = assembler = self._assembler
@@ -269,7 +269,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     def _carry_coordinates(self, m: Module) -> tuple[Value, Value]:
         """FIFO of the coordinates of spans, from the input to the assembler; valid and ready of its input."""
-        p, assembler = self.parameters, self._assembler
+        p, assembler = self.model, self._assembler
         layout = coordinates_shape(p.x_bits, p.y_bits, p.length_bits)
         source = stream.Signature(layout).create(path=("source",))
         m.d.comb += [source.payload[name].eq(self.i.payload[name]) for name in layout.members]
@@ -326,7 +326,7 @@ class ShadingPipelineUnit(wiring.Component):
             inside.eq(inside + came - went),
             idle.eq(~admit & (idle | (finished & is_one))),
         ]
-        if (p := self.parameters).materials > 1:
+        if (p := self.model).materials > 1:
             # Constants follow the index one cycle later, the slope of the exponent some more.
             material, waited = existing_material(self.i.payload.material, p.materials), Signal(2)
             with m.If(self.i.valid & (material != frame.material)):
@@ -348,7 +348,7 @@ class ShadingPipelineUnit(wiring.Component):
         for counter, event in (
             (status.out_of_range_spans, self._interpolator.out_of_range if self._interpolator else 0),
             (status.empty_spans, self.i.valid & self.i.ready & (span.length == 0)),
-            (status.overrun, admit & (span.x + span.length > 1 << self.parameters.x_bits)),
+            (status.overrun, admit & (span.x + span.length > 1 << self.model.x_bits)),
         ):
             seen = Signal(name="seen")
             m.d.sync += seen.eq(event)
@@ -357,7 +357,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     def _shade(self, m: Module, frame: FrameConstantsUnit) -> list[tuple[Value, Value]]:
         """Units from spans to colours; valid and ready of those that take spans."""
-        p, span = self.parameters, self.i.payload
+        p, span = self.model, self.i.payload
         m.submodules.interpolator = interpolator = self._interpolator
         m.submodules.intensity = intensity = self._intensity
         sinks = [(interpolator.i.valid, interpolator.i.ready)]
@@ -432,7 +432,7 @@ class ShadingPipelineUnit(wiring.Component):
         cycle, or none does.
         """
         intensity = self._intensity
-        lockstep = self.parameters.specular is None or not self._lights[0].skips_dark
+        lockstep = self.model.specular is None or not self._lights[0].skips_dark
         leaders = self._lights[:1] if lockstep else self._lights
         for light in self._lights:
             others = [other for other in leaders if other is not light and not lockstep]
@@ -447,7 +447,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     def _decide(self, m: Module, frame: FrameConstantsUnit, sinks: list) -> tuple[stream.Interface, Value]:
         """Operands of the pixels, and the highlight gate's decision for each light; two more ``sinks``."""
-        p, span = self.parameters, self.i.payload
+        p, span = self.model, self.i.payload
         m.submodules.highlight_gate = gate = self._gate
         width = p.length_bits
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=width, depth=self._waiting_spans)

@@ -79,7 +79,7 @@ class PixelPipelinesUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : PixelPipelines
+    model : PixelPipelines
         Bit-accurate model.
     waiting : int
         Spans that wait before a pipeline, 3 or more.
@@ -103,8 +103,8 @@ class PixelPipelinesUnit(wiring.Component):
     Source: docs/theory/units.md#pipeline.
     """
 
-    def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        self.parameters = p = parameters or PixelPipelines()
+    def __init__(self, model: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
+        self.model = p = model or PixelPipelines()
         self._waiting = waiting
         super().__init__(
             {
@@ -176,7 +176,7 @@ class _JoinedPipelines(wiring.Component):
 
     Parameters
     ----------
-    parameters, waiting
+    model, waiting
         Those of `PixelPipelinesUnit`.
     joins : type
         That unit, which takes the number of pipelines and the bits of x and of y.
@@ -184,9 +184,9 @@ class _JoinedPipelines(wiring.Component):
         Payload of the stream; takes the same.
     """
 
-    def __init__(self, parameters, waiting: int, joins: type, shape: Callable[[int, int, int], ShapeLike]):
-        self.pipelines = PixelPipelinesUnit(parameters, waiting)
-        self.parameters = p = self.pipelines.parameters
+    def __init__(self, model, waiting: int, joins: type, shape: Callable[[int, int, int], ShapeLike]):
+        self.pipelines = PixelPipelinesUnit(model, waiting)
+        self.model = p = self.pipelines.model
         size = p.pipes, p.design.x_bits, p.design.y_bits
         self._join = joins(*size)
         # With a merger no cycle more: a turn is in its FIFO before the first pixel of its span comes.
@@ -203,7 +203,7 @@ class WidePipelinesUnit(_JoinedPipelines):
 
     Parameters
     ----------
-    parameters, waiting
+    model, waiting
         Those of `PixelPipelinesUnit`.
 
     Members
@@ -216,8 +216,8 @@ class WidePipelinesUnit(_JoinedPipelines):
     Source: docs/theory/units.md#pipeline.
     """
 
-    def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        super().__init__(parameters, waiting, PixelLanesUnit, lanes_shape)
+    def __init__(self, model: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
+        super().__init__(model, waiting, PixelLanesUnit, lanes_shape)
 
     def elaborate(self, platform):
         """The pipelines, and their pixels on a cycle as one beat."""
@@ -240,7 +240,7 @@ class MergedPipelinesUnit(_JoinedPipelines):
 
     Parameters
     ----------
-    parameters, waiting
+    model, waiting
         Those of `PixelPipelinesUnit`.
 
     Members
@@ -253,8 +253,8 @@ class MergedPipelinesUnit(_JoinedPipelines):
     Source: docs/theory/units.md#pipeline.
     """
 
-    def __init__(self, parameters: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        super().__init__(parameters, waiting, PixelMergerUnit, lambda pipes, *bits: pixel_shape(*bits))
+    def __init__(self, model: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
+        super().__init__(model, waiting, PixelMergerUnit, lambda pipes, *bits: pixel_shape(*bits))
         self.cycles_per_pixel = self.pipelines.cycles_per_pixel
         self.setup_interval = self.pipelines.setup_interval
 

@@ -15,7 +15,7 @@ from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect, moving
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
-from blysk.hdl.geometry.depth_test import DepthMemory, DepthTestUnit, drawn_pixel_shape
+from blysk.hdl.geometry.depth_tester import DepthMemory, DepthTesterUnit, drawn_pixel_shape
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.geometry.light_adapter import LightAdapterUnit, with_components
 from blysk.hdl.geometry.mirror_adapter import MirrorAdapterUnit
@@ -24,10 +24,10 @@ from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_sha
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.port_descriptions import COUNTER_TEXTS
 
-__all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RenderUnit"]
+__all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RendererUnit"]
 
 STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans")
-"""Counters of `RenderUnit`."""
+"""Counters of `RendererUnit`."""
 
 PORT_DESCRIPTIONS = {
     "i_x": "columns of the three corners, in any order",
@@ -75,15 +75,15 @@ goes on.
 """
 
 
-class RenderUnit(wiring.Component):
+class RendererUnit(wiring.Component):
     """Triangles to the pixels that are to be written: `Renderer` is the bit-accurate model.
 
-    `GeometryUnit`, `ShadingPipelineUnit` and `DepthTestUnit` in a row; spans wait between the first two in a
-    FIFO (compact without vectors or a coarse test: one in a register), and their depths pass the pipeline in
-    another. With a coarse depth test a span also waits in the FIFO for the test's answer, and then leaves, or
-    is dropped in one cycle. The units work at the same time: a frame takes as many cycles as the slowest of
-    them alone, if none waits for long. The design's `Build` has the styles, the lanes of
-    triangle setup and the coarse test.
+    `GeometryUnit`, `ShadingPipelineUnit` and `DepthTesterUnit` in a row; spans wait between the first two in
+    a FIFO (compact without vectors or a coarse test: one in a register), and their depths pass the pipeline
+    in another. With a coarse depth test a span also waits in the FIFO for the test's answer, and then leaves,
+    or is dropped in one cycle. The units work at the same time: a frame takes as many cycles as the slowest
+    of them alone, if none waits for long. The design's `Build` has the styles, the lanes of triangle setup
+    and the coarse test.
 
     Frame constants are written while no span is inside; spans of another material than the one before wait
     for the pipeline to be empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
@@ -93,13 +93,13 @@ class RenderUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Renderer
+    model : Renderer
         Bit-accurate model.
     size : (int, int) or None
-        As for `DepthTestUnit`.
+        As for `DepthTesterUnit`.
     clears : bool
-        Whether the memory of depths is cleared for each picture, see `DepthTestUnit`. Else the unit is right
-        for one picture, unless the memory outside is cleared between two.
+        Whether the memory of depths is cleared for each picture, see `DepthTesterUnit`. Else the unit is
+        right for one picture, unless the memory outside is cleared between two.
 
     Members
     -------
@@ -127,18 +127,18 @@ class RenderUnit(wiring.Component):
 
     def __init__(
         self,
-        parameters: Renderer | None = None,
+        model: Renderer | None = None,
         size: tuple[int, int] | None = None,
         clears: bool = False,
     ):
-        self.parameters = parameters or Renderer()
-        design, geometry = self.parameters.design, self.parameters.geometry
+        self.model = model or Renderer()
+        design, geometry = self.model.design, self.model.geometry
         self.geometry = GeometryUnit(geometry, design.build)
         self.pipeline = ShadingPipelineUnit(design)
         self._adapters(design.build.compact_geometry)
-        coarse, bits = self.parameters.coarse, (design.x_bits, design.y_bits)
+        coarse, bits = self.model.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
-        self.depth = DepthTestUnit(*bits, size, clears)
+        self.depth = DepthTesterUnit(*bits, size, clears)
         members = {
             "i": In(stream.Signature(triangle_shape(geometry.grid))),
             "o": Out(stream.Signature(drawn_pixel_shape(design.x_bits, design.y_bits))),
@@ -199,7 +199,7 @@ class RenderUnit(wiring.Component):
         # There is room whenever the pipeline takes a span.
         connect_late_fifo(m, "depths", entering, waiting, pipeline.spans_inside + 1 + UNCOUNTED)
         pixel = pipeline.o
-        if compact := self.parameters.design.build.compact:
+        if compact := self.model.design.build.compact:
             pixel = stream.Signature(pipeline.o.payload.shape()).create(path=("pixel",))
             connect_register(m, "waiting_pixel", pipeline.o, pixel)
         moves = depth.i.valid & depth.i.ready
@@ -238,18 +238,18 @@ class RenderUnit(wiring.Component):
         """Units for the components of vectors that geometry does not have, and the shape before them."""
         span, rows, lights = (
             self.pipeline.i.payload.shape(),
-            self.parameters.rows,
-            self.parameters.design.lights,
+            self.model.rows,
+            self.model.design.lights,
         )
         self._lights = self._mirror = None
         self._span = span
-        if not (rows or self.parameters.mirrors):
+        if not (rows or self.model.mirrors):
             return
         self._span = with_components(span, _COMPONENTS)
         shape = data.StructLayout(self._span.members | _DEEP)
         if rows:
             self._lights = LightAdapterUnit(lights - 1, rows // (lights - 1), compact, shape)
-        if self.parameters.mirrors:
+        if self.model.mirrors:
             self._mirror = MirrorAdapterUnit(compact, with_components(shape, _COMPONENTS + rows))
 
     def _components(self, m: Module, span: stream.Interface) -> stream.Interface:

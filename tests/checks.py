@@ -10,10 +10,10 @@ from amaranth.lib.wiring import Component, Out
 from amaranth.sim import Simulator
 
 from blysk.bench.quality.mutation import Wrapped, flags_of
+from blysk.bench.units.record import Case
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import Case
 
 __all__ = ["assert_beats_equal", "assert_equals_model", "assert_keeps_rate", "known", "resets"]
 

@@ -19,7 +19,7 @@ SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
 FURTHER_MODELS = tuple(name for name in MODELS if name not in (*SPECULAR_MODELS, "blinn_product"))
 """The others that the specular unit serves."""
 
-KINDS = tuple({type(unit.model): name for name, unit in MODELS.items()}.values())
+KINDS = tuple({type(unit.reflection): name for name, unit in MODELS.items()}.values())
 """A model of each kind of specular unit. Methods meet models at a stream: what a method is to send depends on
 the kind alone."""
 

@@ -10,7 +10,7 @@ import pytest
 import blysk
 from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.geometry.triangles import FrameSettings, Triangles
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.light_frame import light_frame
 from blysk.golden.render import Renderer
@@ -34,7 +34,7 @@ def expected(example):
     towards = np.array([[0, 0, (1 << 17) - 1]])
     ambient, diffuse, specular = (np.full((1, 3), round(255 * 64 * level)) for level in (0.05, 0.4, 0.55))
     constants = FrameConstants(50, ambient[0], towards, towards, diffuse, specular)
-    drawn = Renderer(design).compute(triangle, Frame.centred(WIDTH, HEIGHT, limit=178), constants)
+    drawn = Renderer(design).compute(triangle, FrameSettings.centred(WIDTH, HEIGHT, limit=178), constants)
     picture = np.tile(np.array(BACKGROUND, dtype=np.uint8), (HEIGHT, WIDTH, 1))
     picture[drawn.y, drawn.x] = drawn.color
     assert len(drawn.x) > 150

@@ -98,7 +98,7 @@ def installed(wheel, tmp_path_factory):
 
 
 _TABLE = """
-from blysk.sim.units.registry import RECORDS
+from blysk.bench.units.registry import RECORDS
 for name in RECORDS.keys() - {"dot_product"}:
     del RECORDS[name]
 from blysk.sim.cli.main import main
@@ -108,7 +108,7 @@ raise SystemExit(main())
 _UNIT = """
 import blysk
 from blysk.hdl.emit.verilog import emit
-from blysk.sim.units.registry import RECORDS
+from blysk.bench.units.registry import RECORDS
 print(blysk.__file__)
 record = RECORDS["dot_product"]
 print(emit(record.variants[record.default].unit(), "unit").partition("module")[2])

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from amaranth.back import rtlil
 
+from blysk.bench.units.record import first
+from blysk.bench.units.registry import RECORDS
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import first
-from blysk.sim.units.registry import RECORDS
 
 from .checks import assert_equals_model, assert_keeps_rate, known, resets
 from .decided import digest_of
@@ -35,7 +35,7 @@ SELDOM = (
     *("edge_setup", "edge_normals", "gradient_setup", "plane_setup", "plane_assembler", "span_attributes"),
     *("attribute_serialiser", "vertex_sort", "span_clip", "edge_walk", "vector_normaliser", "span_halver"),
     "serial_vectors",
-    *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_test"),
+    *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_tester"),
     *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )
 """Units that the default design does not have: of other methods and models, of renderer, buses and boards.

@@ -7,13 +7,13 @@ import click
 
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F
+from blysk.bench.units.names import UNITS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.sim.api.design import built, design
 from blysk.sim.api.options import BUILD, DESIGN
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable
-from blysk.sim.units.names import UNITS
 from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = ["command"]

@@ -6,7 +6,7 @@ import click
 
 from blysk.bench.command import progress
 from blysk.bench.tools.pages_folder import check_folder
-from blysk.sim.units.names import UNITS
+from blysk.bench.units.names import UNITS
 from blysk.sim.value_types import Choice
 
 __all__ = ["command"]

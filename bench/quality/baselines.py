@@ -25,8 +25,9 @@ from blysk.bench.command import progress, run
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.blocks import ENTRIES as UNITS
 from blysk.bench.tools.blocks import Entry, entries_of
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.build import STYLES
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS, MODELS, preset
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.scene import Scene
@@ -37,7 +38,6 @@ from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.meshes.teapot import teapot
 from blysk.sim.output import check_writable, write_json
-from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
 
 __all__ = [
@@ -80,12 +80,12 @@ def _scenes() -> dict[str, Scene]:
     }
 
 
-def cycles_of(design: Design, style: str = "throughput") -> dict[str, int]:
+def cycles_of(design: ShadingPipeline, style: str = "throughput") -> dict[str, int]:
     """Cycles of a pipeline from the first write of a constant to the last pixel.
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         The pipeline.
     style : str
         See `ShadingPipelineUnit`.
@@ -114,7 +114,7 @@ class _Pipeline:
         return f"pipeline {self.method}, {self.model}, {self.style}" + ", gate" * self.gate
 
     @property
-    def design(self) -> Design:
+    def design(self) -> ShadingPipeline:
         return preset(self.method, self.model, gate=self.gate)
 
     def parts(self) -> dict[str, int]:

@@ -34,13 +34,13 @@ from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
 from blysk.bench.store import Task, results_of
 from blysk.bench.tools.tool_runner import ToolError
+from blysk.bench.units.registry import RECORDS
 from blysk.sim.engines.cache import version_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.installation import install_extra
 from blysk.sim.output import check_writable, write_json
-from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
 
 __all__ = ["LEAST", "Score", "main", "measure", "scores", "table", "waived"]

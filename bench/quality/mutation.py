@@ -21,13 +21,13 @@ from amaranth.lib.wiring import Component, In, Member, Out
 
 from blysk.bench.quality.equivalence import yosys
 from blysk.bench.tools.tool_runner import ToolError
+from blysk.bench.units.record import Record
+from blysk.bench.units.registry import RECORDS
 from blysk.hdl.geometry.triangles import COUNTER_BITS
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.compilers import find_compilers
-from blysk.sim.engines.engine import CompilerMissing, Ports, Stimulus, Trace
+from blysk.sim.engines.engine import CompilerMissing, Drive, Ports, Trace
 from blysk.sim.engines.simulate import stimulus_of
-from blysk.sim.units.record import Record
-from blysk.sim.units.registry import RECORDS
 
 __all__ = ["Mutants", "Wrapped", "flags_of", "killed", "mutate", "stimuli_of", "units_inside", "vectors_of"]
 
@@ -51,8 +51,8 @@ def units_inside(fragment: Fragment, path: str = "") -> Iterator[str]:
             yield from units_inside(inner, f"{path}{name}.")
 
 
-def stimuli_of(record: Record, unit: Component) -> list[Stimulus]:
-    """Stimulus of every run of a record's default variant, those with the fewest input beats first.
+def stimuli_of(record: Record, unit: Component) -> list[Drive]:
+    """Drive of every run of a record's default variant, those with the fewest input beats first.
 
     Stimuli of the long run are left out.
 
@@ -73,10 +73,10 @@ def stimuli_of(record: Record, unit: Component) -> list[Stimulus]:
     return sorted(sent, key=lambda stimulus: len(stimulus.input))
 
 
-def vectors_of(record: Record) -> list[tuple[Stimulus, Trace]]:
+def vectors_of(record: Record) -> list[tuple[Drive, Trace]]:
     """The stimuli of `stimuli_of`, each with its trace in the compiled engine."""
     unit = record.variants[record.default].unit()
-    model = cxxrtl.Model(unit)
+    model = cxxrtl.Compiled(unit)
     return [(sent, model.run(sent)) for sent in stimuli_of(record, unit)]
 
 
@@ -324,7 +324,7 @@ def _registers_behind(module: Mapping[str, Any]) -> Callable[[str], str]:
     return behind
 
 
-class Mutants(cxxrtl.Model):
+class Mutants(cxxrtl.Compiled):
     """Compiled model of a unit with all its mutants."""
 
     def __init__(self, unit: Component, folder: Path):
@@ -362,12 +362,12 @@ class Mutants(cxxrtl.Model):
         ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
         ctypes.c_uint64.in_dll(self._library, "blysk_start").value = start
 
-    def trace(self, stimulus: Stimulus) -> Trace:
+    def trace(self, stimulus: Drive) -> Trace:
         """Trace of a run of the stimulus, which ends at its limit of cycles at the latest."""
         return self._run(stimulus, None)
 
 
-def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: Iterable[int]) -> set[int]:
+def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iterable[int]) -> set[int]:
     """Numbers of the mutants whose trace differs from the unit's for one of the vectors.
 
     A counter of events has more bits than a run has events. Of each word of the status the shortest run that
@@ -376,7 +376,7 @@ def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: I
     """
     alive = set(mutants)
 
-    def run(start: int, stimulus: Stimulus, trace: Trace) -> None:
+    def run(start: int, stimulus: Drive, trace: Trace) -> None:
         limited = replace(stimulus, limit=trace.clock)
         model.choose(0, start)
         expected = _seen(limited, model.trace(limited))
@@ -401,7 +401,7 @@ def killed(model: Mutants, vectors: Sequence[tuple[Stimulus, Trace]], mutants: I
     return set(mutants) - alive
 
 
-def _seen(stimulus: Stimulus, trace: Trace) -> tuple:
+def _seen(stimulus: Drive, trace: Trace) -> tuple:
     """Parts of a trace that tests compare; without stalls, also the clocks of the input transfers."""
     free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
     cycles = (trace.input_cycles,) if free else ()

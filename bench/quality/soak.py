@@ -23,11 +23,14 @@ from amaranth.lib.wiring import Component
 from blysk.bench.command import progress, run
 from blysk.bench.speed.verilator import Verilated, free_stimulus
 from blysk.bench.store import Task, results_of
+from blysk.bench.units.pipeline_spans import ends_for, tabled, vectors_for
+from blysk.bench.units.record import Beats, length_of
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.unit_vector import ONE, quantise
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -41,9 +44,6 @@ from blysk.sim.frames.testbench import pixel_beats
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.installation import install_extra
 from blysk.sim.output import check_writable, write_json
-from blysk.sim.units.pipeline_spans import ends_for, tabled, vectors_for
-from blysk.sim.units.record import Beats, length_of
-from blysk.sim.units.registry import RECORDS
 from blysk.sim.value_types import Whole
 
 __all__ = [
@@ -155,7 +155,7 @@ def random_constants(rng: np.random.Generator) -> FrameConstants:
 
 
 @functools.cache
-def _models(design: Design, baseline: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
+def _models(design: ShadingPipeline, baseline: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
     """The pipeline, and Verilator's model of it if ``baseline``; built once in a process."""
     unit = ShadingPipelineUnit(design)
     return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if baseline else None

@@ -3,7 +3,7 @@
 ``python -m blysk.bench.quality.sweep [MESH ...]`` takes each mesh (the teapot by default) at 320x240, in
 white light and with a grey, glossy material, by the method quotient at every exponent from 1 to 1000 with the
 model blinn and at 30 of them with phong; by another method at every exponent with cosquad and at 30 with
-every other model. Each frame is computed by `Design.compute`, which the simulated pipeline
+every other model. Each frame is computed by `ShadingPipeline.compute`, which the simulated pipeline
 equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and compared with
 exact normals at every pixel and the same model. ``--json`` keeps the figures of every frame. The exit status
 is 1 if the error of a pixel is over 1 LSB, switched pixels left out (see `Point`); 2 for a mesh that
@@ -24,7 +24,7 @@ from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.prepare import constants_of, spans_for
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
@@ -34,7 +34,7 @@ from blysk.golden.reference.scene import Scene
 from blysk.sim.errors import InputError
 from blysk.sim.meshes.mesh import load_mesh
 
-__all__ = ["EXPONENTS", "FEW_EXPONENTS", "LARGEST", "LARGEST_COSINE", "Frame", "Point", "Summary", "main"]
+__all__ = ["EXPONENTS", "FEW_EXPONENTS", "LARGEST", "LARGEST_COSINE", "Point", "Summary", "SweptMesh", "main"]
 __all__ += ["models_of", "summarise"]
 
 EXPONENTS = tuple(range(1, MAX_EXPONENT + 1))
@@ -98,7 +98,7 @@ class Point:
     steady_lsb: float
 
 
-class Frame:
+class SweptMesh:
     """A picture of a mesh with one directional light, rasterised once for every exponent and model.
 
     Parameters
@@ -153,7 +153,7 @@ class Frame:
 
         These are the colours of the golden renderer's `render`, in the order of the fragments.
         """
-        scene, reflection = self.scene_of(exponent), (MODELS | LOBES | MIRROR_LOBES)[model].model
+        scene, reflection = self.scene_of(exponent), (MODELS | LOBES | MIRROR_LOBES)[model].reflection
         highlight = self._mirrored if reflection.MIRROR else self._highlight
         shaded = intensity_of_cosines(
             scene.material,
@@ -165,7 +165,7 @@ class Frame:
         )
         return 255 * saturate(shaded)
 
-    def spans_of(self, design: Design, exponent: int) -> tuple[Raster, Spans]:
+    def spans_of(self, design: ShadingPipeline, exponent: int) -> tuple[Raster, Spans]:
         """Spans as `prepare` cuts and quantises them for a pipeline."""
         scene = self.scene_of(exponent)
         cut, _ = cut_spans(scene, self.raster, design)
@@ -209,7 +209,7 @@ class Frame:
 
     def _switched(
         self,
-        design: Design,
+        design: ShadingPipeline,
         cut: Raster,
         spans: Spans,
         constants: FrameConstants,
@@ -333,7 +333,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|")
     figures, summaries = {}, []
     for one in loaded:
-        frame = Frame(
+        frame = SweptMesh(
             one.mesh, options.width, options.height, options.coefficients, options.view, options.light
         )
         points = [

@@ -259,7 +259,7 @@ def _judged(
     model: str,
 ) -> dict[str, Any]:
     """Every error of a frame, its verdicts and its pictures."""
-    own = (MODELS | LOBES | MIRROR_LOBES)[model].model
+    own = (MODELS | LOBES | MIRROR_LOBES)[model].reflection
     exact = render(scene, "phong", own if own.MIRROR else REFLECTION_MODELS["blinn"], raster=raster)
     if not exact.mask.any():
         size = f"{scene.width}x{scene.height}"

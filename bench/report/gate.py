@@ -25,7 +25,7 @@ from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.spans import pixels_of
-from blysk.golden.pipeline import Design, Pixels, Spans
+from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
 from blysk.golden.presets import METHODS as ALL_METHODS
 from blysk.golden.presets import MODELS as ALL_MODELS
 from blysk.golden.presets import preset
@@ -116,7 +116,7 @@ class GateRow:
     identical: bool
 
 
-def shares_of(design: Design, spans: Spans, constants: FrameConstants) -> Shares:
+def shares_of(design: ShadingPipeline, spans: Spans, constants: FrameConstants) -> Shares:
     """Shares of a frame by the bit-accurate gate, for one light and material; the design may have no gate."""
     spans = spans[np.flatnonzero(spans.length)]
     length = np.asarray(spans.length, dtype=np.int64)

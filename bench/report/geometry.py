@@ -17,12 +17,12 @@ from blysk.bench.svg import svg
 from blysk.bench.tools.families import DEVICE
 from blysk.bench.tools.fpga import name_of
 from blysk.golden.frames.triangle_frame import triangle_frame
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 from blysk.sim.api.placed import read_store
 from blysk.sim.api.scene import scene
 from blysk.sim.frames.triangles import TriangleSimulator
@@ -34,7 +34,7 @@ _EXPONENTS = 1, 20, 100, 1000
 _TRIANGLES = 64, 1000, 10_000, 100_000
 
 
-def _candidate(method: str, **build: Any) -> Design:
+def _candidate(method: str, **build: Any) -> ShadingPipeline:
     """A design for pictures of up to 1024x512, with the model ``blinn`` and one light."""
     return preset(method, "blinn", x_bits=10, y_bits=9).built(top="render", **build)
 
@@ -74,7 +74,7 @@ def measure(design: str, triangles: Sequence[int], size: Sequence[int]) -> dict[
         ``cycles``, and the figures of `frame_figures`, with ``errors`` by exponent in place of ``error``.
     """
     renderer, size = Renderer(CANDIDATES[design]), tuple(size)
-    unit = RenderUnit(renderer)
+    unit = RendererUnit(renderer)
     totals = cost_of(unit).totals
     simulator = TriangleSimulator(renderer, size)
     return {

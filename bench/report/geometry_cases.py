@@ -49,7 +49,7 @@ def frame_figures(scene: Scene, renderer: Renderer, frame: TriangleFrame) -> dic
     dim[raster.pixel[which]] = (np.abs(cosines) <= TERMINATOR).any(axis=1)
     zero[raster.pixel[which]] = np.linalg.norm(sums, axis=1) < 1e-6
     same = (owner == found) & (owner >= 0)
-    model = renderer.design.specular.model
+    model = renderer.design.specular.reflection
     exact = render(scene, "phong", model, raster).image.reshape(-1, 3) * 255
     error = np.abs(frame.image.reshape(-1, 3) - exact).max(axis=1)[same & ~dim & ~zero]
     return {

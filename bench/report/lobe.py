@@ -64,13 +64,13 @@ ROUGHNESSES = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
 class Case:
     """A model, and the exponents or alphas of its table."""
 
-    model: ReflectionModel
+    reflection: ReflectionModel
     label: str
     values: tuple[float, ...]
 
     def parameter(self, value: float) -> float:
         """Parameter of the model: an exponent, or the roughness of an alpha."""
-        return value if self.model.PARAMETER == "exponent" else value**0.5
+        return value if self.reflection.PARAMETER == "exponent" else value**0.5
 
 
 CASES = (
@@ -99,7 +99,7 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
     terms = lobe.compute(
         Fixed(lobe.operand_format, codes), np.zeros(codes.shape, bool), lobe.table(parameter)
     )
-    exact = lobe.model.reflect(1 - np.ldexp(codes, -lobe.fraction_bits), parameter)
+    exact = lobe.reflection.reflect(1 - np.ldexp(codes, -lobe.fraction_bits), parameter)
     return 255 * float(np.abs(terms.values - exact).max())
 
 
@@ -108,7 +108,7 @@ def errors_of_size(octaves: int, steps: int, samples: int = 256) -> list[list[fl
     lobe = Lobe(BLINN, "one_minus_cosine", octaves, steps)
     return [
         [
-            largest_error(replace(lobe, model=case.model), case.parameter(value), samples)
+            largest_error(replace(lobe, reflection=case.reflection), case.parameter(value), samples)
             for value in case.values
         ]
         for case in CASES
@@ -187,7 +187,7 @@ def frame_errors(
         any N·L.
     """
     design, surface, found = preset(method, model), mesh_of(mesh), []
-    target = design.specular.model if design.loads_tables else BLINN
+    target = design.specular.reflection if design.loads_tables else BLINN
     for value in values:
         scene = scene_for(surface, 10, *size)
         change = {"exponent": value} if target.PARAMETER == "exponent" else {"roughness": value}
@@ -273,7 +273,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         f"beckmann from {sharp[1]:g}, of those measured. Below 0.2 its words of 18 bits promise no such "
         "error.",
     ]
-    heads = [f"{case.model.name} {case.label} = {value:g}, LSB" for case in CASES for value in case.values]
+    heads = [
+        f"{case.reflection.name} {case.label} = {value:g}, LSB" for case in CASES for value in case.values
+    ]
     sizes = [
         [f"{given['octaves']}, {given['steps']}", (given["octaves"] + 1) * given["steps"], *chain(*errors)]
         for given, errors in made["errors_of_size"]

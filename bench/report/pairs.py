@@ -2,9 +2,9 @@
 
 ``python -m blysk.bench.report.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
 exponents 1, 30 and 1000 with each pair, also without specular light, in the compiled engine, and compares
-every output pixel, hidden ones too, with `Design.compute`. It prints a line for each pair. A table of the
-method quotient ends at a right angle: an exponent at which a model lives on beyond is left out, and counted.
-The exit status is 1 if a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
+every output pixel, hidden ones too, with `ShadingPipeline.compute`. It prints a line for each pair. A table
+of the method quotient ends at a right angle: an exponent at which a model lives on beyond is left out, and
+counted. The exit status is 1 if a pixel differs or a pair cannot be built, 2 for a mesh that cannot be read.
 """
 
 import argparse
@@ -17,7 +17,7 @@ import numpy as np
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frames.prepare import constants_of, prepare
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED, preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -69,7 +69,7 @@ def models_of(method: str, models: Sequence[str | None]) -> list[str | None]:
     return [model for model in models if takes_vectors or model not in MIRROR_LOBES]
 
 
-def _refuses(design: Design, exponent: int) -> bool:
+def _refuses(design: ShadingPipeline, exponent: int) -> bool:
     """Whether a design has no table of its model at an exponent."""
     if not (design.takes_vectors and design.loads_tables):
         return False
@@ -102,9 +102,9 @@ def mismatches(
         If the pipeline breaks the stream's rules, stops, or gives another number of pixels.
     """
     scene = scene_for(mesh, exponent, width, height)
-    spans = prepare(scene, unit.parameters).spans
-    (constants,) = constants_of(scene, unit.parameters)
-    expected = unit.parameters.compute(spans, constants)
+    spans = prepare(scene, unit.model).spans
+    (constants,) = constants_of(scene, unit.model)
+    expected = unit.model.compute(spans, constants)
     run = simulate(
         unit,
         beats_of(unit, spans),

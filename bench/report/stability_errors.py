@@ -24,7 +24,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.methods.quotient_interpolator import QuotientErrors
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector, intensity_of_cosines, saturate
@@ -83,11 +83,11 @@ class _Shaded(NamedTuple):
     out_of_range: np.ndarray
 
 
-def _design(case: Case, method: str) -> Design:
+def _design(case: Case, method: str) -> ShadingPipeline:
     return preset(method, model_of(method), lights=len(case.scene.lights))
 
 
-def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
+def spans_of(case: Case, design: ShadingPipeline, raster: Raster) -> Spans:
     """Spans of a case for a design, made by `spans_for` or of the case's own codes."""
     if case.codes is None:
         return spans_for(case.scene, raster, design)
@@ -106,9 +106,9 @@ def spans_of(case: Case, design: Design, raster: Raster) -> Spans:
     return Spans(raster.x, raster.y, raster.length, left, right)
 
 
-def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray:
+def _own(case: Case, design: ShadingPipeline, raster: Raster, spans: Spans) -> np.ndarray:
     """Picture of the method's own curve in float64, computed from the codes of the spans."""
-    scene, model, method = case.scene, design.specular.model, design.interpolator
+    scene, model, method = case.scene, design.specular.reflection, design.interpolator
     if design.takes_values:
         cosine, u = method.exact_operands(spans.values, spans.length)
         return shade_operands(scene, raster, cosine, 1 - u, model)
@@ -122,7 +122,7 @@ def _own(case: Case, design: Design, raster: Raster, spans: Spans) -> np.ndarray
     return shade_spans(scene, given, method.exact_normals, model, method.uses_chord)
 
 
-def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
+def _shade(case: Case, design: ShadingPipeline, raster: Raster) -> _Shaded:
     """Errors of the bit-accurate model against exact normals: perspective-correct, normalised per pixel."""
     scene, material = case.scene, case.scene.materials[0]
     spans, (constants,) = spans_of(case, design, raster), constants_of(scene, design)
@@ -150,7 +150,7 @@ def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
                 scene.ambient_light,
                 np.where(near, side, cosine),
                 highlight,
-                design.specular.model,
+                design.specular.reflection,
             )
         )
         for side in (0.0, 2.0**-60)
@@ -168,13 +168,13 @@ def _shade(case: Case, design: Design, raster: Raster) -> _Shaded:
     return _Shaded(found, stated + arithmetic, raster.span[shown], out_of_range)
 
 
-def _highlight_error(design: Design, exponent: int, longest: int, error: float) -> float:
+def _highlight_error(design: ShadingPipeline, exponent: int, longest: int, error: float) -> float:
     """Stated error of a specular term, for an error of N·L and N·H; with vectors by their own bound."""
     unit = design.specular
     if not design.takes_vectors:
         return exponent * error + unit.error
     bounds = QuotientErrors.worst(longest, design.mirror)
-    return bounds.highlight(unit.model, exponent) + unit.line_error(exponent) + unit.ERROR
+    return bounds.highlight(unit.reflection, exponent) + unit.line_error(exponent) + unit.ERROR
 
 
 def _angles(raster: Raster) -> np.ndarray:
@@ -195,7 +195,7 @@ def _line_angles(spans: Spans) -> np.ndarray:
     return 2 * np.degrees(np.arccos(np.minimum(nearest, 1)))
 
 
-def _has_unit_length(design: Design, codes: Sequence[np.ndarray]) -> np.ndarray:
+def _has_unit_length(design: ShadingPipeline, codes: Sequence[np.ndarray]) -> np.ndarray:
     """Whether both ends of spans have length 1 within `LENGTH_TOLERANCE`; for a line, the longer end."""
     lengths = np.linalg.norm(np.stack(codes) / ONE, axis=2)
     if design.interpolator.takes_line:

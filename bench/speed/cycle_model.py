@@ -15,7 +15,7 @@ from amaranth.hdl import UnusedElaboratable
 from blysk.bench.accuracy import model_of, scene_for
 from blysk.bench.command import run
 from blysk.golden.frames.prepare import constants_of, prepare
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import METHODS, preset
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -101,13 +101,13 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     return 1 + writes + unit.latency + cycles
 
 
-def unit_of(design: Design) -> ShadingPipelineUnit:
+def unit_of(design: ShadingPipeline) -> ShadingPipelineUnit:
     """The pipeline of a design for its figures only: no warning says that it is never elaborated."""
     warnings.simplefilter("ignore", UnusedElaboratable)
     return ShadingPipelineUnit(design)
 
 
-def compare(design: Design, triangles: int, size: tuple[int, int]) -> tuple[int, int]:
+def compare(design: ShadingPipeline, triangles: int, size: tuple[int, int]) -> tuple[int, int]:
     """Cycles of a teapot's frame by simulation and by the cycle model."""
     scene = scene_for(teapot(triangles), 50, *size)
     frame = FrameSimulator(design).render(scene)

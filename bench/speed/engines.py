@@ -32,7 +32,7 @@ from blysk.bench.accuracy import scene_for
 from blysk.bench.speed.verilator import Verilated, free_stimulus
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of, prepare
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import preset
 from blysk.hdl.emit.processes import run_program
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -223,7 +223,9 @@ def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
     return time.process_time() - start, result
 
 
-def teapot_spans(design: Design, width: int, height: int, least: int = 1) -> tuple[Spans, FrameConstants]:
+def teapot_spans(
+    design: ShadingPipeline, width: int, height: int, least: int = 1
+) -> tuple[Spans, FrameConstants]:
     """Spans of at least ``least`` pixels of a teapot's picture, and frame constants with one light.
 
     The order is random, from a fixed seed: the first spans then have lengths like all spans, so that the

@@ -20,7 +20,7 @@ from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.golden.reference.renderer import Frame, render
+from blysk.golden.reference.renderer import ExactFrame, render
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.workers import local_executor
 from blysk.sim.installation import install_extra
@@ -194,7 +194,7 @@ class _Golden(NamedTuple):
     """Measurements of the golden renderer: timings by model, last frame, peak memory in bytes."""
 
     timings: dict[str, Timing]
-    frame: Frame
+    frame: ExactFrame
     memory: int
 
 

@@ -20,7 +20,7 @@ from blysk.hdl.emit.processes import run_program
 from blysk.hdl.emit.verilog import emit
 from blysk.sim.engines.beats import pack, word_count
 from blysk.sim.engines.compilers import find_compilers
-from blysk.sim.engines.engine import Ports, SimulationError, Stimulus
+from blysk.sim.engines.engine import Drive, Ports, SimulationError
 
 __all__ = ["OPTIONS", "Verilated", "free_stimulus", "verilator_folder"]
 
@@ -159,7 +159,7 @@ def free_stimulus(
     write: np.ndarray | Mapping | None,
     count: int,
     idle_timeout: int,
-) -> Stimulus:
+) -> Drive:
     """A stimulus for `Verilated.run`: beats without a stall on either side.
 
     Parameters
@@ -173,7 +173,7 @@ def free_stimulus(
     idle_timeout : int
         Cycles without an output beat after which the component counts as stuck.
     """
-    return Stimulus(
+    return Drive(
         input=pack(ports.i, beats),
         write=np.zeros((0, 0), dtype=np.uint32) if write is None else pack(ports.write, write),
         constants=np.zeros((0, 0), dtype=np.uint32),
@@ -239,7 +239,7 @@ class Verilated:
         )
         self._run.restype = ctypes.c_int64
 
-    def run(self, stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray]:
+    def run(self, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
         """Run a stimulus, which must have a count and no stalls.
 
         Returns
@@ -256,19 +256,19 @@ class Verilated:
         SimulationError
             If there is no output beat for ``idle_timeout`` cycles.
         """
-        if stimulus.count is None or stimulus.input_stalls.any() or stimulus.output_stalls.any():
+        if drive.count is None or drive.input_stalls.any() or drive.output_stalls.any():
             raise ValueError("a stimulus with a count and without stalls is needed")
         constants, write, beats = (
-            np.ascontiguousarray(words) for words in (stimulus.constants, stimulus.write, stimulus.input)
+            np.ascontiguousarray(words) for words in (drive.constants, drive.write, drive.input)
         )
-        places = stimulus.write_after
+        places = drive.write_after
         after = None if places is None else places.ctypes.data
-        output = np.empty((stimulus.count, word_count(self.ports.o)), dtype=np.uint32)
-        cycles = np.empty(stimulus.count, dtype=np.int64)
+        output = np.empty((drive.count, word_count(self.ports.o)), dtype=np.uint32)
+        cycles = np.empty(drive.count, dtype=np.int64)
         end = self._run(
             *(constants.ctypes.data, write.ctypes.data, after, len(write), beats.ctypes.data, len(beats)),
-            *(output.ctypes.data, cycles.ctypes.data, stimulus.count, stimulus.idle_timeout),
+            *(output.ctypes.data, cycles.ctypes.data, drive.count, drive.idle_timeout),
         )
         if end < 0:
-            raise SimulationError(f"Verilator's model gave nothing for {stimulus.idle_timeout} cycles")
+            raise SimulationError(f"Verilator's model gave nothing for {drive.idle_timeout} cycles")
         return output, cycles

@@ -1,6 +1,6 @@
 """The table of the units: errors, latency, interval and cost of each variant.
 
-``blysk blocks`` prints it, from the records of `blysk.sim.units`. Errors come from the bit-accurate models
+``blysk blocks`` prints it, from the records of `blysk.bench.units`. Errors come from the bit-accurate models
 and float64 mathematics, times from the units or a simulation of them, parts from their netlists.
 """
 
@@ -12,12 +12,12 @@ import numpy as np
 from amaranth.lib.wiring import Component
 
 from blysk.bench.tools.defaults import SAMPLES, SEED
+from blysk.bench.units.record import Record, Sample, Variant
+from blysk.bench.units.registry import RECORDS
 from blysk.hdl.emit.cost import Cost, cost_of
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.workers import local_executor
-from blysk.sim.units.record import Record, Sample, Variant
-from blysk.sim.units.registry import RECORDS
 
 __all__ = [
     "ENTRIES",

@@ -304,14 +304,14 @@ def _clocks(report: Mapping[str, Any], rates: Mapping[str, float]) -> tuple[Cloc
         name = start if start == end else f"{start} to {end}"
         delay = sum(step["delay"] for step in path["path"])
         reached = report["fmax"][edges[0]]["achieved"] if start == end else 1e3 * PERIODS / delay
-        result.append(Clock(name, rates[end], reached, _told(path["path"], delay)))
+        result.append(Clock(name, rates[end], reached, _described(path["path"], delay)))
     missing = set(rates) - {clock.name for clock in result}
     if missing:
         raise ToolError(f"nextpnr reports no path of {', '.join(sorted(missing))}")
     return tuple(sorted(result, key=lambda clock: (" " in clock.name, clock.name)))
 
 
-def _told(path: Sequence[Mapping[str, Any]], delay: float) -> str:
+def _described(path: Sequence[Mapping[str, Any]], delay: float) -> str:
     cells = sum(step["type"] == "logic" for step in path)
     start, end = (signal_name(path[k][side]["cell"], ECP5) for k, side in ((0, "from"), (-1, "to")))
     return f"{start} -> {end}, {delay:.1f} ns, {cells} cells"

@@ -15,7 +15,7 @@ from blysk.bench.tools.boards import Board
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID
 from blysk.golden.gpu import Gpu
 from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
@@ -97,7 +97,7 @@ def gpu_of(
     return Gpu(drawing, buffer), scenes
 
 
-def _design(settings: Settings, scene: Scene, board: Board) -> Design:
+def _design(settings: Settings, scene: Scene, board: Board) -> ShadingPipeline:
     """The shading pipeline of the settings, for the lights and materials of a scene."""
     if scene.local:
         reason = "a board has lights and a viewer at infinity alone"

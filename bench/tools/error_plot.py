@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from blysk.bench.tools.blocks import Entry
-from blysk.sim.units.record import Decisions, Record, Sample
+from blysk.bench.units.record import Decisions, Record, Sample
 
 __all__ = [
     "draw_errors",

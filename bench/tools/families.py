@@ -58,7 +58,7 @@ class Family:
     options : tuple of str
         Options of nextpnr.
     large : tuple of str
-        Further options, for designs of `_MANY` look-up tables or more.
+        Further options, for designs of `_LARGE` look-up tables or more.
     synthesis : str
         Yosys's commands from a flat netlist to mapped cells, a line each.
     look_up_tables : str

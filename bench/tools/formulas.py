@@ -35,10 +35,10 @@ class Formulas:
 
     def _add(self, graph: Dataflow, word: Word) -> None:
         formula = word.formula
-        if word.unit is None:
+        if word.resource is None:
             self._put(self._of, word.name, formula)
             return
-        instance = f"{word.unit.name}_{graph.schedule.placements[word].instance}_"
+        instance = f"{word.resource.name}_{graph.schedule.placements[word].instance}_"
         self._put(self._results, instance, formula or Formula(word.name))
         for k, operand in enumerate(word.given):
             for name in (str(k), "abcd"[k]):

@@ -32,13 +32,13 @@ from blysk.bench.tools.families import ECP5, Family, Parts
 from blysk.bench.tools.parts_by_unit import parts_by_unit, sum_parts
 from blysk.bench.tools.place_and_route import Layout, lay_out, versions_of
 from blysk.bench.tools.tool_runner import TooLarge
-from blysk.golden.pipeline import Design
+from blysk.bench.units.names import UNITS
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.bus import core_of
 from blysk.sim.api.design import built, design
 from blysk.sim.errors import InputError, OptionError
 from blysk.sim.output import write_json
-from blysk.sim.units.names import UNITS
 
 __all__ = [
     "about",
@@ -128,7 +128,7 @@ def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Co
         yield from ((entry.title, entry.variant.unit) for entry in found)
 
 
-def name_of(design: Design, operand: str | None = None) -> str:
+def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
     """Name of a design in tables: core, method, model, lights, and build options that are no defaults."""
     build = design.build
     name = [f"{'pipeline' if build.top == 'shader' else build.top} {design.method}"]

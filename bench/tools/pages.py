@@ -1,8 +1,8 @@
 """Pages of units: function, ports and variants of each, and drawings of structure, timing and errors.
 
-``blysk pages`` writes them, from the records of `blysk.sim.units`. Text comes from the docstrings of the unit
-and its bit-accurate model, figures from the table of the units, drawings from the netlist, from a simulation
-and from the measured errors, and the list of tests from the stimuli of the record.
+``blysk pages`` writes them, from the records of `blysk.bench.units`. Text comes from the docstrings of the
+unit and its bit-accurate model, figures from the table of the units, drawings from the netlist, from a
+simulation and from the measured errors, and the list of tests from the stimuli of the record.
 """
 
 import inspect
@@ -29,11 +29,11 @@ from blysk.bench.tools.netlist import describe_shape
 from blysk.bench.tools.pages_folder import MADE, check_folder
 from blysk.bench.tools.structure import graph_of
 from blysk.bench.tools.timing import draw_timing, waves_of
+from blysk.bench.units.names import ROOMS
+from blysk.bench.units.record import Record, Sample
+from blysk.bench.units.registry import RECORDS
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.sim.output import write_text
-from blysk.sim.units.names import ROOMS
-from blysk.sim.units.record import Record, Sample
-from blysk.sim.units.registry import RECORDS
 
 __all__ = [
     "SAMPLES",
@@ -80,7 +80,7 @@ def _component(unit: str) -> wiring.Component:
 def _model(unit: str) -> type | None:
     """Class of the bit-accurate model, if the unit has one of its own."""
     component = _component(unit)
-    model = type(getattr(component, "parameters", None))
+    model = type(getattr(component, "model", None))
     return model if model.__name__ == type(component).__name__.removesuffix("Unit") else None
 
 
@@ -97,7 +97,7 @@ def _files(unit: str, folder: Path) -> str:
     """Links to the files of a unit."""
     path = "/".join(type(_component(unit)).__module__.split(".")[2:])
     room, _, name = path.rpartition("/")
-    paths = [f"golden/{path}.py", f"hdl/{path}.py", f"sim/units/{path}.py"]
+    paths = [f"golden/{path}.py", f"hdl/{path}.py", f"bench/units/{path}.py"]
     paths += [f"tests/{layer}/{room}/test_{name}.py".replace("//", "/") for layer in ("golden", "hdl")]
     return " · ".join(_link(f"`{path}`", path, folder) for path in paths if (PROJECT / path).exists())
 

@@ -69,7 +69,7 @@ _SLACK = re.compile(r"ripped up due to negative slack WNS=(-?[\d.]+)ns")
 _ROUNDS = 10
 """Rounds of the router for paths that are too slow, in which the slowest must become faster."""
 
-_MANY = 1000
+_LARGE = 1000
 """Least number of look-up tables of a large design."""
 
 
@@ -413,7 +413,7 @@ def _run(
                 *family.options,
                 "--freq",
                 str(family.target),
-                *(family.large if kinds["LUT4"] >= _MANY else ()),
+                *(family.large if kinds["LUT4"] >= _LARGE else ()),
             )
 
             def route(seed: int) -> tuple[int, tuple[Parts, Place]]:

@@ -14,7 +14,7 @@ from blysk.golden.methods.interpolator import Operand
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.middle_normal import MiddleNormal
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED, preset
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Candidate:
     Parameters
     ----------
     method, model, lights, operand
-        See `Design`.
+        See `ShadingPipeline`.
     degree : int, optional
         Degree of the method's polynomial in the angle: for the middle normal (``quadratic`` and its forms: 2,
         a plain minimax fit, or 3), or for the bisection's factor (1 or 2).
@@ -81,8 +81,8 @@ class Candidate:
         _ = self.design
 
     @cached_property
-    def design(self) -> Design:
-        """Its `Design`: the bit-accurate model of the pipeline."""
+    def design(self) -> ShadingPipeline:
+        """Its `ShadingPipeline`: the bit-accurate model of the pipeline."""
         usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
         interpolator, changes = usual.interpolator, {}
         if usual.takes_vectors and self.model in MODELS:

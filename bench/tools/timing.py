@@ -11,10 +11,10 @@ from amaranth.sim import Simulator
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from blysk.bench.units.record import Case, UnitRun
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import Ports
 from blysk.sim.engines.simulate import stimulus_of
-from blysk.sim.units.record import Case, UnitRun
 
 __all__ = ["Waves", "draw_timing", "waves_of"]
 

@@ -31,7 +31,7 @@ from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
@@ -173,7 +173,7 @@ MESHES = {
 """Meshes of the page, by name."""
 
 
-def design_of(method: str, model: str) -> Design:
+def design_of(method: str, model: str) -> ShadingPipeline:
     """The pipeline of a module: one light, and a highlight gate if the method can have one."""
     return preset(method, model, gate=METHODS[method].serves_gate)
 
@@ -267,7 +267,7 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
     return zlib.compress(b"".join(parts), 9)
 
 
-def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raster, Spans]:
+def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tuple[Raster, Spans]:
     """Spans of a view, before and after the rounding of their normals, for a light that moves.
 
     They are cut for the light of `START`. Spans of a method that takes vectors have the ends of the
@@ -279,7 +279,7 @@ def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raste
         As for `streams_of`.
     exponent : int
         One of `BANDS`.
-    design : Design
+    design : ShadingPipeline
         The pipeline.
     """
     scene = scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent})
@@ -291,7 +291,7 @@ def spans_of(mesh: str, view: int, exponent: int, design: Design) -> tuple[Raste
     return cut, replace(quantise_spans(cut, scene.mesh.material), normal_left=left, normal_right=right)
 
 
-def with_vectors(spans: Spans, scene: Scene, design: Design) -> Spans:
+def with_vectors(spans: Spans, scene: Scene, design: ShadingPipeline) -> Spans:
     """Spans of `spans_of` for the light of a scene: of a method that takes vectors with these.
 
     The page's script computes the same, a product and a sum at a time.
@@ -385,7 +385,7 @@ def module_of(method: str, model: str) -> dict[str, Any]:
     }
 
 
-def lobe_of(design: Design) -> dict[str, Any] | None:
+def lobe_of(design: ShadingPipeline) -> dict[str, Any] | None:
     """Values for frame constants with a table, which the page makes itself; ``None`` without tables.
 
     Returns
@@ -400,7 +400,7 @@ def lobe_of(design: Design) -> dict[str, Any] | None:
         return None
     lobe = design.specular
     assert isinstance(lobe, Lobe)
-    name = lobe.model.PARAMETER or "exponent"
+    name = lobe.reflection.PARAMETER or "exponent"
     parameters = ROUGHNESSES if name == "roughness" else range(1, MAX_EXPONENT + 1)
     scene = scene_of(START)
     (material,) = scene.materials
@@ -428,7 +428,7 @@ def model_table(model: str) -> dict[str, Any]:
     """
     exponents = range(1, MAX_EXPONENT + 1)
     unit = (MODELS | LOBES | MIRROR_LOBES)[model]
-    reflection = unit.model
+    reflection = unit.reflection
     if isinstance(reflection, PowerModel):
         return {"kind": "power", "mirror": reflection.MIRROR}
     if reflection is GGX:

@@ -14,13 +14,13 @@ from amaranth.sim import Simulator
 from PIL import Image
 
 import blysk
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.render import Renderer
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 
 WIDTH, HEIGHT = 32, 24
 # Spans of at most 10 degrees: the core's header has that for exponent 50.
-FRAME = Frame.centred(WIDTH, HEIGHT, limit=Frame.limit_of(10)).codes
+FRAME = FrameSettings.centred(WIDTH, HEIGHT, limit=FrameSettings.limit_of(10)).codes
 # Ambient 0.05, diffuse 0.4, specular 0.55, exponent 50, white light along the viewer.
 WRITES = {0: 50, 1: 816, 2: 816, 3: 816} | dict(
     enumerate([0, 0, 131071, 0, 0, 131071, 6528, 6528, 6528, 8976, 8976, 8976], 16)
@@ -49,7 +49,7 @@ class Triangle(wiring.Component):
         """The core, writes from a table, the triangle, and the memory; the depths are in the core."""
         m = Module()
         renderer = Renderer(blysk.design(model="cosquad"))
-        m.submodules.core = core = RenderUnit(renderer, size=(WIDTH, HEIGHT))
+        m.submodules.core = core = RendererUnit(renderer, size=(WIDTH, HEIGHT))
         m.submodules.picture = self.picture
         n, quiet = Signal(range(32)), Signal(10)
         addresses, data = (Array(map(Const, words)) for words in (WRITES, WRITES.values()))

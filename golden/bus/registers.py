@@ -21,7 +21,7 @@ from blysk.golden.geometry.triangles import LIMIT_BITS
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.scene import BACK_FACES
 
 __all__ = [
@@ -156,12 +156,12 @@ _OF_A_LIGHT = {
 }
 
 
-def constant_registers(design: Design, axes: Sequence[str] = ()) -> list[Register]:
+def constant_registers(design: ShadingPipeline, axes: Sequence[str] = ()) -> list[Register]:
     """Registers of the frame constants: one for each address of the write port, from `CONSTANTS` on.
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         The shading pipeline.
     axes : sequence of str
         Axes that each further light has, see `Renderer.axes`.

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from blysk.golden.frames.frame import Frame
+from blysk.golden.frames.frame import Picture
 from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.lighting import distant_cosine, halfway_vector
 from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
@@ -117,7 +117,7 @@ class Comparison:
     seconds: float
 
 
-def method_in_float64(scene: Scene, design: Design, raster: Raster) -> np.ndarray:
+def method_in_float64(scene: Scene, design: ShadingPipeline, raster: Raster) -> np.ndarray:
     """A frame by the method and the model of a pipeline, in exact arithmetic.
 
     Parameters
@@ -140,7 +140,7 @@ class _Shading:
     """Shades a frame in exact arithmetic, see `ExactShading`."""
 
     scene: Scene
-    design: Design
+    design: ShadingPipeline
     raster: Raster
 
     def by_normals(self) -> np.ndarray:
@@ -164,13 +164,13 @@ class _Shading:
         return shade_operands(scene, raster, cosine, 1 - one_minus_cosine, _model_of(self.design), factor)
 
 
-def _model_of(design: Design) -> ReflectionModel:
+def _model_of(design: ShadingPipeline) -> ReflectionModel:
     if design.specular is None:
         raise ValueError("a design without specular light has no reflection model to compare with")
-    return design.specular.model
+    return design.specular.reflection
 
 
-def target_of(design: Design) -> ReflectionModel:
+def target_of(design: ShadingPipeline) -> ReflectionModel:
     """Model of the exact frame of the total error: of a lobe its own, else Blinn's power.
 
     The other models approximate that power; a lobe is a table of its own model.
@@ -178,7 +178,7 @@ def target_of(design: Design) -> ReflectionModel:
     return _model_of(design) if design.loads_tables else BLINN
 
 
-def error_bound(scene: Scene, design: Design, cut: Raster | None = None) -> float | None:
+def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None) -> float | None:
     """Bound of the error against exact normals of every pixel with the same model, in LSB.
 
     Let c be the largest channel of all terms together: over the materials the largest sum over the lights of
@@ -215,7 +215,7 @@ class _Bounds:
     """Bounds the error of a frame with specular light, see `ErrorBounds`."""
 
     scene: Scene
-    design: Design
+    design: ShadingPipeline
     cut: Raster | None
 
     def by_vectors(self) -> float | None:
@@ -227,7 +227,7 @@ class _Bounds:
         return _tolerance_bound(self.scene, self.design)
 
 
-def _tolerance_bound(scene: Scene, design: Design) -> float | None:
+def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
     """Bound from the tolerances by which spans are cut, as `error_bound` states it."""
     model = _model_of(design)
     made = design.for_materials(scene.materials)
@@ -307,14 +307,14 @@ def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndar
 _CHUNK = 1 << 15
 
 
-def compare(scene: Scene, design: Design, frame: Frame) -> Comparison:
+def compare(scene: Scene, design: ShadingPipeline, frame: Picture) -> Comparison:
     """Errors of a frame against three frames of the golden renderer; NaN if the frame shows no surface.
 
     Parameters
     ----------
     scene, design
         What was drawn, and by which pipeline; after a specialisation the full scene and pipeline.
-    frame : Frame
+    frame : Picture
         The frame of that pipeline.
     """
     bound = error_bound(scene, design, frame.cut_raster)
@@ -346,7 +346,7 @@ def compare_triangles(
     return _compare(scene, design, image, rasterise(scene), None, bound)
 
 
-def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison:
+def compare_image(scene: Scene, design: ShadingPipeline, image: np.ndarray) -> Comparison:
     """Errors of a picture whose spans are not known, so that there is no arithmetic error.
 
     Parameters
@@ -361,7 +361,7 @@ def compare_image(scene: Scene, design: Design, image: np.ndarray) -> Comparison
 
 def _compare(
     scene: Scene,
-    design: Design,
+    design: ShadingPipeline,
     image: np.ndarray,
     raster: Raster,
     cut_raster: Raster | None,

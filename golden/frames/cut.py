@@ -9,7 +9,7 @@ from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks, lines_along, weights_along
 from blysk.golden.frames.pieces import Pieces
 from blysk.golden.methods.interpolator import Interpolator
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
@@ -17,7 +17,7 @@ from blysk.golden.reference.scene import Scene
 __all__ = ["cut_by_angle", "cut_by_ends", "cut_by_error", "cut_by_length", "cut_spans", "split_pairs"]
 
 
-def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int]:
+def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Raster, int]:
     """Spans cut as the method of a pipeline needs them, and how many of the given spans were cut.
 
     The normal at a cut is the true normal of the surface, ``normalise((1-t) m_l N_l + t m_r N_r)`` along the
@@ -30,7 +30,7 @@ def cut_spans(scene: Scene, raster: Raster, design: Design) -> tuple[Raster, int
         Materials, lights and viewer.
     raster : Raster
         Spans from `rasterise`.
-    design : Design
+    design : ShadingPipeline
         The pipeline.
 
     Returns
@@ -49,7 +49,7 @@ class _Cutter:
 
     scene: Scene
     raster: Raster
-    design: Design
+    design: ShadingPipeline
 
     @property
     def _limits(self) -> HighlightLimits:

@@ -6,15 +6,15 @@ from time import perf_counter
 import numpy as np
 
 from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["Frame", "frame_buffer", "model_frame"]
+__all__ = ["Picture", "frame_buffer", "model_frame"]
 
 
 @dataclass(frozen=True)
-class Frame:
+class Picture:
     """A scene's picture, made of the pixels of a pipeline.
 
     Parameters
@@ -78,14 +78,14 @@ def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray
     return image
 
 
-def model_frame(scene: Scene, design: Design) -> Frame:
+def model_frame(scene: Scene, design: ShadingPipeline) -> Picture:
     """Frame by a pipeline's bit-accurate model: bit for bit the image of the simulated pipeline.
 
     Parameters
     ----------
     scene : Scene
         What to draw: at most as many lights as the design has, and as many materials.
-    design : Design
+    design : ShadingPipeline
         The pipeline.
 
     Raises
@@ -97,7 +97,7 @@ def model_frame(scene: Scene, design: Design) -> Frame:
     prepared = prepare(scene, design)
     rastered = perf_counter()
     pixels = design.compute(prepared.spans, constants_of(scene, design))
-    return Frame(
+    return Picture(
         image=frame_buffer(scene, prepared.cut_raster, pixels.color),
         prepared=prepared,
         out_of_range_spans=pixels.out_of_range_spans,

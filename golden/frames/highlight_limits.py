@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.lobes import curve_lines
 from blysk.golden.reference.reflection import ReflectionModel
@@ -20,14 +20,14 @@ __all__ = ["HighlightLimits"]
 class _Curve:
     """Highlight limits from the curve S(u) of a lobe, for one parameter; u = 1 - N·H."""
 
-    model: ReflectionModel
+    reflection: ReflectionModel
     parameter: float | None
     scale: int = 0
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Arguments u in ascending order; the steepest ``|dS/du|`` and the largest S from each u on."""
-        u, value, slope = curve_lines(self.model, self.parameter)
+        u, value, slope = curve_lines(self.reflection, self.parameter)
         u, slope = np.ldexp(u, self.scale), np.ldexp(slope, -self.scale)
         return u, *(np.maximum.accumulate(of[::-1])[::-1] for of in (slope, value))
 
@@ -43,7 +43,7 @@ class _Curve:
     @cached_property
     def turn(self) -> float:
         """As of `HighlightLimits`, for one material."""
-        u, _, slope = curve_lines(self.model, self.parameter)
+        u, _, slope = curve_lines(self.reflection, self.parameter)
         # Each slope counts up to the next argument.
         steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slope)).max()
         found: float = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
@@ -77,7 +77,7 @@ class HighlightLimits:
     STEEPEST: ClassVar[float] = 0.77
 
     @classmethod
-    def of(cls, materials: Sequence[Material], design: Design | None = None) -> "HighlightLimits":
+    def of(cls, materials: Sequence[Material], design: ShadingPipeline | None = None) -> "HighlightLimits":
         """Limits of materials with the specular unit of a design; without a design by their exponents."""
         if design is None or design.specular is None:
             exponents = [float(material.exponent) for material in materials]
@@ -90,7 +90,7 @@ class HighlightLimits:
             for index, material in enumerate(materials):
                 parameter = design.highlight_parameter(material)
                 if parameter not in made:
-                    made[parameter] = _Curve(lobe.model, parameter, lobe.scale)
+                    made[parameter] = _Curve(lobe.reflection, parameter, lobe.scale)
                 curves[index] = made[parameter]
         return cls(np.asarray(exponents, dtype=np.float64), tuple(curves))
 

@@ -14,7 +14,7 @@ from blysk.golden.frames.missed import missed_spans
 from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.reference.faces import face_normals
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.raster import Raster, rasterise
@@ -58,7 +58,7 @@ class PreparedFrame:
     missed_spans: int = 0
 
 
-def prepare(scene: Scene, design: Design) -> PreparedFrame:
+def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
     """Rasterise a scene, and cut, order and quantise its spans for a pipeline.
 
     Raises
@@ -82,7 +82,7 @@ def prepare(scene: Scene, design: Design) -> PreparedFrame:
     return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), missed)
 
 
-def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
+def spans_for(scene: Scene, cut: Raster, design: ShadingPipeline) -> Spans:
     """The input beats of a pipeline for spans that are cut for it, with what the method takes.
 
     Parameters
@@ -91,7 +91,7 @@ def spans_for(scene: Scene, cut: Raster, design: Design) -> Spans:
         Materials, lights and viewer.
     cut : Raster
         Spans from `cut_spans`.
-    design : Design
+    design : ShadingPipeline
         The pipeline.
     """
     return design.interpolator.filled(_Filler(scene, cut, design))
@@ -103,7 +103,7 @@ class _Filler:
 
     scene: Scene
     cut: Raster
-    design: Design
+    design: ShadingPipeline
 
     def with_normals(self) -> Spans:
         return quantise_spans(self.cut, self.scene.mesh.material)
@@ -138,7 +138,7 @@ def _true_ends(scene: Scene, cut: Raster) -> tuple[np.ndarray, np.ndarray]:
     return left, right
 
 
-def span_vectors(scene: Scene, cut: Raster, design: Design) -> SpanVectors:
+def span_vectors(scene: Scene, cut: Raster, design: ShadingPipeline) -> SpanVectors:
     """Vectors ``N/W`` of spans in the frames of the lights, quantised, for a method that takes them.
 
     Parameters
@@ -147,7 +147,7 @@ def span_vectors(scene: Scene, cut: Raster, design: Design) -> SpanVectors:
         Lights and viewer.
     cut : Raster
         Spans from `cut_spans`.
-    design : Design
+    design : ShadingPipeline
         The pipeline.
     """
     axes = vector_axes(scene, design)
@@ -155,7 +155,7 @@ def span_vectors(scene: Scene, cut: Raster, design: Design) -> SpanVectors:
     return SpanVectors.quantise(left, right, cut.length)
 
 
-def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
+def constants_of(scene: Scene, design: ShadingPipeline) -> list[FrameConstants]:
     """Frame constants of each material of a scene, for a pipeline.
 
     Raises
@@ -175,7 +175,7 @@ def constants_of(scene: Scene, design: Design) -> list[FrameConstants]:
 
 
 def with_tables(
-    constants: Sequence[FrameConstants], materials: Sequence[Material], design: Design
+    constants: Sequence[FrameConstants], materials: Sequence[Material], design: ShadingPipeline
 ) -> list[FrameConstants]:
     """Frame constants with the tables of the materials' lobes; equal ones share a bank.
 
@@ -185,7 +185,7 @@ def with_tables(
         Constants of each material.
     materials : sequence of Material
         The materials, in the same order.
-    design : Design
+    design : ShadingPipeline
         Pipeline whose specular unit is a `Lobe`.
 
     Raises
@@ -195,19 +195,19 @@ def with_tables(
         build time.
     """
     lobe = design.lobe
-    parameters = [material.parameter(lobe.model) for material in materials]
+    parameters = [material.parameter(lobe.reflection) for material in materials]
     banks = list(lobe.fixed or dict.fromkeys(parameters))
     for parameter in parameters:
         if parameter not in banks:
             fixed = ", ".join(f"{value:g}" for value in banks)
-            raise ValueError(f"the {lobe.model.PARAMETER} is fixed at {fixed}, not {parameter:g}")
+            raise ValueError(f"the {lobe.reflection.PARAMETER} is fixed at {fixed}, not {parameter:g}")
     if len(banks) > lobe.banks:
         most = f"build it with more banks, up to {lobe.MAX_BANKS}"
         if lobe.banks == lobe.MAX_BANKS:
             most = "take a model without a table, such as exp"
         raise ValueError(
             f"the materials have {len(banks)} lobes, the pipeline has banks for {lobe.banks}; give materials "
-            f"an equal {lobe.model.PARAMETER}, or {most}"
+            f"an equal {lobe.reflection.PARAMETER}, or {most}"
         )
     tables = [lobe.table(parameter) for parameter in banks]
     thresholds = [

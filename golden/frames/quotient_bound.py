@@ -14,7 +14,7 @@ from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.geometry.vertex_sort import SortedTriangles
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.methods.quotient_interpolator import QuotientErrors
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.lighting import distant_cosine
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
@@ -23,7 +23,7 @@ from blysk.golden.render import Renderer
 __all__ = ["quotient_bound", "quotient_triangle_bound"]
 
 
-def quotient_bound(scene: Scene, design: Design, cut: Raster) -> float:
+def quotient_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> float:
     """Bound of the error against exact normals of every pixel with the same model, in LSB.
 
     The rounding of a pixel, 1/2, and of its colour operands, 1/128 each; and, for the brightest material, the
@@ -109,7 +109,7 @@ def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
 
 
 def _bound(
-    scene: Scene, design: Design, errors: QuotientErrors, further: QuotientErrors | None = None
+    scene: Scene, design: ShadingPipeline, errors: QuotientErrors, further: QuotientErrors | None = None
 ) -> float:
     """From the bounds of directions, of the first light and of further ones, to that of a pixel."""
     lobe = design.lobe
@@ -118,7 +118,7 @@ def _bound(
     for material in scene.materials:
         parameter = design.highlight_parameter(material)
         table = lobe.line_error(parameter) + Lobe.ERROR
-        highlights = [bounds.highlight(lobe.model, parameter) + table for bounds in kinds]
+        highlights = [bounds.highlight(lobe.reflection, parameter) + table for bounds in kinds]
         total = np.zeros(3)
         for index, light in enumerate(scene.lights):
             kind = min(index, len(kinds) - 1)

@@ -11,7 +11,7 @@ from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.vector_axes import further_axes, triangle_axes
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles, scene_triangles
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.reference.light_frame import light_frames
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
@@ -42,7 +42,7 @@ class TriangleFrame:
     owner : int64 array, shape (height, width)
         Face of the mesh that each pixel shows, -1 for the background.
     counts : mapping of str to int
-        Counters of `RenderUnit`.
+        Counters of `RendererUnit`.
     """
 
     image: np.ndarray
@@ -73,7 +73,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     angle = SPAN_ANGLE if angle is None else angle
     design = renderer.design
     axes = triangle_axes(scene, design) if design.takes_vectors and design.lights else None
-    return scene_triangles(scene, renderer.geometry.grid, Frame.limit_of(angle), axes).by_material()
+    return scene_triangles(scene, renderer.geometry.grid, FrameSettings.limit_of(angle), axes).by_material()
 
 
 def triangle_constants(scene: Scene, renderer: Renderer) -> list[FrameConstants]:

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.light_frame import LightFrame, light_frames
 from blysk.golden.reference.scene import Scene
 
 __all__ = ["further_axes", "triangle_axes", "vector_axes"]
 
 
-def vector_axes(scene: Scene, design: Design) -> np.ndarray:
+def vector_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
     """Axes in the scene's frame of the components that a method takes of ``N/W``, by rows.
 
     Without highlights z is along each light.
@@ -18,7 +18,7 @@ def vector_axes(scene: Scene, design: Design) -> np.ndarray:
     ----------
     scene : Scene
         Lights and viewer.
-    design : Design
+    design : ShadingPipeline
         The pipeline, of a method that takes vectors.
 
     Returns
@@ -38,7 +38,7 @@ def vector_axes(scene: Scene, design: Design) -> np.ndarray:
     return np.stack([rows[name] for name in model.components])
 
 
-def triangle_axes(scene: Scene, design: Design) -> np.ndarray:
+def triangle_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
     """Axes in the scene's frame of the normals that triangles have, for a method that takes vectors, by rows.
 
     x, y and z of the first light's frame; without highlights z is along the light.
@@ -55,7 +55,7 @@ def triangle_axes(scene: Scene, design: Design) -> np.ndarray:
     return _axes(light_frames(scene, 1)[0], design.vector_spans.highlights)
 
 
-def further_axes(scene: Scene, design: Design) -> np.ndarray:
+def further_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
     """Axes of further lights in the frame of the first, as `FrameConstants` has them, in float64.
 
     Parameters

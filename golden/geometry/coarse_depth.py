@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.geometry.span_attributes import SPAN_DEPTH
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.golden.number.spans import pixels_of
@@ -21,7 +21,7 @@ BLOCKS = (4, 8, 16)
 class CoarseDepth:
     """Bounds of the depths in blocks of pixels. A span behind the bounds of all its blocks is hidden.
 
-    A block has a bound b, a candidate c and a mask. No depth that `DepthTest` has stored in the block is
+    A block has a bound b, a candidate c and a mask. No depth that `DepthTester` has stored in the block is
     deeper than b. Depth is linear, so a span's pixels in the block lie between ``lo`` and ``hi``.
 
     - If ``lo > b``, they are hidden.
@@ -36,7 +36,7 @@ class CoarseDepth:
     with the tag of another picture counts as cleared. With each picture `swept` words are cleared, the words
     cleared longest ago first. So every word is cleared before its tag comes up again.
 
-    Spans go on to shading and to `DepthTest` in the order in which they came. So the depths under a bound are
+    Spans go on to shading and to `DepthTester` in the order in which they came. So the depths under a bound are
     stored before the depths of a later span are tested. Pictures with and without this test are equal.
 
     Parameters
@@ -134,7 +134,7 @@ class CoarseDepth:
         start = (block[span] + k) * self.block
         ends = np.stack([np.maximum(x[span], start), np.minimum((x + length)[span], start + self.block) - 1])
         code = (depth[span] + (ends - x[span]) * step[span]) >> SPAN_DEPTH.fraction_bits
-        upper = np.clip(code, 0, DepthTest.FARTHEST) >> (DEPTH.width - self.depth_bits)
+        upper = np.clip(code, 0, DepthTester.FARTHEST) >> (DEPTH.width - self.depth_bits)
         end = np.where(ends[1] == self.width - 1, self.block - 1, ends[1] - start)
         mask = (np.int64(2) << end) - (np.int64(1) << (ends[0] - start))
         place = (number * self.blocks + y * self.blocks_per_line + block)[span] + k

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.geometry.edge_setup import X_BITS, Edges, wrap
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.geometry.vertex_sort import SortedTriangles
 
 __all__ = ["EdgeWalk", "Rows"]
@@ -68,7 +68,7 @@ class EdgeWalk:
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
 
-    def compute(self, edges: Edges, triangles: SortedTriangles, frame: Frame) -> Rows:
+    def compute(self, edges: Edges, triangles: SortedTriangles, frame: FrameSettings) -> Rows:
         """Bit-accurate scanlines.
 
         Parameters
@@ -77,7 +77,7 @@ class EdgeWalk:
             From `EdgeSetup`.
         triangles : SortedTriangles
             The triangles of the edges.
-        frame : Frame
+        frame : FrameSettings
             The picture. Scanlines below it are left out.
 
         Returns

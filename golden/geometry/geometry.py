@@ -15,7 +15,7 @@ from blysk.golden.geometry.span_adapter import LineAdapter, LineSpans
 from blysk.golden.geometry.span_attributes import Pieces, SpanAttributes, WholeSpans
 from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
 from blysk.golden.geometry.span_halver import SpanHalver
-from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, Frame, Grid, Triangles
+from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, FrameSettings, Grid, Triangles
 from blysk.golden.geometry.vector_adapter import VectorAdapter, VectorSpans
 from blysk.golden.geometry.vertex_sort import SortedTriangles, VertexSort
 from blysk.golden.number.fixed import Fixed
@@ -70,7 +70,7 @@ class Geometry:
         return "true lines" if self.lines else vectors if self.vectors else "unit normals"
 
     def rows(
-        self, triangles: Triangles, frame: Frame
+        self, triangles: Triangles, frame: FrameSettings
     ) -> tuple[SortedTriangles, ClippedRows, np.ndarray, dict[str, int]]:
         """Coverage alone: sorted triangles, their clipped scanlines, the triangle of each, counts so far."""
         drawn, counts = VertexSort(self.grid).compute(triangles, frame)
@@ -79,7 +79,7 @@ class Geometry:
         clipped = SpanClip().compute(rows, frame)
         return drawn, clipped, rows.triangle, counts
 
-    def planes(self, drawn: SortedTriangles, frame: Frame) -> tuple[Planes, int]:
+    def planes(self, drawn: SortedTriangles, frame: FrameSettings) -> tuple[Planes, int]:
         """Planes of sorted triangles, and the number of slivers among them."""
         scales = PlaneSetup(self.grid).compute(drawn, EdgeSetup(self.grid).compute(drawn))
         first, middle, last = (Fixed(ATTRIBUTE, drawn.triangles.attributes[:, k]) for k in range(3))
@@ -89,7 +89,9 @@ class Geometry:
         )
         return planes, int(scales.sliver.sum())
 
-    def pieces(self, triangles: Triangles, frame: Frame) -> tuple[SortedTriangles, Pieces, dict[str, int]]:
+    def pieces(
+        self, triangles: Triangles, frame: FrameSettings
+    ) -> tuple[SortedTriangles, Pieces, dict[str, int]]:
         """Sorted triangles, the pieces of their spans with N/W at both ends, and the counts so far."""
         drawn, rows, _, counts = self.rows(triangles, frame)
         planes, sliver = self.planes(drawn, frame)
@@ -107,7 +109,7 @@ class Geometry:
         return drawn, pieces, counts
 
     def compute(
-        self, triangles: Triangles, frame: Frame
+        self, triangles: Triangles, frame: FrameSettings
     ) -> tuple[TrueSpans | LineSpans | VectorSpans, dict[str, int]]:
         """Bit-accurate spans, and the counters.
 
@@ -115,7 +117,7 @@ class Geometry:
         ----------
         triangles : Triangles
             In the order of drawing.
-        frame : Frame
+        frame : FrameSettings
             The picture, the treatment of back faces, and the largest chord of a span.
 
         Returns

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.geometry.gradient_setup import Gradients
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 
 __all__ = ["PlaneAssembler", "Planes"]
 
@@ -64,7 +64,7 @@ class PlaneAssembler:
 
     LARGEST = 12
 
-    def compute(self, gradients: Gradients, least: np.ndarray, frame: Frame) -> Planes:
+    def compute(self, gradients: Gradients, least: np.ndarray, frame: FrameSettings) -> Planes:
         """Bit-accurate planes.
 
         Parameters
@@ -73,8 +73,8 @@ class PlaneAssembler:
             From `GradientSetup`.
         least : int64 array, shape (T,)
             From `AttributeSerialiser`, in 2^-11.
-        frame : Frame
-            Frame whose ``limit`` counts.
+        frame : FrameSettings
+            FrameSettings whose ``limit`` counts.
         """
         if not self.cuts:
             return Planes(gradients, np.full(len(least), self.LARGEST))

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Frame, Grid, Triangles
+from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, FrameSettings, Grid, Triangles
 from blysk.golden.reference.faces import planes_of, seen_from_behind
 from blysk.golden.reference.scene import Scene
 
@@ -26,7 +26,7 @@ class SceneTriangles:
     ----------
     triangles : Triangles
         In the order of the mesh. The pieces of a clipped triangle follow each other.
-    frame : Frame
+    frame : FrameSettings
         The picture.
     source : int64 array, shape (T,)
         Index of the mesh face of each triangle or piece.
@@ -41,7 +41,7 @@ class SceneTriangles:
     """
 
     triangles: Triangles
-    frame: Frame
+    frame: FrameSettings
     source: np.ndarray
     clipped: int
     outside: int
@@ -54,7 +54,7 @@ class SceneTriangles:
 
 
 def scene_triangles(
-    scene: Scene, grid: Grid = GRID, limit: int = Frame.limit, axes: np.ndarray | None = None
+    scene: Scene, grid: Grid = GRID, limit: int = FrameSettings.limit, axes: np.ndarray | None = None
 ) -> SceneTriangles:
     """Transform a scene's triangles, clip and round them.
 
@@ -71,7 +71,7 @@ def scene_triangles(
     grid : Grid
         Fraction bits of the coordinates.
     limit : int
-        `Frame.limit`.
+        `FrameSettings.limit`.
     axes : float64 array, shape (3, 3), optional
         Unit vectors x, y and z of the frame of the normals, see `vector_axes`. ``None``: the scene's frame.
 
@@ -84,7 +84,7 @@ def scene_triangles(
     ValueError
         If the picture is too large, or the limit out of range.
     """
-    frame = Frame.centred(scene.width, scene.height, back_faces=scene.back_faces, limit=limit)
+    frame = FrameSettings.centred(scene.width, scene.height, back_faces=scene.back_faces, limit=limit)
     mesh = scene.mesh
     homogeneous = scene.camera.homogeneous(mesh.vertices, scene.width, scene.height)
     # The grid's origin is in the middle of the picture.

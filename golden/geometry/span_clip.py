@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.geometry.edge_walk import Rows
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 
 __all__ = ["ClippedRows", "SpanClip"]
 
@@ -57,14 +57,14 @@ class SpanClip:
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
 
-    def compute(self, rows: Rows, frame: Frame) -> ClippedRows:
+    def compute(self, rows: Rows, frame: FrameSettings) -> ClippedRows:
         """Bit-accurate scanlines in the picture.
 
         Parameters
         ----------
         rows : Rows
             From `EdgeWalk`.
-        frame : Frame
+        frame : FrameSettings
             The picture.
         """
         begin, end = np.maximum(rows.begin, frame.left), np.minimum(rows.end, frame.right)

@@ -16,7 +16,7 @@ __all__ = [
     "LIMIT_BITS",
     "MATERIAL_BITS",
     "PIXEL_BITS",
-    "Frame",
+    "FrameSettings",
     "Grid",
     "Triangles",
 ]
@@ -93,7 +93,7 @@ GRID = Grid()
 
 
 @dataclass(frozen=True)
-class Frame:
+class FrameSettings:
     """Settings that stay constant while the triangles of a frame pass.
 
     Parameters
@@ -134,7 +134,7 @@ class Frame:
             raise ValueError(f"a frame's limit must be 0 to {(1 << LIMIT_BITS) - 1}, not {self.limit}")
 
     @classmethod
-    def centred(cls, width: int, height: int, **options: Any) -> "Frame":
+    def centred(cls, width: int, height: int, **options: Any) -> "FrameSettings":
         """Frame with the picture in the middle of the grid. The guard band is then equal on all sides.
 
         Parameters

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blysk.golden.geometry.triangles import GRID, Frame, Grid, Triangles
+from blysk.golden.geometry.triangles import GRID, FrameSettings, Grid, Triangles
 
 __all__ = ["SortedTriangles", "VertexSort"]
 
@@ -73,14 +73,14 @@ class VertexSort:
         key = (triangles.y << (self.grid.bits + 1)) + triangles.x
         return np.argsort(key, axis=1, kind="stable")
 
-    def compute(self, triangles: Triangles, frame: Frame) -> tuple[SortedTriangles, dict[str, int]]:
+    def compute(self, triangles: Triangles, frame: FrameSettings) -> tuple[SortedTriangles, dict[str, int]]:
         """Triangles to draw, and the counts of the others.
 
         Parameters
         ----------
         triangles : Triangles
             Corners in the grid's range.
-        frame : Frame
+        frame : FrameSettings
             The picture, and the treatment of back faces.
 
         Returns

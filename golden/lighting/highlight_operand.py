@@ -43,7 +43,7 @@ class HighlightOperand:
         raise NotImplementedError
 
     @property
-    def model(self) -> ReflectionModel:
+    def reflection(self) -> ReflectionModel:
         """The reflection model."""
         raise NotImplementedError
 

@@ -86,7 +86,7 @@ class Lobe(HighlightOperand):
 
     Parameters
     ----------
-    model : ReflectionModel
+    reflection : ReflectionModel
         Model of N·H for which `table` makes tables. The hardware does not depend on it.
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
@@ -114,7 +114,7 @@ class Lobe(HighlightOperand):
     Source: docs/theory/units.md#lobe; [PICA200] has tables of a cosine in equal steps, with differences.
     """
 
-    model: ReflectionModel = BLINN
+    reflection: ReflectionModel = BLINN
     operand: Literal["cosine", "one_minus_cosine"] = "cosine"
     octaves: int = 20
     steps: int = 16
@@ -136,9 +136,9 @@ class Lobe(HighlightOperand):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.model.MIRROR and not self.SERVES_MIRROR:
+        if self.reflection.MIRROR and not self.SERVES_MIRROR:
             raise ValueError(
-                f"a table holds a lobe of N·H, and {self.model.name} is one of R·V; take phong_coplanar"
+                f"a table holds a lobe of N·H, and {self.reflection.name} is one of R·V; take phong_coplanar"
             )
         if self.steps not in (2**bits for bits in range(1, 9)):
             raise ValueError(f"steps must be a power of two from 2 to 256, not {self.steps}")
@@ -160,7 +160,7 @@ class Lobe(HighlightOperand):
             if len(self.fixed) != self.banks:
                 raise ValueError(f"{len(self.fixed)} tables are fixed, of {self.banks} banks")
             for parameter in self.fixed:
-                self.model.reflect(1.0, parameter)
+                self.reflection.reflect(1.0, parameter)
 
     @property
     def has_table(self) -> bool:
@@ -185,7 +185,7 @@ class Lobe(HighlightOperand):
     @property
     def name(self) -> str:
         """Name of the reflection model."""
-        return self.model.name
+        return self.reflection.name
 
     @property
     def argument_format(self) -> Format:
@@ -255,9 +255,9 @@ class Lobe(HighlightOperand):
         ValueError
             If the parameter of the model is missing or out of range.
         """
-        if parameter is None and self.model.PARAMETER is not None:
-            raise ValueError(f"a table of {self.name} needs its {self.model.PARAMETER}")
-        value, middle = (self.model.reflect(cosine, parameter) for cosine in self.cosines)
+        if parameter is None and self.reflection.PARAMETER is not None:
+            raise ValueError(f"a table of {self.name} needs its {self.reflection.PARAMETER}")
+        value, middle = (self.reflection.reflect(cosine, parameter) for cosine in self.cosines)
         high = (value[1:] + value[:-1]) / 2 - middle
         left, right = self._beside(high)
         larger, smaller = np.maximum(np.abs(left), np.abs(right)), np.minimum(np.abs(left), np.abs(right))
@@ -281,7 +281,7 @@ class Lobe(HighlightOperand):
         parameters : sequence of float or None
             Parameters of the model.
         """
-        lines = [curve_lines(self.model, parameter) for parameter in dict.fromkeys(parameters)]
+        lines = [curve_lines(self.reflection, parameter) for parameter in dict.fromkeys(parameters)]
         if all(slope.max() <= self.SHARP for _, _, slope in lines):
             return 0
         dark = max(u[np.flatnonzero(value > self.VALUE_FORMAT.step / 4)[-1]] for u, value, _ in lines)
@@ -309,7 +309,7 @@ class Lobe(HighlightOperand):
         values, knots = self.table(parameter).values.values, self.knots
         share = np.arange(1, 8) / 8
         u = (knots[:-1] + np.diff(knots) * share[:, np.newaxis]).ravel()
-        exact = self.model.reflect(1 - np.ldexp(u, -self.scale), parameter)
+        exact = self.reflection.reflect(1 - np.ldexp(u, -self.scale), parameter)
         return float(np.abs(np.interp(u, knots, values) - exact).max())
 
     @property
@@ -321,7 +321,7 @@ class Lobe(HighlightOperand):
         ValueError
             If the model has no exponent. Its gate gets the threshold of a table.
         """
-        if self.model.PARAMETER != "exponent":
+        if self.reflection.PARAMETER != "exponent":
             raise ValueError(f"{self.name} has no exponent, by which a gate could look up its threshold")
         exponents = range(1 << self.EXPONENT_BITS)
         return np.array([self.table(max(exponent, 1)).last_lit_argument for exponent in exponents])

@@ -49,7 +49,7 @@ class Power(HighlightOperand):
 
     operand: Literal["cosine", "one_minus_cosine"] = "cosine"
 
-    model: ClassVar = BLINN
+    reflection: ClassVar = BLINN
 
     COMPLEMENT_FORMAT = UQ(0, 34)
     FACTOR_FORMAT = UQ(0, 17)
@@ -58,7 +58,7 @@ class Power(HighlightOperand):
     @property
     def name(self) -> str:
         """Name of the unit. The name of the reflection model stands for its unit with a table."""
-        return f"{self.model.name}_product"
+        return f"{self.reflection.name}_product"
 
     @property
     def last_lit_arguments(self) -> np.ndarray:

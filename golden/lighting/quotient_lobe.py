@@ -61,14 +61,14 @@ class QuotientLobe(Lobe):
         """
         if operand == self.operand:
             return self
-        if self.model.MIRROR:
+        if self.reflection.MIRROR:
             raise ValueError(f"{self.name} is a lobe of R·V: take the method quotient, or phong_coplanar")
-        return Lobe(self.model, operand, scale=scale, **self.table_options)
+        return Lobe(self.reflection, operand, scale=scale, **self.table_options)
 
     @property
     def parts(self) -> int:
         """Parts of the table: 2, or 1 for a lobe of R·V."""
-        return 1 if self.model.MIRROR else 2
+        return 1 if self.reflection.MIRROR else 2
 
     @property
     def rows(self) -> int:
@@ -104,7 +104,7 @@ class QuotientLobe(Lobe):
         """
         knots = np.minimum(self.knots, 1 - 2.0**-40)
         pair = knots, (knots[1:] + knots[:-1]) / 2
-        if self.model.MIRROR:
+        if self.reflection.MIRROR:
             return 1 - 2 * pair[0], 1 - 2 * pair[1]
         entries, middles = (np.concatenate([np.sqrt(1 - s), np.sqrt(s)]) for s in pair)
         return np.delete(entries, len(knots)), middles
@@ -126,10 +126,10 @@ class QuotientLobe(Lobe):
             As for `Lobe`. Also if the curve of N·H is over half an LSB beyond the right angle, where this
             method has no highlight.
         """
-        if not self.model.MIRROR and (parameter is not None or self.model.PARAMETER is None):
-            beyond = float(self.model.reflect(np.array(-(2.0**-20)), parameter))
+        if not self.reflection.MIRROR and (parameter is not None or self.reflection.PARAMETER is None):
+            beyond = float(self.reflection.reflect(np.array(-(2.0**-20)), parameter))
             if beyond > 1 / 510:
-                given = "" if parameter is None else f" with {self.model.PARAMETER} {parameter:g}"
+                given = "" if parameter is None else f" with {self.reflection.PARAMETER} {parameter:g}"
                 raise ValueError(
                     f"{self.name}{given} is {beyond:.2g} beyond a right angle of N and H, where the method "
                     "quotient has no highlight; take another method or model"
@@ -142,13 +142,13 @@ class QuotientLobe(Lobe):
         used = knots[:-1] <= 1 / 2
         share = np.arange(1, 8)[:, np.newaxis] / 8
         middles = knots[:-1][used] + np.diff(knots)[used] * share
-        parts = [1 - 2 * middles] if self.model.MIRROR else [np.sqrt(1 - middles), np.sqrt(middles)]
+        parts = [1 - 2 * middles] if self.reflection.MIRROR else [np.sqrt(1 - middles), np.sqrt(middles)]
         largest = 0.0
         for part, cosine in enumerate(parts):
             first = part * (len(knots) - 1)
             entry = values[first : first + len(knots)]
             line = (1 - share) * entry[:-1][used] + share * entry[1:][used]
-            largest = max(largest, float(np.abs(line - self.model.reflect(cosine, parameter)).max()))
+            largest = max(largest, float(np.abs(line - self.reflection.reflect(cosine, parameter)).max()))
         return largest
 
     def address(self, argument: Fixed) -> tuple[np.ndarray, Fixed]:

@@ -118,7 +118,7 @@ class Specular(HighlightOperand):
 
     Parameters
     ----------
-    model : ReflectionModel
+    reflection : ReflectionModel
         A `PolynomialModel`, an `AngleCosine` or an `Exponential`.
     operand : str
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
@@ -144,7 +144,7 @@ class Specular(HighlightOperand):
     and ``cosquad_q``; [Lyon93].
     """
 
-    model: ReflectionModel = COSQUAD
+    reflection: ReflectionModel = COSQUAD
     operand: Literal["cosine", "one_minus_cosine"] = "cosine"
     as_published: bool = False
 
@@ -162,15 +162,15 @@ class Specular(HighlightOperand):
     ERROR = 2.0**-13
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, self.SERVED):
-            raise ValueError(f"the specular unit does not serve {self.model.name}")
-        line = isinstance(self.model, PolynomialModel) and self.model.curve is None
+        if not isinstance(self.reflection, self.SERVED):
+            raise ValueError(f"the specular unit does not serve {self.reflection.name}")
+        line = isinstance(self.reflection, PolynomialModel) and self.reflection.curve is None
         if self.as_published and not (line and self.squarings == 1):
             raise ValueError(
-                f"as_published is of polynomials that are squared once, not of {self.model.name}"
+                f"as_published is of polynomials that are squared once, not of {self.reflection.name}"
             )
-        if isinstance(self.model, PolynomialModel):
-            self._check_slope(self.model)
+        if isinstance(self.reflection, PolynomialModel):
+            self._check_slope(self.reflection)
         super().__post_init__()
 
     def _check_slope(self, model: PolynomialModel) -> None:
@@ -187,24 +187,24 @@ class Specular(HighlightOperand):
     @property
     def name(self) -> str:
         """Name of the reflection model."""
-        return self.model.name
+        return self.reflection.name
 
     @property
     def is_coscos(self) -> bool:
         """Whether the model is a power of ``cos(a gamma)``."""
-        return isinstance(self.model, AngleCosine)
+        return isinstance(self.reflection, AngleCosine)
 
     @property
     def is_exponential(self) -> bool:
         """Whether the model is an exponential, which shifts in place of squaring."""
-        return isinstance(self.model, Exponential)
+        return isinstance(self.reflection, Exponential)
 
     @property
     def squarings(self) -> int:
         """How often the base is squared: 1 to 3, 0 for ``exp``."""
-        if isinstance(self.model, AngleCosine):
-            return self.model.power.bit_length() - 1
-        return self.model.squarings if isinstance(self.model, PolynomialModel) else 0
+        if isinstance(self.reflection, AngleCosine):
+            return self.reflection.power.bit_length() - 1
+        return self.reflection.squarings if isinstance(self.reflection, PolynomialModel) else 0
 
     @property
     def error(self) -> float:
@@ -221,14 +221,14 @@ class Specular(HighlightOperand):
     @property
     def slope_terms(self) -> tuple[Fixed, Fixed] | None:
         """``a`` and ``b`` of the slope ``k = a n + b``, in words of the hardware; None: a table holds k."""
-        if isinstance(self.model, AngleCosine):
-            if self.model.rule != "taylor":
+        if isinstance(self.reflection, AngleCosine):
+            if self.reflection.rule != "taylor":
                 return None
-            a, b = 8 / (self.model.power * math.pi**2), 0.0
-        elif isinstance(self.model, PolynomialModel):
-            if self.model.curve is not None:
+            a, b = 8 / (self.reflection.power * math.pi**2), 0.0
+        elif isinstance(self.reflection, PolynomialModel):
+            if self.reflection.curve is not None:
                 return None
-            a, b = self.model.a, self.model.b
+            a, b = self.reflection.a, self.reflection.b
         else:
             a, b = math.log2(math.e) / 16, 0.0
         return Fixed.round(self.A_FORMAT, a), Fixed.round(self.B_FORMAT, b)
@@ -244,10 +244,10 @@ class Specular(HighlightOperand):
         return total.wrap(self.SLOPE_FORMAT)
 
     def _slope(self, exponent: int) -> float:
-        if isinstance(self.model, AngleCosine):
-            return 8 * (self.model.scale(exponent) / math.pi) ** 2
-        assert isinstance(self.model, PolynomialModel)
-        return self.model.slope(exponent)
+        if isinstance(self.reflection, AngleCosine):
+            return 8 * (self.reflection.scale(exponent) / math.pi) ** 2
+        assert isinstance(self.reflection, PolynomialModel)
+        return self.reflection.slope(exponent)
 
     def scale(self, exponent: np.ndarray) -> tuple[Fixed, np.ndarray]:
         """``K`` and ``s`` of the slope ``k = K 2^s``, for exponents 0 to 1023.

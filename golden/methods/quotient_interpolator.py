@@ -77,14 +77,14 @@ class QuotientInterpolator(Interpolator):
 
     def matched(self, specular: HighlightOperand | None) -> "QuotientInterpolator":
         """The method with the kind of highlight of a unit's model."""
-        mirror = specular is not None and specular.model.MIRROR
+        mirror = specular is not None and specular.reflection.MIRROR
         return self if mirror == self.mirror else replace(self, mirror=mirror)
 
     def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
         """The unit, if it takes places. Else a `QuotientLobe` of its model, with the same tables."""
         if specular.operand == self.operand:
             return specular
-        return QuotientLobe(specular.model, **specular.table_options)
+        return QuotientLobe(specular.reflection, **specular.table_options)
 
     def geometry(self, lights: int) -> Geometry:
         """Geometry that makes vectors. With several lights it turns them."""

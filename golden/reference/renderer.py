@@ -26,7 +26,7 @@ __all__ = [
     "NORMAL_THRESHOLD",
     "SHADINGS",
     "Curve",
-    "Frame",
+    "ExactFrame",
     "Thresholds",
     "fragment_positions",
     "gouraud_triangles",
@@ -56,7 +56,7 @@ _CHUNK = 1 << 15
 
 
 @dataclass(frozen=True)
-class Frame:
+class ExactFrame:
     """A picture.
 
     Parameters
@@ -153,7 +153,7 @@ def render(
     model: ReflectionModel = BLINN,
     raster: Raster | None = None,
     thresholds: Thresholds | None = None,
-) -> Frame:
+) -> ExactFrame:
     """Picture of a scene in float64.
 
     - ``flat``: the intensity of each triangle's own normal, in its middle;
@@ -222,7 +222,7 @@ def render(
                         points=_points(scene, raster, by_normals),
                     )
                 )
-    return Frame(image=image, mask=visible_mask(scene, raster))
+    return ExactFrame(image=image, mask=visible_mask(scene, raster))
 
 
 def visible_mask(scene: Scene, raster: Raster) -> np.ndarray:

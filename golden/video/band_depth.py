@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.depth_tester import DepthTester
 
 __all__ = ["BandDepth"]
 
@@ -14,7 +14,7 @@ class BandDepth:
     """A memory of depths; a word that was not written in the present band counts as cleared.
 
     A word holds a depth and a tag of ``tag_bits`` bits: the number of the band in which it was written,
-    modulo ``2^tag_bits``. A word with another tag than the present one reads as `DepthTest.CLEARED`. An old
+    modulo ``2^tag_bits``. A word with another tag than the present one reads as `DepthTester.CLEARED`. An old
     tag must not become the present one again. So when a band begins, ``swept`` words are written with the tag
     before the present one, first those that were swept longest ago: with ``2^t`` tags every word is swept
     again at most ``2^t - 2`` bands later, one band before its tag would be the present one.
@@ -81,5 +81,5 @@ class BandDepth:
         last = np.r_[-1, np.maximum.accumulate(wrote)[:-1]] if len(key) else wrote
         same = (last >= 0) & (key[order][np.maximum(last, 0)] == key[order])
         result = np.empty(len(key), dtype=np.int64)
-        result[order] = np.where(same, depth[order][np.maximum(last, 0)], DepthTest.CLEARED)
+        result[order] = np.where(same, depth[order][np.maximum(last, 0)], DepthTester.CLEARED)
         return result

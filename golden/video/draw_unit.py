@@ -8,8 +8,8 @@ import numpy as np
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.triangle_frame import SPAN_ANGLE, triangle_constants
 from blysk.golden.frames.vector_axes import triangle_axes
-from blysk.golden.geometry.triangles import Frame, Triangles
-from blysk.golden.pipeline import Design
+from blysk.golden.geometry.triangles import FrameSettings, Triangles
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.scene import Scene
@@ -72,7 +72,7 @@ class Drawing:
         Renderer with a design whose ``x_bits`` and ``y_bits`` are those of `place_bits`.
     size : (int, int)
         Width and height of the picture.
-    frames : tuple of Frame
+    frames : tuple of FrameSettings
         The whole picture for each preset, as spans are cut shorter for a steeper highlight.
     controls : Controls
         Angle and preset of each frame.
@@ -96,7 +96,7 @@ class Drawing:
     presets: tuple[tuple[FrameConstants, ...], ...]
     renderer: Renderer
     size: tuple[int, int]
-    frames: tuple[Frame, ...]
+    frames: tuple[FrameSettings, ...]
     controls: Controls = field(default_factory=Controls)
     lines: int = 16
     transform: VertexTransform = field(default_factory=VertexTransform)
@@ -123,7 +123,7 @@ class Drawing:
     def of(
         cls,
         scenes: Sequence[Scene],
-        design: Design | None = None,
+        design: ShadingPipeline | None = None,
         *,
         lines: int = 16,
         axis: Sequence[float] = (0.0, 1.0, 0.0),
@@ -140,7 +140,7 @@ class Drawing:
         ----------
         scenes : sequence of Scene
             The presets: scenes with the same mesh, camera and size, and different materials and lights.
-        design : Design, optional
+        design : ShadingPipeline, optional
             Shading; its ``x_bits`` and ``y_bits`` are replaced. By default `board_design` for the lights and
             materials of the scenes.
         lines : int
@@ -174,7 +174,7 @@ class Drawing:
         if renderer.rows:
             axes = axes * _SHORTER
         presets = tuple(tuple(triangle_constants(each, renderer)) for each in scenes)
-        widest = Frame.limit_of(SPAN_ANGLE if angle is None else angle)
+        widest = FrameSettings.limit_of(SPAN_ANGLE if angle is None else angle)
         return cls(
             mesh=mesh,
             motion=Motion.of(mesh, scene.camera, size, axis, transform, list(axes)),
@@ -182,7 +182,9 @@ class Drawing:
             presets=presets,
             renderer=renderer,
             size=size,
-            frames=tuple(Frame.centred(*size, back_faces=scene.back_faces, limit=widest) for _ in scenes),
+            frames=tuple(
+                FrameSettings.centred(*size, back_faces=scene.back_faces, limit=widest) for _ in scenes
+            ),
             controls=controls or Controls(materials=len(scenes)),
             lines=lines,
             transform=transform,
@@ -198,7 +200,7 @@ class Drawing:
         """Bit-accurate model of the triangle assembly."""
         return TriangleAssembly(self.mesh, self.transform.grid)
 
-    def rows(self, band: int, preset: int = 0) -> Frame:
+    def rows(self, band: int, preset: int = 0) -> FrameSettings:
         """The frame, clipped to the lines of a band."""
         frame = self.frames[preset]
         top = frame.top + band * self.lines
@@ -221,7 +223,7 @@ class Drawing:
         names = ("x", "y", "depth", "normal", "outside")
         return ScreenVertices(*(np.concatenate([getattr(part, name) for part in made]) for name in names))
 
-    def triangles(self, angle: int, preset: int, rows: Frame) -> tuple[Triangles, dict[str, int]]:
+    def triangles(self, angle: int, preset: int, rows: FrameSettings) -> tuple[Triangles, dict[str, int]]:
         """Triangles of some scanlines, and the counters of the assembly."""
         words = self.commands.compute(self.commands.starts[preset], True)
         draws = words[words[:, 0] == KINDS.index("draw")]
@@ -264,13 +266,13 @@ class Drawing:
         return image
 
 
-def board_design(lights: int = 1, materials: int = 1) -> Design:
+def board_design(lights: int = 1, materials: int = 1) -> ShadingPipeline:
     """The shading pipeline of the boards: quotient, blinn.
 
     Parameters
     ----------
     lights, materials : int
-        As for `Design`.
+        As for `ShadingPipeline`.
     """
     return preset("quotient", "blinn", lights, materials=materials)
 

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
@@ -110,7 +110,7 @@ class Motion:
             raise ValueError("turning meshes need a perspective camera, not an orthographic one")
         pixels = 1 << (unit or VertexTransform()).scale_bits
         width, height = size
-        frame = Frame.centred(width, height)
+        frame = FrameSettings.centred(width, height)
         points = np.vstack([np.zeros(3), np.eye(3)])
         rows = camera.homogeneous(points, width, height)[:, :3]
         rows = rows + rows[:, 2:] * [frame.left, frame.top, 0]

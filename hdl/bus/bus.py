@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.bus.registers import RegisterMap, constant_registers, frame_registers
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.render import Renderer
 from blysk.hdl.bus.axi_lite import AxiLite, AxiLiteUnit
 from blysk.hdl.bus.framing import FramingUnit
@@ -56,7 +56,7 @@ class BusUnit(wiring.Component):
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         Design of the core; its `Build` says which of `TOPS` the core is, and which of `BUSES` the bus.
     **options
         Keyword arguments of the core's constructor.
@@ -80,7 +80,7 @@ class BusUnit(wiring.Component):
     Source: docs/theory/bus.md#streams.
     """
 
-    def __init__(self, design: Design, **options):
+    def __init__(self, design: ShadingPipeline, **options):
         self.framing = FramingUnit(design, **options)
         member, signature, front = BUSES[design.build.bus]
         self._member, self._front = member, front()
@@ -99,7 +99,7 @@ class BusUnit(wiring.Component):
             constant_registers(design, axes) if "write" in of_core else (),
         )
         self._registers = RegistersUnit(self.map)
-        layouts = self.framing.parameters
+        layouts = self.framing.model
         members = {
             "s_axis": In(AxiStream(layouts.given.size)),
             "m_axis": Out(AxiStream(layouts.made.size, 2)),
@@ -151,7 +151,7 @@ class BusUnit(wiring.Component):
         return m
 
 
-def core_of(design: Design) -> wiring.Component:
+def core_of(design: ShadingPipeline) -> wiring.Component:
     """The core that a design's `Build` asks for: one of `TOPS`, with its own streams or on a bus.
 
     Raises

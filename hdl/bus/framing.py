@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.bus.byte_layout import ByteLayout
 from blysk.golden.bus.framing import PACKETS, Framing
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.bus.byte_layout import bytes_of, fields_of, layout_of, misfits
 from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.core.stream import skid_buffer
@@ -40,7 +40,7 @@ class FramingUnit(wiring.Component):
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         Design of the core; its `Build` says which of `TOPS` the core is.
     **options
         Keyword arguments of the core's constructor.
@@ -61,8 +61,8 @@ class FramingUnit(wiring.Component):
     Source: docs/theory/bus.md#streams; not in the documents.
     """
 
-    def __init__(self, design: Design | None = None, **options):
-        design = design or Design()
+    def __init__(self, design: ShadingPipeline | None = None, **options):
+        design = design or ShadingPipeline()
         top = design.build.top
         self.top, self.packets = TOPS[top], PACKETS[top]
         self.core = self.top.unit(design, **options)
@@ -70,7 +70,7 @@ class FramingUnit(wiring.Component):
         self._without = ("last",) if self.packets == "span" else ()
         below = {} if top == "geometry" else {"material": design.materials}
         given, made = layout_of(payloads[0], below=below), layout_of(payloads[1], self._without)
-        self.parameters = Framing(given, made, self.packets)
+        self.model = Framing(given, made, self.packets)
         counters = {"frames": unsigned(COUNTER_BITS), "misfits": unsigned(COUNTER_BITS), "busy": unsigned(1)}
         members = {
             "i": In(stream.Signature(given_shape(given))),
@@ -123,7 +123,7 @@ class FramingUnit(wiring.Component):
             m.d.sync += [active.eq(0), ending.eq(0)]
 
         misfit = Signal(name="misfit")
-        m.d.sync += misfit.eq(accept & misfits(self.parameters.given, word))
+        m.d.sync += misfit.eq(accept & misfits(self.model.given, word))
         count_events(m, self.status, frames=done, misfits=misfit)
         m.d.comb += [
             *(self.status[name].eq(core.status[name]) for name in core.status.shape().members),

@@ -50,7 +50,7 @@ class RegistersUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : RegisterMap
+    model : RegisterMap
         The registers.
 
     Members
@@ -69,9 +69,9 @@ class RegistersUnit(wiring.Component):
     Source: docs/theory/bus.md#registers.
     """
 
-    def __init__(self, parameters: RegisterMap):
-        self.parameters = parameters
-        said = {"busy": unsigned(1)} | {name: unsigned(width) for name, width, _ in parameters.counters}
+    def __init__(self, model: RegisterMap):
+        self.model = model
+        said = {"busy": unsigned(1)} | {name: unsigned(width) for name, width, _ in model.counters}
         load = {"valid": unsigned(1)} | dict(write_shape().members)
         members = {
             "i": In(stream.Signature(access_shape())),
@@ -79,8 +79,8 @@ class RegistersUnit(wiring.Component):
             "constants": In(data.StructLayout(said)),
             "load": Out(data.StructLayout(load)),
         }
-        if parameters.picture:
-            shape = {register.name: _shape(register) for register in parameters.picture}
+        if model.picture:
+            shape = {register.name: _shape(register) for register in model.picture}
             members["picture"] = Out(data.StructLayout(shape))
         super().__init__(members)
 
@@ -105,9 +105,9 @@ class RegistersUnit(wiring.Component):
             with m.If(cause.any()):
                 m.d.sync += [refused.eq(access.address), errors.eq(errors | cause)]
         accepted, whole = full & access.write & ~cause.any(), access.strobe.all()
-        with m.If(accepted & access.strobe[0] & _is_at(access, self.parameters["errors"])):
+        with m.If(accepted & access.strobe[0] & _is_at(access, self.model["errors"])):
             m.d.sync += errors.eq(errors & ~access.data[: len(ERRORS)])
-        for register in self.parameters.picture:
+        for register in self.model.picture:
             value = Signal(_shape(register), name=f"picture_{register.name}")
             m.d.comb += self.picture[register.name].eq(value)
             with m.If(accepted & whole & _is_at(access, register)):
@@ -125,9 +125,9 @@ class RegistersUnit(wiring.Component):
         found, fits = Signal(name="found"), Signal(name="fits")
         readable, writable, clears = (Signal(name=name) for name in ("readable", "writable", "clears"))
         said = {"identity": IDENTITY, "version": VERSION, "state": self.constants.busy} | held
-        said |= {name: self.constants[name] for name, *_ in self.parameters.counters}
+        said |= {name: self.constants[name] for name, *_ in self.model.counters}
         with m.Switch(access.address[2:]):
-            for register in self.parameters.registers:
+            for register in self.model.registers:
                 with m.Case(register.address >> 2):
                     reads, writes = register.access != "write-only", register.access != "read-only"
                     m.d.comb += [found.eq(1), readable.eq(reads), writable.eq(writes)]

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from amaranth.hdl import Value
 from amaranth.lib import wiring
 
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.render import Renderer
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 
 __all__ = ["TOPS", "Top"]
 
@@ -26,7 +26,7 @@ class Top:
     title : str
         Its input and its output, as in ``triangles to spans``.
     unit : callable
-        Makes the core from a `Design`; keywords go to the constructor of its unit.
+        Makes the core from a `ShadingPipeline`; keywords go to the constructor of its unit.
     watch : callable
         Makes a signal from the core, before it is elaborated: high while anything is inside, except a beat
         that waits at ``o``.
@@ -37,18 +37,18 @@ class Top:
     watch: Callable[[wiring.Component], Value]
 
 
-def _geometry(design: Design) -> GeometryUnit:
+def _geometry(design: ShadingPipeline) -> GeometryUnit:
     return GeometryUnit(Renderer(design).geometry, design.build)
 
 
-def _shader(design: Design) -> wiring.Component:
+def _shader(design: ShadingPipeline) -> wiring.Component:
     if design.build.pipes == 1:
         return ShadingPipelineUnit(design)
     return (MergedPipelinesUnit if design.build.merged else PixelPipelinesUnit)(PixelPipelines(design))
 
 
-def _render(design: Design, **options) -> RenderUnit:
-    return RenderUnit(Renderer(design), clears=True, **options)
+def _render(design: ShadingPipeline, **options) -> RendererUnit:
+    return RendererUnit(Renderer(design), clears=True, **options)
 
 
 TOPS = {

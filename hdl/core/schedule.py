@@ -40,7 +40,7 @@ class Operation:
     lifetime : int or None
         Cycles on which the result can be read, before the next beat's result replaces it; ``None`` for
         wiring: that of its operand.
-    unit : hashable or None
+    resource : hashable or None
         Functional unit that serves it: equal instances of hardware, shared by its uses. ``None``: hardware of
         its own.
     since : int or Operation
@@ -52,7 +52,7 @@ class Operation:
     operands: tuple["Operation", ...]
     latency: int
     lifetime: int | None
-    unit: Hashable | None = None
+    resource: Hashable | None = None
     since: "int | Operation" = 0
 
 
@@ -121,10 +121,10 @@ def place(operations: Sequence[Operation], interval: int, spaced: bool = False) 
     schedule : Schedule
         Of all operations.
     """
-    units = list(dict.fromkeys(o.unit for o in operations if o.unit is not None))
+    resources = list(dict.fromkeys(o.resource for o in operations if o.resource is not None))
     found = _greedy(operations, interval, spaced)
     if spaced and interval > 1:
-        found = min((found, *_shared(operations, interval, units)), key=_size)
+        found = min((found, *_shared(operations, interval, resources)), key=_size)
     return Schedule(_delayed(operations, found.placements), found.counts)
 
 
@@ -143,10 +143,10 @@ def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Sch
     """Each use at the first free slot; another instance if no slot is free within two intervals."""
     placements: dict[Operation, Placement] = {}
     instances: dict[Hashable, list[set[int]]] = {}
-    for unit in (o.unit for o in operations if o.unit is not None):
-        instances.setdefault(unit, [])
-    for unit, taken in instances.items():
-        uses = sum(o.unit == unit for o in operations)
+    for resource in (o.resource for o in operations if o.resource is not None):
+        instances.setdefault(resource, [])
+    for resource, taken in instances.items():
+        uses = sum(o.resource == resource for o in operations)
         taken += [set() for _ in range(-(-uses // interval))]
 
     def serves(taken: set[int], stage: int) -> bool:
@@ -156,8 +156,8 @@ def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Sch
 
     for operation in operations:
         read, instance = _earliest(operation, placements), 0
-        if operation.unit is not None:
-            sets = instances[operation.unit]
+        if operation.resource is not None:
+            sets = instances[operation.resource]
             slots = (
                 (stage, k)
                 for stage in range(read, read + 2 * interval)
@@ -171,7 +171,7 @@ def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Sch
             read, instance = slot
             sets[instance].add(read)
         placements[operation] = Placement(read, instance)
-    return Schedule(placements, {unit: len(taken) for unit, taken in instances.items()})
+    return Schedule(placements, {resource: len(taken) for resource, taken in instances.items()})
 
 
 def _size(schedule: Schedule) -> tuple[int, int]:
@@ -179,7 +179,9 @@ def _size(schedule: Schedule) -> tuple[int, int]:
     return sum(schedule.counts.values()), schedule.length
 
 
-def _shared(operations: Sequence[Operation], interval: int, units: Sequence[Hashable]) -> Iterator[Schedule]:
+def _shared(
+    operations: Sequence[Operation], interval: int, resources: Sequence[Hashable]
+) -> Iterator[Schedule]:
     """Schedules for beats at any distance with few instances; none if there are too many ways.
 
     The uses of a functional unit, sorted by their earliest stage, are divided into runs of neighbours. Each
@@ -189,9 +191,10 @@ def _shared(operations: Sequence[Operation], interval: int, units: Sequence[Hash
     for operation in operations:
         alone[operation] = Placement(_earliest(operation, alone))
     uses = {
-        unit: sorted((o for o in operations if o.unit == unit), key=lambda o: alone[o].read) for unit in units
+        resource: sorted((o for o in operations if o.resource == resource), key=lambda o: alone[o].read)
+        for resource in resources
     }
-    choices = [list(islice(_runs(len(uses[unit]), interval), _MOST_SEARCHED)) for unit in units]
+    choices = [list(islice(_runs(len(uses[resource]), interval), _MOST_SEARCHED)) for resource in resources]
     if prod(map(len, choices)) >= _MOST_SEARCHED:
         return
     fewest = None
@@ -200,14 +203,14 @@ def _shared(operations: Sequence[Operation], interval: int, units: Sequence[Hash
         if fewest is not None and instances > fewest:
             continue
         run_of = {}
-        for unit, sizes in zip(units, chosen, strict=True):
-            of_unit = iter(uses[unit])
+        for resource, sizes in zip(resources, chosen, strict=True):
+            of_resource = iter(uses[resource])
             for k, size in enumerate(sizes):
-                run_of.update({next(of_unit): (unit, k) for _ in range(size)})
+                run_of.update({next(of_resource): (resource, k) for _ in range(size)})
         placements = _windows(operations, interval, run_of)
         if placements is None:
             continue
-        counts = {unit: len(sizes) for unit, sizes in zip(units, chosen, strict=True)}
+        counts = {resource: len(sizes) for resource, sizes in zip(resources, chosen, strict=True)}
         fewest = instances
         yield Schedule(placements, counts)
 
@@ -269,7 +272,7 @@ def _delayed(
     bound = {o.since for o in operations if isinstance(o.since, Operation)}
     for operation in reversed(operations):
         placement = placements[operation]
-        fixed = operation.unit is not None or not operation.latency or operation in bound
+        fixed = operation.resource is not None or not operation.latency or operation in bound
         if fixed or not readers[operation] or not operation.operands:
             continue
         # Wiring is where its operand is.

@@ -25,8 +25,8 @@ __all__ = [
 FIFO_LATENCY = 2
 """Cycles that a payload takes through the empty FIFO of `connect_fifo`."""
 
-_MANY, _PART = 36, 12
-"""Stages from which on they are looked at by parts, and those of a part."""
+_UNGROUPED, _GROUP = 36, 12
+"""Pipelines of more stages than the first reduce their valid bits in groups of the second."""
 
 SLICE_LATENCY = 1
 """Cycles that a payload takes through the register of `connect_slice`."""
@@ -432,12 +432,13 @@ class PipelinedUnit(wiring.Component):
         # Whether a beat will be inside on the next cycle even if none comes on this one.
         stays, opens = Signal(name="stays"), Signal(name="opens")
         inside = Cat(accept, self._stages)[: self.latency - 1]
-        if self.latency > _MANY:
+        if self.latency > _UNGROUPED:
             # By parts, each of which is worked out from the stages before its own.
-            parts = [Signal(name=f"inside_{k}") for k in range(-(-(self.latency - 3) // _PART))]
+            parts = [Signal(name=f"inside_{k}") for k in range(-(-(self.latency - 3) // _GROUP))]
             with m.If(advance):
                 m.d.sync += [
-                    part.eq(inside[1 + k * _PART : 1 + (k + 1) * _PART].any()) for k, part in enumerate(parts)
+                    part.eq(inside[1 + k * _GROUP : 1 + (k + 1) * _GROUP].any())
+                    for k, part in enumerate(parts)
                 ]
             inside = Cat(inside[:2], *parts)
         m.d.comb += opens.eq((turn == self.initiation_interval - 1) | ~(accept | stays))

@@ -17,7 +17,7 @@ class Word(Operation):
 
     Parameters
     ----------
-    name, operands, latency, lifetime, unit, since
+    name, operands, latency, lifetime, resource, since
         As for `Operation`.
     graph : Dataflow
         Graph of the word.

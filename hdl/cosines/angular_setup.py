@@ -49,7 +49,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : AngularSetup
+    model : AngularSetup
         Bit-accurate model: the method of psi (``angle``), tables and formats.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to 26, by arccos 1 to 21; ``None``: 6.
@@ -70,8 +70,8 @@ class AngularSetupUnit(PipelinedUnit):
     Source: docs/theory/interpolation.md#angular-method; [T] 3.1.
     """
 
-    def __init__(self, parameters: AngularSetup | None = None, *, initiation_interval: int | None = None):
-        self.parameters = p = parameters or AngularSetup()
+    def __init__(self, model: AngularSetup | None = None, *, initiation_interval: int | None = None):
+        self.model = p = model or AngularSetup()
         products = 26 if p.angle == "half_chord" else 21
         interval = checked_interval(initiation_interval, products, 6)
         self._graph = Dataflow(interval)
@@ -112,7 +112,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     def _describe(self) -> dict:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         left, right, vector, length = (
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right", "vector", "length")
@@ -171,7 +171,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     def _by_arccos(self, cross: Word) -> Word:
         """Word of psi by arccos, and the product that converts it to turns."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
 
         def exact(cross):
             # The square of the code of length 1 is 2^-16 under 1.
@@ -211,7 +211,7 @@ class AngularSetupUnit(PipelinedUnit):
         entry = g.register(f"{name}_entry", lambda entry: entry, entry)
         value = g.wire(f"{name}_value", lambda entry: FixedValue(values.format, entry[width:]), entry)
         change = g.wire(f"{name}_change", lambda entry: FixedValue(changes.format, entry[:width]), entry)
-        fraction_format = UQ(0, self.parameters.FRACTION_BITS)
+        fraction_format = UQ(0, self.model.FRACTION_BITS)
         product = g.multiply(
             f"{name}_product", fraction, change, lambda fraction: FixedValue(fraction_format, fraction)
         )
@@ -228,7 +228,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     def _address(self, name: str, bits: Word, width: int) -> tuple[Word, Word]:
         """Address of a table, from the leading bits, and the fraction that follows it."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         below = width - p.ADDRESS_BITS
         return (
             g.wire(f"{name}_address", lambda bits: bits[below:], bits),
@@ -237,7 +237,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     def _major(self, major: Word, chord: Word) -> Word:
         """Word of ``major/2 (1 + e)``, which is x up to 90 degrees."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
 
         def clamped(chord):
             bits = Value.cast(chord)
@@ -256,7 +256,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     def _minor(self, minor: Word, shift: Word, v: Word) -> Word:
         """Word of ``minor 2^j T``, which is y up to 90 degrees."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         operand = self._address("reciprocal", v, 36)
         reciprocal = self._looked_up("inverse_roots", p.reciprocals, *operand, -1, p.RECIPROCAL_FORMAT)
         code = g.register(
@@ -275,7 +275,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     def _step(self, angle: Word, obtuse: Word, shift: Word, length: Word) -> Word:
         """Word of the bits of ``psi/(m-1)``."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         leading = angle
         if p.angle == "half_chord":
             shift = g.register("angle_shift", lambda obtuse, shift: Mux(obtuse, 0, shift)[:5], obtuse, shift)
@@ -303,7 +303,7 @@ class AngularSetupUnit(PipelinedUnit):
 
     def _polar(self, x: Word, y: Word, obtuse: Word) -> tuple[Word, Word]:
         """Words of cos beta and of the direction, by one step of CORDIC a cycle."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         width, direction_width = p.ROTATED_FORMAT.width, p.DIRECTION_FORMAT.width
         first, second = (
             g.register(

@@ -27,7 +27,7 @@ class ArccosUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Arccos
+    model : Arccos
         Bit-accurate model, with the table.
     form : str
         ``"pipelined"`` or ``"sequential"``.
@@ -61,11 +61,11 @@ class ArccosUnit(PipelinedUnit):
     }
 
     def __init__(
-        self, parameters: Arccos | None = None, *, form: Literal["pipelined", "sequential"] = "pipelined"
+        self, model: Arccos | None = None, *, form: Literal["pipelined", "sequential"] = "pipelined"
     ):
         if form not in ("pipelined", "sequential"):
             raise ValueError(f"form must be 'pipelined' or 'sequential', not {form!r}")
-        self.parameters = parameters or Arccos()
+        self.model = model or Arccos()
         self.form = form
         pipelined = form == "pipelined"
         super().__init__(
@@ -77,7 +77,7 @@ class ArccosUnit(PipelinedUnit):
 
     def datapath(self, m, operands):
         """Describe the registers from the magnitude of x to the saturation of the angle."""
-        p, register = self.parameters, self.register
+        p, register = self.model, self.register
         code = Value.cast(operands)
         negative = register(m, code[-1], "negative_1")
         magnitude = register(m, Mux(code[-1], -code, code)[:18], "magnitude")
@@ -112,16 +112,16 @@ class ArccosUnit(PipelinedUnit):
         return [
             Array(Const(int(code), signed(width)) for code in column)[segment]
             for column, width in zip(
-                self.parameters.codes.T, (self.parameters.CONSTANT_FORMAT.width, 18, 18), strict=True
+                self.model.codes.T, (self.model.CONSTANT_FORMAT.width, 18, 18), strict=True
             )
         ]
 
     def _aligned(self, product, segment):
         """Product of a segment's word and x with 32 fraction bits."""
-        shifts = self.parameters.integer_bits - 2
-        return Array(
-            (product << int(shift))[: self.parameters.SUM_FORMAT.width].as_signed() for shift in shifts
-        )[segment]
+        shifts = self.model.integer_bits - 2
+        return Array((product << int(shift))[: self.model.SUM_FORMAT.width].as_signed() for shift in shifts)[
+            segment
+        ]
 
     def _pipelined(self, m, x, segment, flags):
         register = self.register

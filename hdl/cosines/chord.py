@@ -74,7 +74,7 @@ class ChordUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Chord
+    model : Chord
         Bit-accurate model.
 
     Members
@@ -87,8 +87,8 @@ class ChordUnit(PipelinedUnit):
     Source: docs/theory/chord.md#the-chord; [Lyon93].
     """
 
-    def __init__(self, parameters: Chord | None = None):
-        self.parameters = parameters or Chord()
+    def __init__(self, model: Chord | None = None):
+        self.model = model or Chord()
         self._graph = graph = Dataflow(1)
         a, b = (graph.input(name, lambda operands, name=name: operands[name]) for name in "ab")
         u = chord(graph, "u", a, b)

@@ -62,10 +62,10 @@ def span_operands_shape(
 
 
 def chord_differences_shape(
-    lights: int, highlights: bool = True, parameters: ChordSetup | None = None, factors: int = 0
+    lights: int, highlights: bool = True, model: ChordSetup | None = None, factors: int = 0
 ) -> data.StructLayout:
     """Shape of a span's differences: of N·L and u for each light, of the factors; and ``out_of_range``."""
-    format = (parameters or ChordSetup()).format
+    format = (model or ChordSetup()).format
     names = ("diffuse", "highlight") if highlights else ("diffuse",)
     differences = data.StructLayout({"first": FixedShape(format), "second": FixedShape(format)})
     members: dict = {"lights": data.ArrayLayout(data.StructLayout(dict.fromkeys(names, differences)), lights)}
@@ -87,7 +87,7 @@ class ChordSetupUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : ChordSetup
+    model : ChordSetup
         Bit-accurate model.
     lights : int
         Number of lights, 1 or more.
@@ -109,7 +109,7 @@ class ChordSetupUnit(PipelinedUnit):
     -------
     i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
         Spans; the length is at least 1. With factors also ``factors``, `span_factors_shape`.
-    o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights, parameters, factors)))`
+    o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights, model, factors)))`
         Differences; ``out_of_range``: P or G does not fit its word, and the differences are invalid.
 
     Source: docs/theory/chord.md#differences; [Lyon93].
@@ -117,7 +117,7 @@ class ChordSetupUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: ChordSetup | None = None,
+        model: ChordSetup | None = None,
         lights: int = 1,
         *,
         initiation_interval: int = 3,
@@ -125,18 +125,18 @@ class ChordSetupUnit(PipelinedUnit):
         highlights: bool = True,
         factors: int = 0,
     ):
-        self.parameters = parameters or ChordSetup()
+        self.model = model or ChordSetup()
         self.highlights = highlights
         self.lights = lights
         self.factors = factors
         self.length_bits = checked_length_bits(length_bits)
         self._graph = Dataflow(initiation_interval, spaced=True)
-        self._shifters = shared_shifters(self._graph, self.parameters)
+        self._shifters = shared_shifters(self._graph, self.model)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
         super().__init__(
             span_operands_shape(lights, highlights, length_bits, factors),
-            chord_differences_shape(lights, highlights, self.parameters, factors),
+            chord_differences_shape(lights, highlights, self.model, factors),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
             spaced=True,
@@ -144,7 +144,7 @@ class ChordSetupUnit(PipelinedUnit):
 
     def _describe(self) -> dict:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         length = g.input("length", lambda operands: operands.length)
         steps = step_words(g, length, self.length_bits)
         functions = [("diffuse", p.DIFFUSE_SLOPE_FORMAT)]
@@ -163,7 +163,7 @@ class ChordSetupUnit(PipelinedUnit):
                 curvature,
                 steps,
                 has_low=slope_format.width > p.HIGH_FORMAT.width,
-                parameters=p,
+                model=p,
             )
             results.update({(i, function, name): word for name, word in words.items()})
         results["out_of_range"] = g.register("out_of_range", lambda *flags: Cat(flags).any(), *flags)
@@ -171,7 +171,7 @@ class ChordSetupUnit(PipelinedUnit):
 
     def _quadratic(self, i: int, function: str, slope_format: Format, flags: list[Word]):
         """Words of P and G of f, u or a; the flags get a word where P or G is out of range."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         name = f"{function}_{i}"
         values = g.input(
             name,
@@ -224,16 +224,16 @@ class ChordSetupUnit(PipelinedUnit):
         return result
 
 
-def shared_shifters(graph: Dataflow, parameters: ChordSetup) -> FunctionalUnit:
+def shared_shifters(graph: Dataflow, model: ChordSetup) -> FunctionalUnit:
     """Shifters of the differences, two uses a quadratic; see `difference_words`."""
-    format = parameters.shifted_format
+    format = model.shifted_format
 
     def shift(register, value, amount):
         # Two stages of shift, then rounding half up to the fraction bits of the differences.
         coarse = FixedValue(format, Value.cast(value) >> Cat(Const(0, 2), amount[2:]))
         coarse, fine = register(coarse, "coarse"), register(amount[:2], "fine_amount")
         shifted = register(FixedValue(format, Value.cast(coarse) >> fine), "shifted")
-        return register(shifted.round_half_up(parameters.fraction_bits).wrap(parameters.format), "rounded")
+        return register(shifted.round_half_up(model.fraction_bits).wrap(model.format), "rounded")
 
     return graph.share("shifter", (FixedShape(format), unsigned(5)), 3, shift)
 
@@ -270,7 +270,7 @@ def difference_words(
     curvature: Word,
     steps: tuple[Word, Word, Word, Word],
     has_low: bool,
-    parameters: ChordSetup,
+    model: ChordSetup,
 ) -> dict[str, Word]:
     """Words of the differences ``P dt + G dt^2`` and ``2 G dt^2``: two multiplications, or three.
 
@@ -290,7 +290,7 @@ def difference_words(
         Words of `step_words`.
     has_low : bool
         Whether P has more bits than a multiplier's operand, and is multiplied in two words.
-    parameters : ChordSetup
+    model : ChordSetup
         Bit-accurate model, with the formats.
 
     Returns
@@ -298,7 +298,7 @@ def difference_words(
     dict of Word
         ``first`` and ``second``.
     """
-    p = parameters
+    p = model
     reciprocal, shift, square, square_shift = steps
 
     def shifted(name, value, shift, scale, formula):

@@ -33,7 +33,7 @@ class HalfChordUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : HalfChord
+    model : HalfChord
         Bit-accurate model, with table and coefficients.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to 6; ``None``: 6.
@@ -53,8 +53,8 @@ class HalfChordUnit(PipelinedUnit):
     Source: docs/theory/interpolation.md#half-chord; [T] 3.3.
     """
 
-    def __init__(self, parameters: HalfChord | None = None, *, initiation_interval: int | None = None):
-        self.parameters = parameters or HalfChord()
+    def __init__(self, model: HalfChord | None = None, *, initiation_interval: int | None = None):
+        self.model = model or HalfChord()
         interval = checked_interval(initiation_interval, 6)
         self._graph = Dataflow(interval)
         self._angle = self._describe()
@@ -70,14 +70,14 @@ class HalfChordUnit(PipelinedUnit):
     def datapath(self, m, operands):
         """Describe the registers of the graph."""
         angle = self._graph.build(m, self, operands)(self._angle, self.latency)
-        return FixedValue(self.parameters.RESULT_FORMAT, angle)
+        return FixedValue(self.model.RESULT_FORMAT, angle)
 
     def _describe(self) -> Word:
         """Word of the result."""
         g = self._graph
         chord = g.input("chord_squared", lambda operands: operands.chord_squared)
         supplement = g.input("supplement", lambda operands: operands.supplement)
-        return half_chord_words(g, self.parameters, chord, supplement, *normalised_words(g, chord))
+        return half_chord_words(g, self.model, chord, supplement, *normalised_words(g, chord))
 
 
 def normalised_words(graph: Dataflow, chord_squared: Word) -> tuple[Word, Word]:

@@ -40,7 +40,7 @@ class HighlightCosineUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : HighlightCosine
+    model : HighlightCosine
         Bit-accurate model, with the table.
 
     Members
@@ -60,8 +60,8 @@ class HighlightCosineUnit(wiring.Component):
         "term_10": "v·β",
     }
 
-    def __init__(self, parameters: HighlightCosine | None = None):
-        self.parameters = parameters or HighlightCosine()
+    def __init__(self, model: HighlightCosine | None = None):
+        self.model = model or HighlightCosine()
         super().__init__(
             {
                 "i": In(stream.Signature(highlight_shape())),
@@ -94,7 +94,7 @@ class HighlightCosineUnit(wiring.Component):
 
     def _wave(self, m, theta, cos_beta):
         """Registers of the stages 2 to 12."""
-        p, register = self.parameters, PipelinedUnit.register
+        p, register = self.model, PipelinedUnit.register
         carried = {"beta": cos_beta}
 
         def carry(stage):

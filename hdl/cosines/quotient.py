@@ -37,18 +37,18 @@ def pixel_words_shape(spans: QuotientSpans) -> data.StructLayout:
     return data.StructLayout(members)
 
 
-def quotients_shape(parameters: Quotient) -> data.StructLayout:
+def quotients_shape(model: Quotient) -> data.StructLayout:
     """Shape of N·L and a place for each light, of ``out_of_range``, and of the bit that passes.
 
     Parameters
     ----------
-    parameters : Quotient
+    model : Quotient
         Formats.
     """
-    light = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
-    if parameters.spans.highlights:
-        light["highlight"] = FixedShape(parameters.place_format)
-    lights = data.ArrayLayout(data.StructLayout(light), parameters.spans.lights)
+    light = {"cosine": FixedShape(model.COSINE_FORMAT)}
+    if model.spans.highlights:
+        light["highlight"] = FixedShape(model.place_format)
+    lights = data.ArrayLayout(data.StructLayout(light), model.spans.lights)
     return data.StructLayout({"lights": lights, "out_of_range": 1, "span": 1})
 
 
@@ -66,23 +66,23 @@ class QuotientUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Quotient
+    model : Quotient
         Bit-accurate model.
     initiation_interval : int
         Cycles from an input to the next, at least 1.
 
     Members
     -------
-    i : :py:`In(stream.Signature(pixel_words_shape(parameters.spans)))`
+    i : :py:`In(stream.Signature(pixel_words_shape(model.spans)))`
         Words of a pixel.
-    o : :py:`Out(stream.Signature(quotients_shape(parameters)))`
+    o : :py:`Out(stream.Signature(quotients_shape(model)))`
         Operands of each light. ``out_of_range``: q is too small, and they are invalid.
 
     Source: docs/theory/quotient.md#pixel.
     """
 
-    def __init__(self, parameters: Quotient | None = None, initiation_interval: int = 1):
-        self.parameters = p = parameters or Quotient()
+    def __init__(self, model: Quotient | None = None, initiation_interval: int = 1):
+        self.model = p = model or Quotient()
         self._graph = Dataflow(initiation_interval, memories=True)
         self._results = self._describe()
         super().__init__(
@@ -99,7 +99,7 @@ class QuotientUnit(PipelinedUnit):
         m.d.comb += [result.span.eq(at(self._results["span"], self.latency))]
         m.d.comb += result.out_of_range.eq(at(self._results["out_of_range"], self.latency))
         for light, found in enumerate(result.lights):
-            for name in ("cosine", "highlight")[: 1 + self.parameters.spans.highlights]:
+            for name in ("cosine", "highlight")[: 1 + self.model.spans.highlights]:
                 m.d.comb += found[name].eq(at(self._results[f"{name}_{light}"], self.latency))
         return result
 
@@ -113,7 +113,7 @@ class QuotientUnit(PipelinedUnit):
 
     def _describe(self) -> dict[str, Word]:
         """Words from those of a pixel to the results."""
-        p, g, spans = self.parameters, self._graph, self.parameters.spans
+        p, g, spans = self.model, self._graph, self.model.spans
         rest = g.input("rest", lambda operands: operands.rest, "w")
         span = g.input("span", lambda operands: operands.span)
         numerators = [
@@ -173,7 +173,7 @@ class QuotientUnit(PipelinedUnit):
 
     def _root(self, normal: Word) -> Word:
         """Word of r, from that of q shifted."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
         bits = p.BASE_FORMAT.width + p.SLOPE_FORMAT.width
         fraction_bits = 21 - p.TABLE_BITS
         base, slope = (word.codes for word in p.table)
@@ -199,7 +199,7 @@ class QuotientUnit(PipelinedUnit):
 
     def _compare(self, light: int, numerators: list[Word], rest: Word) -> tuple[Word, Word | None]:
         """The smaller of m and w of a light, and whether it is w; of R·V it is m."""
-        p, g, mirror = self.parameters, self._graph, self.parameters.spans.mirror
+        p, g, mirror = self.model, self._graph, self.model.spans.mirror
         numerator, name = numerators[light], f"{light}"
         cut, width = p.PIXEL_FRACTION, p.PIXEL_FRACTION + 2
         if light:
@@ -241,7 +241,7 @@ class QuotientUnit(PipelinedUnit):
 
     def _place(self, light: int, chosen: Word, shift: Word, square_root: Word, marks: list[Word]) -> Word:
         """Word of the place of a light; marks: the part, and ``z < 0``, but for R·V."""
-        p, g, mirror = self.parameters, self._graph, self.parameters.spans.mirror
+        p, g, mirror = self.model, self._graph, self.model.spans.mirror
         width, name = p.PIXEL_FRACTION + 2, f"{light}"
 
         def group_of(chosen):

@@ -18,26 +18,26 @@ from blysk.hdl.cosines.quotient import pixel_words_shape
 __all__ = ["QuotientSpansUnit", "line_directions_shape", "vectors_shape"]
 
 
-def vectors_shape(parameters: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
+def vectors_shape(model: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
     """Shape of a span: components at the first pixel, their step, its exponent, and the length.
 
     Parameters
     ----------
-    parameters : QuotientSpans
+    model : QuotientSpans
         Which components there are.
     length_bits : int
         Bits of the length.
     """
-    vector = data.ArrayLayout(FixedShape(parameters.COMPONENT_FORMAT), len(parameters.components))
-    exponent = unsigned(parameters.EXPONENT_FORMAT.width)
+    vector = data.ArrayLayout(FixedShape(model.COMPONENT_FORMAT), len(model.components))
+    exponent = unsigned(model.EXPONENT_FORMAT.width)
     return data.StructLayout(
         {"start": vector, "step": vector, "exponent": exponent, "length": unsigned(length_bits)}
     )
 
 
-def line_directions_shape(parameters: QuotientSpans) -> data.ArrayLayout:
+def line_directions_shape(model: QuotientSpans) -> data.ArrayLayout:
     """Shape of ``sin a`` and ``cos a`` of each light."""
-    return data.ArrayLayout(data.ArrayLayout(FixedShape(parameters.COMPONENT_FORMAT), 2), parameters.lights)
+    return data.ArrayLayout(data.ArrayLayout(FixedShape(model.COMPONENT_FORMAT), 2), model.lights)
 
 
 class QuotientSpansUnit(wiring.Component):
@@ -65,7 +65,7 @@ class QuotientSpansUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : QuotientSpans
+    model : QuotientSpans
         Bit-accurate model.
     length_bits : int
         Bits of the length.
@@ -74,12 +74,12 @@ class QuotientSpansUnit(wiring.Component):
 
     Members
     -------
-    i : :py:`In(stream.Signature(vectors_shape(parameters, length_bits)))`
+    i : :py:`In(stream.Signature(vectors_shape(model, length_bits)))`
         Spans of length 1 or more. A span is accepted with its last turn: one of two pixels or more waits.
         Payload and constants have to stay from the first cycle on which it is valid; valid may fall.
-    o : :py:`Out(stream.Signature(pixel_words_shape(parameters)))`
+    o : :py:`Out(stream.Signature(pixel_words_shape(model)))`
         Words of pixels, and a bit that alternates from span to span, 1 in the first.
-    constants : :py:`In(line_directions_shape(parameters))`
+    constants : :py:`In(line_directions_shape(model))`
         ``sin a`` and ``cos a`` of each light, constant while spans are inside; only with highlights.
     begun : :py:`Out(1)`
         Whether words of the span that is offered were taken already.
@@ -95,11 +95,11 @@ class QuotientSpansUnit(wiring.Component):
 
     def __init__(
         self,
-        parameters: QuotientSpans | None = None,
+        model: QuotientSpans | None = None,
         length_bits: int = LENGTH_BITS,
         serial: bool = False,
     ):
-        self.parameters = p = parameters or QuotientSpans()
+        self.model = p = model or QuotientSpans()
         self.length_bits, self.serial = length_bits, serial
         self.latency = self._SHIFTED + (1 if serial else 2)
         self.short_latency = self.latency if serial else self._SUMS + HEADED_FIFO_LATENCY + 1
@@ -116,13 +116,13 @@ class QuotientSpansUnit(wiring.Component):
     @property
     def _products(self) -> int:
         """Products of a turn of the serial setup; without highlights those of lines are with a constant."""
-        p = self.parameters
+        p = self.model
         return sum(len(names) for names in p.squares) + p.lights * (2 if p.highlights else 1)
 
     @property
     def multipliers(self) -> int:
         """Number of multipliers."""
-        p = self.parameters
+        p = self.model
         return 1 if self.serial else self._products - p.lights * (not p.highlights)
 
     @property
@@ -133,7 +133,7 @@ class QuotientSpansUnit(wiring.Component):
     def elaborate(self, platform):
         """Turns of the setup; the accumulators, and which words they take."""
         m = Module()
-        p, pixel = self.parameters, self.o.payload
+        p, pixel = self.model, self.o.payload
         # Registers of differences that wait, and the FIFO of starts.
         waiting = data.StructLayout(
             {
@@ -204,7 +204,7 @@ class QuotientSpansUnit(wiring.Component):
 
     def _start_shape(self) -> data.StructLayout:
         """Shape of a start: sums without the fraction bits of differences, z, and the length."""
-        p = self.parameters
+        p = self.model
         free = p.square_format.fraction_bits - 34
         members = {
             "squares": data.ArrayLayout(unsigned(p.square_format.width - free), len(p.squares)),
@@ -219,7 +219,7 @@ class QuotientSpansUnit(wiring.Component):
 
     def _set_up(self, m: Module, second, first, start: stream.Interface) -> None:
         """Turns, products, sums and shifts, up to the registers of differences and the memory of starts."""
-        p, span, moves = self.parameters, self.i.payload, Signal(name="moves")
+        p, span, moves = self.model, self.i.payload, Signal(name="moves")
         place = {name: index for index, name in enumerate(p.components)}
         # The turns are starts, second differences, first ones. Registers tell the first and the second turn:
         # they drive the multiplexers of all operands.
@@ -315,7 +315,7 @@ class QuotientSpansUnit(wiring.Component):
 
         A turn begins while no words of its kind are inside, so that nothing behind the multiplier waits.
         """
-        p, span = self.parameters, self.i.payload
+        p, span = self.model, self.i.payload
         place = {name: index for index, name in enumerate(p.components)}
         begin, change = (
             {name: vector[at].as_value() for name, at in place.items()} for vector in (span.start, span.step)
@@ -404,7 +404,7 @@ class QuotientSpansUnit(wiring.Component):
 
         Second differences are accompanied by z, times 2^16, where it is taken.
         """
-        p = self.parameters
+        p = self.model
         if not p.highlights:
             return [(f"z{light}", Const(p.ONE, signed(18)), None) for light in range(p.lights)]
         pairs = [zip("xz", self.constants[light], (0, 1 << 16), strict=True) for light in range(p.lights)]
@@ -423,7 +423,7 @@ class QuotientSpansUnit(wiring.Component):
         self, register: Callable, product: Callable, light: int, b: dict[str, Value], is_second
     ) -> Value:
         """Sum of the products of l; with the second differences z, times 2^16, where it is taken."""
-        p = self.parameters
+        p = self.model
         if not p.highlights:
             height = b[f"z{light}"]
             scaled = register(register((height << 17) - (height << 1), f"scaled_{light}"), f"late_{light}")
@@ -483,7 +483,7 @@ class QuotientSpansUnit(wiring.Component):
 
     def _height(self, m: Module, light: int, advance: Value, takes: Any, given: Any) -> Value:
         """Sign of z of a light."""
-        p, (step, start) = self.parameters, given
+        p, (step, start) = self.model, given
         width = p.HEIGHT_FORMAT.width
         names = ("height", "height_step", "next_height_step")
         height, current, following = (

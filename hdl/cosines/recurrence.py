@@ -36,7 +36,7 @@ class RecurrenceUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Recurrence
+    model : Recurrence
         Bit-accurate model: form and formats.
 
     Members
@@ -61,8 +61,8 @@ class RecurrenceUnit(wiring.Component):
         r"(\w+)_x": "x",
     }
 
-    def __init__(self, parameters: Recurrence | None = None):
-        self.parameters = p = parameters or Recurrence()
+    def __init__(self, model: Recurrence | None = None):
+        self.model = p = model or Recurrence()
         self.cycles_per_pixel = 1 if p.interleave > 1 else {"reinsch": 4, "direct": 3}[p.form]
         word = FixedShape(p.state_format)
         if p.interleave > 1:
@@ -83,7 +83,7 @@ class RecurrenceUnit(wiring.Component):
     def elaborate(self, platform):
         """Describe counters, coefficient, the loop of each cosine, and registers that round and saturate."""
         m = Module()
-        p, span = self.parameters, self.i.payload
+        p, span = self.model, self.i.payload
         active, after, phase = Signal(), Signal(p.LENGTH_BITS), Signal(range(self.cycles_per_pixel))
         is_first = Signal()
         rounded_valid, rounded_last, valid = Signal(), Signal(), Signal()
@@ -141,7 +141,7 @@ class RecurrenceUnit(wiring.Component):
 
     def _start(self, m, name, load):
         """First and second value of the next phase: from the input, then from registers that hold them."""
-        p, payload = self.parameters, self.i.payload[name]
+        p, payload = self.model, self.i.payload[name]
         if p.interleave == 1:
             return payload.first, payload.second
         words = []
@@ -160,14 +160,14 @@ class RecurrenceUnit(wiring.Component):
 
     def _delayed(self, m, value, cycles, name):
         """A value some cycles later; if not interleaved, the value itself, constant during its pixel."""
-        if self.parameters.interleave > 1:
+        if self.model.interleave > 1:
             for k in range(cycles):
                 value = PipelinedUnit.register(m, value, f"{name}_delayed_{k}")
         return value
 
     def _reinsch(self, m, name, start, starts, ends, is_first, coefficient, shift):
         """Loop of ``D -= K 2^(2-s) x; x += D``; the sum of x and the old D does not wait for the product."""
-        p = self.parameters
+        p = self.model
         first, second = start
         state = p.state_format
         x, difference, total = (
@@ -200,7 +200,7 @@ class RecurrenceUnit(wiring.Component):
 
     def _direct(self, m, name, start, starts, ends, is_first, coefficient):
         """Loop of ``x(k+1) = -(-2 cos d) x(k) - x(k-1)``; ``other`` is x(k-1), at the first pixel x(1)."""
-        p = self.parameters
+        p = self.model
         first, second = start
         state = p.state_format
         x, other = (Signal(FixedShape(state), name=f"{name}_{word}") for word in ("x", "other"))

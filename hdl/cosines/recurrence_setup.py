@@ -18,9 +18,9 @@ __all__ = ["RecurrenceSetupUnit", "recurrence_starts_shape"]
 _SHIFT_BITS = 6
 
 
-def recurrence_starts_shape(parameters: RecurrenceSetup, lights: int) -> data.StructLayout:
+def recurrence_starts_shape(model: RecurrenceSetup, lights: int) -> data.StructLayout:
     """Shape of a prepared span: start values for L and H of each light; coefficient, shift; length; flag."""
-    r = parameters.recurrence
+    r = model.recurrence
     words = data.ArrayLayout(FixedShape(r.state_format), r.interleave)
     start = data.StructLayout(dict.fromkeys(("first", "second"), words))
     members = {
@@ -55,7 +55,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : RecurrenceSetup
+    model : RecurrenceSetup
         Bit-accurate model.
     lights : int
         Number of lights, 1 or more.
@@ -71,7 +71,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
     -------
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Spans of length 1 to 4095.
-    o : :py:`Out(stream.Signature(recurrence_starts_shape(parameters, lights)))`
+    o : :py:`Out(stream.Signature(recurrence_starts_shape(model, lights)))`
         Start values; K of a step of four pixels and its shift; the length; ``out_of_range``: the span is
         over 90 degrees, and its words are invalid.
     constants : :py:`In(light_vectors_shape(lights))`
@@ -81,9 +81,9 @@ class RecurrenceSetupUnit(PipelinedUnit):
     """
 
     def __init__(
-        self, parameters: RecurrenceSetup | None = None, lights: int = 1, *, initiation_interval: int = 4
+        self, model: RecurrenceSetup | None = None, lights: int = 1, *, initiation_interval: int = 4
     ):
-        self.parameters = p = parameters or RecurrenceSetup()
+        self.model = p = model or RecurrenceSetup()
         self.lights = lights
         self._graph = g = Dataflow(initiation_interval)
         self._shifted = p.steps.curvature_format
@@ -114,7 +114,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _describe(self) -> dict:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         left, right = (
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right")
@@ -183,7 +183,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         self, q_square: Word, exponent: Word
     ) -> tuple[Word, tuple[Word, Word], tuple[Word, Word]]:
         """Words of ``1 - sin d/d``, and K with its shift, first for a step d, then for 4d."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         bits = g.register(
             "step_coarse",
             lambda word, e: Cat(Const(0, 11), Value.cast(word)) >> Cat(Const(0, 3), e[3:]),
@@ -206,7 +206,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _rho(self, inverse: Word, sine: Word, reciprocal: Word, step_shift: Word) -> tuple[Word, Word]:
         """Word of rho and its shift."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         product = g.multiply("excess_product", inverse, sine)
         excess = g.register("excess_difference", lambda a, b: a - b, inverse, sine)
         excess = g.register("excess_exact", lambda a, product: a - product, excess, product)
@@ -227,7 +227,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         step_k, step_s : Word
             K of a step d, and its shift.
         """
-        g, r = self._graph, self.parameters.steps
+        g, r = self._graph, self.model.steps
         state, half = r.state_format, self._half_step
         x = {
             key: [g.register(f"{_name(key)}_x_0", lambda a: (a.extend(state) + half).wrap(state), first)]
@@ -267,8 +267,8 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _starts(self, states: dict) -> dict:
         """Words of the start values, by light, function, ``first`` or ``second``, and phase."""
-        g, r, half = self._graph, self.parameters.recurrence, self._half_step
-        state, results = self.parameters.steps.state_format, {}
+        g, r, half = self._graph, self.model.recurrence, self._half_step
+        state, results = self.model.steps.state_format, {}
         for key, words in states.items():
             for j in range(r.interleave):
                 name = f"{_name(key)}_start_{j}"
@@ -290,17 +290,17 @@ class RecurrenceSetupUnit(PipelinedUnit):
     @property
     def _half_step(self) -> FixedValue:
         """Half a step of the recurrence's operand."""
-        r = self.parameters.steps
+        r = self.model.steps
         return FixedValue.constant(r.state_format, 2.0 ** -(r.fraction_bits + 1))
 
     def _short(self, name, word) -> Word:
         """Word of a value of ``direct``; the half step that the operand has rounds it."""
-        format = self.parameters.recurrence.state_format
+        format = self.model.recurrence.state_format
         return self._graph.register(name, lambda x: x.truncate(format.fraction_bits), word)
 
     def _cosine_coefficient(self, coefficient, shift) -> Word:
         """Word of ``-2 cos 4d`` from K, rounded up."""
-        g, format = self._graph, self.parameters.recurrence.coefficient_format
+        g, format = self._graph, self.model.recurrence.coefficient_format
         code = g.register(
             "cosine_negative",
             lambda k, s: (-(Value.cast(k) << 1)) >> Cat(Const(0, 3), s[3:]),
@@ -317,14 +317,14 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _cosine(self, name, normal, vector) -> Word:
         """Word of a dot product in units of `ONE_SQUARED`."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         total = dot(g, name, normal, vector)
         total = g.register(f"{name}_unit", lambda v: v + v.scale(-16).truncate(34), total)
         return g.register(name, lambda v: v.saturate(p.COSINE_FORMAT), total)
 
     def _slope(self, name, ends, q, q_shift) -> Word:
         """Word of ``b - a + a q``."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         left, right = ends
         operand = g.register(f"{name}_rounded", lambda a: a.round_half_up(16), left)
         operand = g.register(f"{name}_operand", lambda a: a.saturate(p.OPERAND_FORMAT), operand)
@@ -340,7 +340,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _rho_slope(self, name, slope, rho, rho_shift) -> Word:
         """Word of ``rho (b - a + a q)``."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         low_bits = p.SLOPE_LOW_FORMAT.width
         high = g.multiply(
             f"{name}_high", slope, rho, lambda v: FixedValue(p.OPERAND_FORMAT, Value.cast(v)[low_bits:])
@@ -363,7 +363,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _normalised(self, chord: Word) -> tuple[Word, Word]:
         """Word in [1/2, 1), or 0, and its left shift."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
 
         def shift_of(chord):
             code, shift = Value.cast(chord), Const(p.CHORD_SHIFT, _SHIFT_BITS)
@@ -389,7 +389,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _word(self, name, value) -> Word:
         """Word of a value rounded to 17 bits and saturated under 1."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         rounded = g.register(f"{name}_rounded", lambda v: v.round_half_up(17), value)
         return g.register(name, lambda v: v.saturate(p.WORD_FORMAT), rounded)
 
@@ -406,7 +406,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _looked_up(self, name, tables, bits) -> list[Word]:
         """Words of the interpolated values of tables at an operand."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         value_bits, change_bits = p.TABLE_VALUE_FORMAT.width, p.TABLE_CHANGE_FORMAT.width
         width = value_bits + change_bits
         words = [
@@ -450,7 +450,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     def _steps(self, length: Word) -> tuple[Word, Word, Word, Word]:
         """Words of ``1/(m-1)`` and its square, and their shifts: six cycles."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         top, bits = LENGTH_BITS - 1, p.WORD_FORMAT.width
 
         def leading(steps):

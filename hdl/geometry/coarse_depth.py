@@ -8,7 +8,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.coarse_depth import CoarseDepth
-from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.hdl.core.fixed import FixedShape
@@ -42,7 +42,7 @@ class CoarseDepthUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : CoarseDepth
+    model : CoarseDepth
         Bit-accurate model.
     x_bits, y_bits : int
         Bits of a column, or a length, and of a scanline.
@@ -67,13 +67,13 @@ class CoarseDepthUnit(wiring.Component):
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
 
-    def __init__(self, parameters: CoarseDepth, x_bits: int = 12, y_bits: int = 12):
-        if (parameters.width - 1) >> x_bits or (parameters.height - 1) >> y_bits:
+    def __init__(self, model: CoarseDepth, x_bits: int = 12, y_bits: int = 12):
+        if (model.width - 1) >> x_bits or (model.height - 1) >> y_bits:
             raise ValueError(
-                f"a picture of {parameters.width}x{parameters.height} has places of more than {x_bits} and "
+                f"a picture of {model.width}x{model.height} has places of more than {x_bits} and "
                 f"{y_bits} bits"
             )
-        self.parameters, self.x_bits, self.y_bits = parameters, x_bits, y_bits
+        self.model, self.x_bits, self.y_bits = model, x_bits, y_bits
         super().__init__(
             {
                 "i": In(stream.Signature(deep_span_shape(x_bits, y_bits))),
@@ -85,7 +85,7 @@ class CoarseDepthUnit(wiring.Component):
     def elaborate(self, platform):
         """Blocks of a span; depths at both ends of each; the memory's word; comparison; the write."""
         m = Module()
-        given, bits = self.parameters, self.parameters.block.bit_length() - 1
+        given, bits = self.model, self.model.block.bit_length() - 1
         valid, answer, advance = Signal(name="valid"), Signal(name="answer"), Signal(name="advance")
         m.d.comb += advance.eq(skid_buffer(m, self.o, valid, answer))
         word = data.StructLayout(
@@ -153,7 +153,7 @@ class CoarseDepthUnit(wiring.Component):
 
     def _pictures(self, m: Module, tag: Signal, empty: Signal) -> tuple:
         """The span taken in, and whether it must wait for its picture; the words that are cleared."""
-        given = self.parameters
+        given = self.model
         shape = {"x": self.x_bits, "last": self.x_bits, "line": range(given.blocks), "picture": 1}
         shape |= {"depth": SPAN_DEPTH.width, "step": DEPTH_STEP.width, "outside": 1}
         span = Signal(data.StructLayout(shape), name="span", reset_less=True)
@@ -179,7 +179,7 @@ class CoarseDepthUnit(wiring.Component):
 
     def _blocks(self, m: Module, bits: int, advance: Signal, given_span: tuple) -> tuple[data.View, Value]:
         """Spans split into blocks, one a cycle; also whether a block is there or will follow."""
-        given, incoming = self.parameters, self.i.payload
+        given, incoming = self.model, self.i.payload
         span, span_valid, held = given_span
         step = {"step": DEPTH_STEP.width, "outside": 1}
         ends = {"first": bits, "last": bits, "border": 1, "left": self.x_bits - bits}
@@ -241,7 +241,7 @@ class CoarseDepthUnit(wiring.Component):
 
     def _bounds(self, m: Module, bits: int, advance: Signal, block: data.View) -> tuple[data.View, ...]:
         """Three stages: depth changes to both ends of a part; depths there; the least and the largest."""
-        given, last = self.parameters, self.parameters.block - 1
+        given, last = self.model, self.model.block - 1
         common = {"valid": 1, "begins": 1, "ends": 1, "place": range(given.blocks), "mask": given.block}
         copied = ("valid", "begins", "ends", "place", "depth", "outside")
         both = dict.fromkeys(("near", "far"), _SUM_BITS)
@@ -274,10 +274,10 @@ class CoarseDepthUnit(wiring.Component):
         return steps, ends, bound
 
     def _upper(self, code: Value) -> Value:
-        """Upper bits of a depth, which saturates to 0 and to `DepthTest.FARTHEST`."""
-        depth, farthest = code.as_signed() >> SPAN_DEPTH.fraction_bits, DepthTest.FARTHEST
+        """Upper bits of a depth, which saturates to 0 and to `DepthTester.FARTHEST`."""
+        depth, farthest = code.as_signed() >> SPAN_DEPTH.fraction_bits, DepthTester.FARTHEST
         inside = Mux(depth < 0, 0, Mux(depth > farthest, farthest, depth))
-        return inside[DEPTH.width - self.parameters.depth_bits : DEPTH.width]
+        return inside[DEPTH.width - self.model.depth_bits : DEPTH.width]
 
 
 def _times(value: ValueLike, count: Value) -> Value:

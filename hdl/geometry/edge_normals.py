@@ -35,7 +35,7 @@ class EdgeNormalsUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : EdgeNormals
+    model : EdgeNormals
         Bit-accurate model.
     compact : bool
         The compact style.
@@ -54,9 +54,9 @@ class EdgeNormalsUnit(wiring.Component):
 
     COMPACT_INTERVAL = 3
 
-    def __init__(self, parameters: EdgeNormals | None = None, compact: bool = False):
-        self.parameters, self.compact = parameters or EdgeNormals(), compact
-        given = self.parameters.normaliser
+    def __init__(self, model: EdgeNormals | None = None, compact: bool = False):
+        self.model, self.compact = model or EdgeNormals(), compact
+        given = self.model.normaliser
         self._normaliser = (
             SharedVectorNormaliserUnit(given, self.COMPACT_INTERVAL)
             if compact

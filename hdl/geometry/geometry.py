@@ -179,7 +179,7 @@ class GeometryUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Geometry
+    model : Geometry
         Bit-accurate model: grid, and what spans have.
     build : Build
         Style of the geometry, and ``setups``: the number of lanes, from the edges to the planes, that
@@ -204,11 +204,11 @@ class GeometryUnit(wiring.Component):
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: Geometry | None = None, build: Build | None = None):
-        self.parameters, build = parameters or Geometry(), build or Build(top="geometry")
-        self.grid, self.compact = self.parameters.grid, build.compact_geometry
-        self.lines, self.vectors = self.parameters.lines, self.parameters.vectors
-        self.rotates = self.parameters.rotates
+    def __init__(self, model: Geometry | None = None, build: Build | None = None):
+        self.model, build = model or Geometry(), build or Build(top="geometry")
+        self.grid, self.compact = self.model.grid, build.compact_geometry
+        self.lines, self.vectors = self.model.lines, self.model.vectors
+        self.rotates = self.model.rotates
         grid, compact, lines, vectors = self.grid, self.compact, self.lines, self.vectors
         self._sort = VertexSortUnit(grid, compact)
         self._lanes = [_TriangleSetup(grid, compact, not (lines or vectors)) for _ in range(build.setups)]

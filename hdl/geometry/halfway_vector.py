@@ -19,7 +19,7 @@ class HalfwayVectorUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : HalfwayVector
+    model : HalfwayVector
         Bit-accurate model.
 
     Members
@@ -32,9 +32,9 @@ class HalfwayVectorUnit(wiring.Component):
     Source: docs/theory/geometry.md#half-way-vector; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: HalfwayVector | None = None):
-        self.parameters = parameters or HalfwayVector()
-        self._normaliser = VectorNormaliserUnit(self.parameters.normaliser)
+    def __init__(self, model: HalfwayVector | None = None):
+        self.model = model or HalfwayVector()
+        self._normaliser = VectorNormaliserUnit(self.model.normaliser)
         self.latency = self._normaliser.latency
         given = data.StructLayout({"light": normal_shape(), "viewer": normal_shape()})
         made = data.StructLayout({"halfway": normal_shape(), "opposite": unsigned(1)})

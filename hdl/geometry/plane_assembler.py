@@ -48,7 +48,7 @@ class PlaneAssemblerUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : PlaneAssembler
+    model : PlaneAssembler
         Bit-accurate model.
     serial : bool
         Whether attributes are offered one by one.
@@ -65,8 +65,8 @@ class PlaneAssemblerUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, parameters: PlaneAssembler | None = None, serial: bool = False):
-        self.parameters, self.serial = parameters or PlaneAssembler(), serial
+    def __init__(self, model: PlaneAssembler | None = None, serial: bool = False):
+        self.model, self.serial = model or PlaneAssembler(), serial
         super().__init__(
             {
                 "i": In(stream.Signature(gradient_shape())),
@@ -91,7 +91,7 @@ class PlaneAssemblerUnit(wiring.Component):
                     word.eq(other)
                     for word, other in zip(words, [*words[1:], Value.cast(gradient[name])], strict=True)
                 ]
-        if self.parameters.cuts:
+        if self.model.cuts:
             allowed, multiplied = self._allowed(m, accept & (count == 0), gradient.least)
             found = self._search(m, accept, count, gradient.size, allowed, multiplied, result.piece)
         else:

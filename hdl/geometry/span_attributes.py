@@ -127,7 +127,7 @@ class SpanAttributesUnit(wiring.Component):
         first, drawn = Signal(name="first", init=1), Signal(name="drawn")
         busy, accept, loads = (Signal(name=name) for name in ("busy", "accept", "loads"))
         mask, tag = Signal(PIXEL_BITS, name="whole_piece"), Signal(_tag_shape(), name="tag")
-        pace = _Pace(m, self.i, busy, self.serial, not self.whole)
+        pace = _AttributeTurns(m, self.i, busy, self.serial, not self.whole)
         m.d.comb += [accept.eq(pace.accepts), loads.eq(accept & row.covered)]
         with m.If(pace.goes & pace.loads):
             m.d.sync += [tag[name].eq(row[name]) for name in ("y", "right", "flip", "material")]
@@ -136,7 +136,7 @@ class SpanAttributesUnit(wiring.Component):
         most = Mux(first, _mask(planes.piece), mask)
         if self.whole:
             most = mask = Const((1 << PIXEL_BITS) - 1)
-        along = _Along(m, row, tag, most, mask, loads, busy, pace)
+        along = _ScanlineWalk(m, row, tag, most, mask, loads, busy, pace)
         with m.If(pace.goes & pace.takes):
             m.d.sync += [first.eq(row.last), drawn.eq(row.covered | (drawn & ~first))]
             if not self.whole:
@@ -215,7 +215,7 @@ class SpanAttributesUnit(wiring.Component):
     def _down(m: Module, k: int, accept, first, carry, plane, pace) -> tuple[Value, Value]:
         """An attribute's value at the long edge's pixel, and its step along a scanline."""
         short, long, inward, edge = (
-            _Kept(m, f"{name}_{k}", pace) for name in ("short", "long", "inward", "edge")
+            _AttributeRing(m, f"{name}_{k}", pace) for name in ("short", "long", "inward", "edge")
         )
         steps = [
             Mux(first, _code(plane[name]), kept.value) for name, kept in (("short", short), ("long", long))
@@ -266,7 +266,7 @@ class SpanAttributesUnit(wiring.Component):
         ]
 
 
-class _Pace:
+class _AttributeTurns:
     """Control of the attributes' turns: all attributes on one cycle, or *serial* one a cycle, four in all.
 
     In the serial form the first attribute decides whether a scanline comes in, for all four, and the control
@@ -323,13 +323,14 @@ class _Pace:
         return register
 
 
-class _Kept:
+class _AttributeRing:
     """A register of one attribute; *serial* a ring with a word of each attribute, moved on by every step.
 
-    A *late* word is replaced one step later, on its way round the ring, by values from `_Pace.late`.
+    A *late* word is replaced one step later, on its way round the ring, by values from
+    `_AttributeTurns.late`.
     """
 
-    def __init__(self, m: Module, name: str, pace: _Pace, late: bool = False):
+    def __init__(self, m: Module, name: str, pace: _AttributeTurns, late: bool = False):
         self.value = self._next = Signal(_BITS, name=name)
         self._domain = "sync"
         if pace.serial:
@@ -347,7 +348,7 @@ class _Kept:
         m.d[self._domain] += self._next.eq(value)
 
 
-class _Along:
+class _ScanlineWalk:
     """Control of the walk along a scanline: first pixels to skip, then pieces, one or two bits a step."""
 
     def __init__(self, m: Module, row, tag, most: Value, mask: Signal, loads: Signal, busy: Signal, pace):
@@ -437,8 +438,10 @@ class _Along:
     def values(self, m: Module, name: str, loads, base, inward, kept) -> tuple[Value, Value]:
         """Values of an attribute at the piece's ends; its step is ``inward`` on loading, ``kept`` later."""
         # Chosen behind registers: the sums take a whole cycle.
-        nears, totals = (_Kept(m, f"{name}_{word}", self.pace, late=True) for word in ("near", "total"))
-        steps = _Kept(m, f"{name}_step", self.pace)
+        nears, totals = (
+            _AttributeRing(m, f"{name}_{word}", self.pace, late=True) for word in ("near", "total")
+        )
+        steps = _AttributeRing(m, f"{name}_step", self.pace)
         near, total, step = nears.value, totals.value, steps.value
         far = (total + sum(Mux(bit, step << k, 0) for k, bit in enumerate(self.digit)))[:_BITS]
         whole = Mux(self.single, step, Mux(self.double, step << 2, step << 1))

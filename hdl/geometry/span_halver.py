@@ -39,7 +39,7 @@ class SpanHalverUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : SpanHalver
+    model : SpanHalver
         Bit-accurate model.
 
     Members
@@ -62,8 +62,8 @@ class SpanHalverUnit(wiring.Component):
 
     latency = 1
 
-    def __init__(self, parameters: SpanHalver | None = None):
-        self.parameters = parameters or SpanHalver()
+    def __init__(self, model: SpanHalver | None = None):
+        self.model = model or SpanHalver()
         super().__init__(
             {
                 "i": In(stream.Signature(whole_spans_shape())),
@@ -230,7 +230,7 @@ class SpanHalverUnit(wiring.Component):
             long = long | (keeps & same[j] & sums[0] & sums[1])
         large = [first[k][-1] | last[k][-1] for k in range(len(same))]
         steep = Cat(~keeps & size for keeps, size in zip(same, large, strict=True)).any()
-        if self.parameters.rotates:
+        if self.model.rotates:
             steep = Cat(is_apart(*words) for words in zip(same, first, last, strict=True)).any()
         return is_kept(pixels, long, Cat(large).any(), steep)
 

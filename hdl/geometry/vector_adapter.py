@@ -29,7 +29,7 @@ class VectorAdapterUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : VectorAdapter
+    model : VectorAdapter
         Bit-accurate model.
 
     Members
@@ -42,13 +42,13 @@ class VectorAdapterUnit(PipelinedUnit):
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
 
-    def __init__(self, parameters: VectorAdapter | None = None):
-        self.parameters = parameters or VectorAdapter()
+    def __init__(self, model: VectorAdapter | None = None):
+        self.model = model or VectorAdapter()
         super().__init__(halved_spans_shape(), vector_spans_shape(), latency=4)
 
     def datapath(self, m, operands):
         """Shared shift; margin; the step's bits and shift; sign, rounding."""
-        p, bits = self.parameters, SPAN_NORMAL.fraction_bits
+        p, bits = self.model, SPAN_NORMAL.fraction_bits
         start, step = (
             [Value.cast(operands[name][k]).as_signed() for k in range(3)] for name in ("start", "step")
         )
@@ -111,19 +111,19 @@ def exponent_of(used: Value) -> Value:
     return Cat(places)
 
 
-def _smaller(parameters: VectorAdapter, code: Value) -> Value:
+def _smaller(model: VectorAdapter, code: Value) -> Value:
     """A code with a margin to 1."""
-    return (code - (code >> parameters.margin_shift))[: len(code)].as_signed()
+    return (code - (code >> model.margin_shift))[: len(code)].as_signed()
 
 
-def shift_of(parameters: VectorAdapter, shift: Value) -> Value:
+def shift_of(model: VectorAdapter, shift: Value) -> Value:
     """Places by which a vector is shifted: one less if it is to turn, so that its length stays under 1."""
-    return (shift - shift.any())[: len(shift)] if parameters.rotates else shift
+    return (shift - shift.any())[: len(shift)] if model.rotates else shift
 
 
-def used_bits(parameters: VectorAdapter, codes: list[Value]) -> Value:
+def used_bits(model: VectorAdapter, codes: list[Value]) -> Value:
     """First bits below the sign that a code of a shifted step uses: where it differs from its sign."""
-    p, used = parameters, 0
+    p, used = model, 0
     for code in codes:
         used = used | (code[: p.STEP_BITS] ^ code[-1].replicate(p.STEP_BITS))[-p.LARGEST_EXPONENT :]
     # For other frames a place less, but for none.

@@ -20,9 +20,9 @@ from blysk.hdl.normals.dot_product import DotProductUnit
 __all__ = ["SharedVectorNormaliserUnit", "VectorNormaliserUnit", "vectors_shape"]
 
 
-def vectors_shape(parameters: VectorNormaliser) -> tuple[data.StructLayout, data.StructLayout]:
+def vectors_shape(model: VectorNormaliser) -> tuple[data.StructLayout, data.StructLayout]:
     """Shapes of a vector with the flag ``flip``, and of a unit vector with the flag ``lost``."""
-    vector = data.ArrayLayout(FixedShape(parameters.format), 3)
+    vector = data.ArrayLayout(FixedShape(model.format), 3)
     return (
         data.StructLayout({"vector": vector, "flip": unsigned(1)}),
         data.StructLayout({"normal": normal_shape(), "lost": unsigned(1)}),
@@ -39,7 +39,7 @@ class VectorNormaliserUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : VectorNormaliser
+    model : VectorNormaliser
         Bit-accurate model.
 
     Members
@@ -60,10 +60,10 @@ class VectorNormaliserUnit(PipelinedUnit):
         "f": "c_0 − c_1·u",
     }
 
-    def __init__(self, parameters: VectorNormaliser | None = None):
-        self.parameters = parameters or VectorNormaliser()
+    def __init__(self, model: VectorNormaliser | None = None):
+        self.model = model or VectorNormaliser()
         self._dot, self.multipliers = DotProductUnit(), 6
-        super().__init__(*vectors_shape(self.parameters), latency=self._dot.latency + 15)
+        super().__init__(*vectors_shape(self.model), latency=self._dot.latency + 15)
 
     def datapath(self, m, operands):
         """Shifted, squared, its factor from the table, scaled."""
@@ -95,7 +95,7 @@ class VectorNormaliserUnit(PipelinedUnit):
 
     def _shift(self, m: Module, operands) -> tuple[list[FixedValue], Value]:
         """Shifted components, rounded to 18 bits, and whether the vector is lost: at stage 4."""
-        bits = self.parameters.format.width - 1
+        bits = self.model.format.width - 1
         codes = [Value.cast(component).as_signed() for component in operands.vector]
         ones = 0
         for code in codes:
@@ -118,7 +118,7 @@ class VectorNormaliserUnit(PipelinedUnit):
 
     def _factor(self, m: Module, square: FixedValue) -> FixedValue:
         """``e`` of a squared length, 7 cycles later."""
-        p, register = self.parameters, self.register
+        p, register = self.model, self.register
         s, large = _root_place(square)
         bits = p.OFFSET_FORMAT.width - 1
         segment = register(m, s[bits:], "segment")
@@ -139,8 +139,8 @@ class VectorNormaliserUnit(PipelinedUnit):
 
     def _coefficients(self, m: Module, segment: Value) -> tuple[FixedValue, FixedValue]:
         """``c0`` and ``c1`` of the segment, two cycles later: a block RAM's output is late in its cycle."""
-        layout = _row_shape(self.parameters)
-        rows = zip(*(column.values.tolist() for column in self.parameters.coefficients), strict=True)
+        layout = _row_shape(self.model)
+        rows = zip(*(column.values.tolist() for column in self.model.coefficients), strict=True)
         rows = [dict(zip(("c0", "c1"), row, strict=True)) for row in rows]
         m.submodules.roots = table = Memory(shape=layout, depth=len(rows), init=rows)
         port = table.read_port()
@@ -158,7 +158,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : VectorNormaliser
+    model : VectorNormaliser
         Bit-accurate model.
     initiation_interval : int
         Least number of cycles from a vector to the next, at least 3.
@@ -176,22 +176,22 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, parameters: VectorNormaliser | None = None, initiation_interval: int = 4):
+    def __init__(self, model: VectorNormaliser | None = None, initiation_interval: int = 4):
         if initiation_interval < 3:
             raise ValueError(f"initiation_interval must be at least 3, not {initiation_interval}")
-        self.parameters = parameters or VectorNormaliser()
+        self.model = model or VectorNormaliser()
         self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
         super().__init__(
-            *vectors_shape(self.parameters),
+            *vectors_shape(self.model),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
         )
 
     def _describe(self) -> dict[str, Word]:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         vector, flip = (g.input(name, lambda o, name=name: o[name]) for name in ("vector", "flip"))
         places = self._places(vector)
         shifter = self._shifter()
@@ -236,7 +236,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
 
     def _places(self, vector: Word) -> Word:
         """Places of the shift, four bits, and above them whether a first bit is found with them."""
-        g, bits = self._graph, self.parameters.format.width - 1
+        g, bits = self._graph, self.model.format.width - 1
 
         def ones(v):
             codes = [Value.cast(component).as_signed() for component in v]
@@ -263,7 +263,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
 
     def _shifter(self):
         """Left by 0 to 15 places in two registers, then rounded to 18 bits in a third."""
-        width = self.parameters.format.width
+        width = self.model.format.width
 
         def shift(register, word, amount):
             coarse = register((word << Cat(Const(0, 2), amount[2:]))[:width].as_signed(), "coarse")

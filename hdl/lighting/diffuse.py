@@ -18,7 +18,7 @@ class DiffuseUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Diffuse
+    model : Diffuse
         Bit-accurate model: format of the operand.
     latency : int or None
         At least 2, or 3 where the initiation interval is over 1; ``None``: the least.
@@ -27,7 +27,7 @@ class DiffuseUnit(PipelinedUnit):
 
     Members
     -------
-    i : :py:`In(stream.Signature(parameters.operand_format))`
+    i : :py:`In(stream.Signature(model.operand_format))`
         ``N . L`` of two unit vectors.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Diffuse term.
@@ -42,12 +42,12 @@ class DiffuseUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: Diffuse | None = None,
+        model: Diffuse | None = None,
         *,
         latency: int | None = None,
         initiation_interval: int = 1,
     ):
-        self.parameters = parameters or Diffuse()
+        self.model = model or Diffuse()
         self._graph = graph = Dataflow(initiation_interval, memories=True)
         operand = graph.input("operand", lambda operand: operand)
         rounded = graph.register("rounded", lambda cosine: cosine.round_half_up(17), operand)
@@ -58,7 +58,7 @@ class DiffuseUnit(PipelinedUnit):
         if latency is not None and latency < least:
             raise ValueError(f"latency must be at least {least}, not {latency}")
         super().__init__(
-            FixedShape(self.parameters.operand_format),
+            FixedShape(self.model.operand_format),
             FixedShape(Diffuse.RESULT_FORMAT),
             latency=latency or least,
             initiation_interval=initiation_interval,

@@ -20,7 +20,7 @@ class FactorUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Factor
+    model : Factor
         Bit-accurate model.
     has_factor : bool
         Whether there is a factor.
@@ -42,8 +42,8 @@ class FactorUnit(PipelinedUnit):
         "product": "a·S",
     }
 
-    def __init__(self, parameters: Factor | None = None, *, has_factor: bool = True):
-        self.parameters = parameters or Factor()
+    def __init__(self, model: Factor | None = None, *, has_factor: bool = True):
+        self.model = model or Factor()
         self.has_factor = has_factor
         word = FixedShape(Factor.FORMAT)
         terms = dict.fromkeys(("diffuse", "specular"), word)

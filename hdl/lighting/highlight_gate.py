@@ -36,7 +36,7 @@ class HighlightGateUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : HighlightGate
+    model : HighlightGate
         Bit-accurate model: reflection model, method and width.
     lights : int
         Number of lights, at least 1.
@@ -67,14 +67,14 @@ class HighlightGateUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: HighlightGate,
+        model: HighlightGate,
         lights: int = 1,
         *,
         initiation_interval: int | None = None,
         exponent: int | None = None,
         takes_threshold: bool = False,
     ):
-        self.parameters = p = parameters
+        self.model = p = model
         if exponent is not None and not 1 <= exponent <= MAX_EXPONENT:
             raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
         if exponent is not None and takes_threshold:
@@ -100,7 +100,7 @@ class HighlightGateUnit(PipelinedUnit):
 
     def datapath(self, m, operands):
         """The PROM, addressed by the exponent, and the graph."""
-        p = self.parameters
+        p = self.model
         if self.takes_threshold:
             self._threshold = self.register(m, self.constants.threshold, "threshold")
         elif self.exponent is not None:
@@ -116,7 +116,7 @@ class HighlightGateUnit(PipelinedUnit):
 
     def _describe(self) -> Word:
         """Word of the decisions."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         f, angle = p.fraction_bits, p.angle_format
         left, right = (
             g.input(name, lambda operands, name=name: operands[name])
@@ -141,7 +141,7 @@ class HighlightGateUnit(PipelinedUnit):
         self, index: int, left: Word, right: Word, u: Word, out_of_range: Word, sums: FunctionalUnit
     ) -> Word:
         """Word of the decision for one light."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         f = p.fraction_bits
         step = FixedValue.constant(p.level_format, p.level_format.step)
         levels = []

@@ -29,20 +29,20 @@ def pixel_color_shape() -> data.StructLayout:
     return data.StructLayout({"r": unsigned(8), "g": unsigned(8), "b": unsigned(8)})
 
 
-def _kinds(parameters: Intensity) -> tuple[str, ...]:
+def _kinds(model: Intensity) -> tuple[str, ...]:
     """Kinds of terms."""
-    return ("diffuse", "specular") if parameters.has_specular else ("diffuse",)
+    return ("diffuse", "specular") if model.has_specular else ("diffuse",)
 
 
-def _term_shape(parameters: Intensity) -> data.StructLayout:
+def _term_shape(model: Intensity) -> data.StructLayout:
     """Shape of an input beat."""
-    terms = data.ArrayLayout(FixedShape(_TERM), parameters.lights)
-    return data.StructLayout(dict.fromkeys(_kinds(parameters), terms))
+    terms = data.ArrayLayout(FixedShape(_TERM), model.lights)
+    return data.StructLayout(dict.fromkeys(_kinds(model), terms))
 
 
-def _constants_shape(parameters: Intensity) -> data.StructLayout:
+def _constants_shape(model: Intensity) -> data.StructLayout:
     """Shape of the colour operands."""
-    colors = data.ArrayLayout(color_shape(), parameters.lights)
+    colors = data.ArrayLayout(color_shape(), model.lights)
     return data.StructLayout({"ambient": color_shape(), "diffuse": colors, "specular": colors})
 
 
@@ -60,7 +60,7 @@ class IntensityUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Intensity
+    model : Intensity
         Bit-accurate model: number of lights, at least 1; whether there are specular terms; channels.
 
     Members
@@ -87,8 +87,8 @@ class IntensityUnit(PipelinedUnit):
         "([rgb])": r"I_\1",
     }
 
-    def __init__(self, parameters: Intensity | None = None):
-        self.parameters = p = parameters or Intensity()
+    def __init__(self, model: Intensity | None = None):
+        self.model = p = model or Intensity()
         self.kinds = _kinds(p)
         terms = len(self.kinds) * p.lights
         super().__init__(
@@ -102,11 +102,11 @@ class IntensityUnit(PipelinedUnit):
         """Terms, products, a binary tree of sums, rounding, saturation."""
         register = self.register
         result = Signal(self.o.payload.shape())
-        channels = "rgb"[: self.parameters.channels]
+        channels = "rgb"[: self.model.channels]
         operands = register(m, operands, "terms")
         for channel, name in enumerate(channels):
             terms = []
-            for light in range(self.parameters.lights):
+            for light in range(self.model.lights):
                 for kind in self.kinds:
                     factor = register(m, operands[kind][light], f"factor_{kind}_{light}_{name}")
                     color = register(m, self.constants[kind][light][channel], f"color_{kind}_{light}_{name}")
@@ -142,7 +142,7 @@ class CompactIntensityUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Intensity
+    model : Intensity
         As for `IntensityUnit`.
 
     Attributes
@@ -163,8 +163,8 @@ class CompactIntensityUnit(wiring.Component):
         "total": "Σ of terms",
     }
 
-    def __init__(self, parameters: Intensity | None = None):
-        self.parameters = p = parameters or Intensity()
+    def __init__(self, model: Intensity | None = None):
+        self.model = p = model or Intensity()
         self.kinds = _kinds(p)
         self._terms = len(self.kinds) * p.lights
         self.initiation_interval = p.channels * self._terms
@@ -186,7 +186,7 @@ class CompactIntensityUnit(wiring.Component):
         notes = [Signal(note, name=f"note_{stage}") for stage in range(4)]
         issued, multiplied, added, rounding = notes
         valid = Signal()
-        last_channel = self.parameters.channels - 1
+        last_channel = self.model.channels - 1
         # Without reset a multiplier's own registers can take their place.
         factors = [
             Signal(FixedShape(of), name=name, reset_less=True)
@@ -256,12 +256,12 @@ class CompactIntensityUnit(wiring.Component):
             chosen.eq(left & -left),
             rest.eq(left & ~chosen),
             ends_channel.eq(~rest.any()),
-            ends_pixel.eq(ends_channel & (channel == self.parameters.channels - 1)),
+            ends_pixel.eq(ends_channel & (channel == self.model.channels - 1)),
             self.i.ready.eq(ready),
             following.eq(free),
             accept.eq(self.i.valid & self.i.ready),
         ]
-        nonzero, last_channel = Cat(Value.cast(term).any() for term in terms), self.parameters.channels - 1
+        nonzero, last_channel = Cat(Value.cast(term).any() for term in terms), self.model.channels - 1
         with m.If(accept):
             m.d.sync += [busy.eq(1), channel.eq(0), used.eq(nonzero), left.eq(nonzero)]
             m.d.comb += following.eq(_one_at_most(nonzero) if last_channel == 0 else 0)

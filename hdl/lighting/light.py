@@ -48,33 +48,31 @@ class SpecularKind(NamedTuple):
     slope_unit: Callable[[Any], wiring.Component] | None = None
 
 
-def _specular_unit(parameters: Specular, **options) -> PipelinedUnit:
-    return SpecularUnit(parameters, **options)
+def _specular_unit(model: Specular, **options) -> PipelinedUnit:
+    return SpecularUnit(model, **options)
 
 
-def _power_unit(parameters: Power, *, initiation_interval: int, **_) -> PipelinedUnit:
+def _power_unit(model: Power, *, initiation_interval: int, **_) -> PipelinedUnit:
     """Power unit: the exponent needs no preparation; sequential from an interval of 42 on."""
-    return PowerUnit(parameters, form="sequential" if initiation_interval >= 42 else "pipelined")
+    return PowerUnit(model, form="sequential" if initiation_interval >= 42 else "pipelined")
 
 
-def _lobe_unit(
-    parameters: Lobe, *, initiation_interval: int, shares_slope: bool, exponent: None
-) -> PipelinedUnit:
+def _lobe_unit(model: Lobe, *, initiation_interval: int, shares_slope: bool, exponent: None) -> PipelinedUnit:
     """Lobe unit: tables in place of an exponent, in a memory of its own or outside."""
-    tables = None if shares_slope else parameters.fixed_tables
-    return LobeUnit(parameters, initiation_interval, tables=tables, shares_memory=shares_slope)
+    tables = None if shares_slope else model.fixed_tables
+    return LobeUnit(model, initiation_interval, tables=tables, shares_memory=shares_slope)
 
 
 SPECULAR_KINDS: dict[type, SpecularKind] = {
-    Lobe: SpecularKind(_lobe_unit, lambda parameters, exponent: 1),
-    QuotientLobe: SpecularKind(_lobe_unit, lambda parameters, exponent: 1),
+    Lobe: SpecularKind(_lobe_unit, lambda model, exponent: 1),
+    QuotientLobe: SpecularKind(_lobe_unit, lambda model, exponent: 1),
     Specular: SpecularKind(_specular_unit, SpecularUnit.multiplications, SlopeUnit),
-    Power: SpecularKind(_power_unit, lambda parameters, exponent: 42),
+    Power: SpecularKind(_power_unit, lambda model, exponent: 42),
 }
 """Kinds of specular units, by the classes of their bit-accurate models."""
 
 
-def kind_of(parameters: HighlightOperand) -> SpecularKind:
+def kind_of(model: HighlightOperand) -> SpecularKind:
     """The kind of specular unit that a bit-accurate model describes.
 
     Raises
@@ -82,7 +80,7 @@ def kind_of(parameters: HighlightOperand) -> SpecularKind:
     TypeError
         If there is no unit for the model.
     """
-    model = type(parameters)
+    model = type(model)
     if model not in SPECULAR_KINDS:
         raise TypeError(f"{model.__name__} has no unit: SPECULAR_KINDS of {__name__} needs an entry for it")
     return SPECULAR_KINDS[model]
@@ -105,7 +103,7 @@ class LightUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Specular or Power or Lobe
+    model : Specular or Power or Lobe
         Reflection model, and whether ``highlight`` is ``N . H`` or one minus it.
     diffuse : Diffuse
         Format of ``N . L``.
@@ -139,7 +137,7 @@ class LightUnit(wiring.Component):
 
     def __init__(
         self,
-        parameters: Specular | Power | Lobe | None = None,
+        model: Specular | Power | Lobe | None = None,
         diffuse: Diffuse | None = None,
         *,
         initiation_interval: int = 1,
@@ -148,7 +146,7 @@ class LightUnit(wiring.Component):
         gated: bool = False,
         fades: bool | None = None,
     ):
-        self.parameters = p = parameters or Specular()
+        self.model = p = model or Specular()
         self._specular = kind_of(p).unit(
             p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
         )
@@ -161,8 +159,8 @@ class LightUnit(wiring.Component):
         self.latency += self.skips_dark
         self._diffuse = DiffuseUnit(diffuse, latency=2 if self.skips_dark else self._specular.latency)
         operands = {
-            "cosine": FixedShape(self._diffuse.parameters.operand_format),
-            "highlight": FixedShape(self.parameters.operand_format),
+            "cosine": FixedShape(self._diffuse.model.operand_format),
+            "highlight": FixedShape(self.model.operand_format),
         }
         if gated:
             operands["gated"] = unsigned(1)

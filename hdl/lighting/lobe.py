@@ -28,14 +28,14 @@ def lobe_write_shape() -> data.StructLayout:
     return data.StructLayout({"value": Lobe.VALUE_FORMAT.width, "begins": 1})
 
 
-def lobe_read_signature(parameters: Lobe) -> wiring.Signature:
+def lobe_read_signature(model: Lobe) -> wiring.Signature:
     """Read port: the word of an ``address`` is there two cycles with ``enable`` later.
 
     Without ``enable`` the word stays; it may also stay on a cycle that writes to the address.
     """
     return wiring.Signature(
         {
-            "address": Out(range(parameters.banks * parameters.entries)),
+            "address": Out(range(model.banks * model.entries)),
             "enable": Out(1),
             "word": In(Lobe.WORD_BITS),
         }
@@ -57,7 +57,7 @@ class LobeMemory(wiring.Component):
 
     Parameters
     ----------
-    parameters : Lobe
+    model : Lobe
         Size of the tables, and their number.
     tables : sequence of LobeTable or None
         Tables fixed at build time, one for each bank. ``None``: they are written.
@@ -68,7 +68,7 @@ class LobeMemory(wiring.Component):
     -------
     write : :py:`In(stream.Signature(lobe_write_shape()))`
         Writes, unless the tables are fixed; always ready.
-    reads : :py:`In(lobe_read_signature(parameters)).array(ports)`
+    reads : :py:`In(lobe_read_signature(model)).array(ports)`
         Read ports.
 
     Raises
@@ -79,10 +79,8 @@ class LobeMemory(wiring.Component):
     Source: docs/theory/units.md#lobe.
     """
 
-    def __init__(
-        self, parameters: Lobe | None = None, tables: Sequence[LobeTable] | None = None, ports: int = 1
-    ):
-        self.parameters = p = parameters or Lobe()
+    def __init__(self, model: Lobe | None = None, tables: Sequence[LobeTable] | None = None, ports: int = 1):
+        self.model = p = model or Lobe()
         self.tables = _checked(p, tables)
         members = {"reads": In(lobe_read_signature(p)).array(ports)}
         if tables is None:
@@ -91,7 +89,7 @@ class LobeMemory(wiring.Component):
 
     def elaborate(self, platform):
         """The memory, and the logic that makes its words from the values written."""
-        p = self.parameters
+        p = self.model
         m = Module()
         words = [word for table in self.tables or [] for word in table.words.tolist()]
         m.submodules.words = memory = Memory(shape=Lobe.WORD_BITS, depth=p.banks * p.entries, init=words)
@@ -105,7 +103,7 @@ class LobeMemory(wiring.Component):
 
     def _write(self, m: Module, port: Any) -> None:
         """Write a word with each value but the first: that of the value before, and the difference."""
-        p, write = self.parameters, self.write.payload
+        p, write = self.model, self.write.payload
         value, previous = (Signal.like(write.value, name=name) for name in ("value", "previous"))
         address, last = (Signal.like(port.addr, name=name) for name in ("address", "last"))
         follows, begins, holds, active = (
@@ -150,7 +148,7 @@ class LobeUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Lobe
+    model : Lobe
         Size and number of the tables, and the operand.
     initiation_interval : int
         Cycles from an input to the next, at least 1.
@@ -170,7 +168,7 @@ class LobeUnit(PipelinedUnit):
         Only with several banks: the number of the bank, constant while beats are inside.
     write : :py:`In(stream.Signature(lobe_write_shape()))`
         Only if the unit has a memory of its own that is not fixed; see `LobeMemory`.
-    table : :py:`Out(lobe_read_signature(parameters))`
+    table : :py:`Out(lobe_read_signature(model))`
         Only if the memory is outside.
 
     Raises
@@ -184,13 +182,13 @@ class LobeUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: Lobe | None = None,
+        model: Lobe | None = None,
         initiation_interval: int = 1,
         *,
         tables: Sequence[LobeTable] | None = None,
         shares_memory: bool = False,
     ):
-        self.parameters = p = parameters or Lobe()
+        self.model = p = model or Lobe()
         if tables is not None and shares_memory:
             raise ValueError("a unit that shares a memory has no tables of its own")
         self.tables, self.shares_memory = _checked(p, tables), shares_memory
@@ -219,7 +217,7 @@ class LobeUnit(PipelinedUnit):
         if self.shares_memory:
             wiring.connect(m, wiring.flipped(self.table), self._read)
         else:
-            m.submodules.memory = memory = LobeMemory(self.parameters, self.tables)
+            m.submodules.memory = memory = LobeMemory(self.model, self.tables)
             wiring.connect(m, self._read, memory.reads[0])
             if self.tables is None:
                 wiring.connect(m, wiring.flipped(self.write), memory.write)
@@ -227,7 +225,7 @@ class LobeUnit(PipelinedUnit):
 
     def datapath(self, m, operands):
         """The graph, read at the stage of its last word."""
-        p = self.parameters
+        p = self.model
         self._base = Const(0, 1)
         if p.banks > 1 and p.operand != "place":
             self._base = Signal(range(p.banks * p.rows), name="base")
@@ -240,7 +238,7 @@ class LobeUnit(PipelinedUnit):
 
     def _describe(self) -> Word:
         """Words from the operand to the result."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
         operand = g.input("operand", lambda operands: operands.operand)
         dark = g.input("dark", lambda operands: operands.dark)
 
@@ -256,7 +254,7 @@ class LobeUnit(PipelinedUnit):
 
     def _placed(self, operand: Word, lit: Word) -> tuple[tuple[Word], Callable]:
         """Word of a place, and the function from it to the address and the fraction."""
-        p, fraction = self.parameters, self.parameters.fraction_format.width
+        p, fraction = self.model, self.model.fraction_format.width
 
         def placed(place, lit):
             return Mux(lit, Value.cast(place)[:-1], 0)
@@ -269,7 +267,7 @@ class LobeUnit(PipelinedUnit):
 
     def _addressed(self, operand: Word, lit: Word) -> tuple[tuple[Word], Callable]:
         """Word of 1 - N·H shifted by its leading zeros, and the function from it to address and fraction."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
         bits, top = p.fraction_bits, p.fraction_bits - 1
 
         def limited(wide, lit):
@@ -304,7 +302,7 @@ class LobeUnit(PipelinedUnit):
 
     def _interpolate(self, word: Word, lit: Word) -> Word:
         """Term of a word and its fraction: ``v + D f``."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
         formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
         parts, first = [], 0
         for (name, format), symbol in zip(formats.items(), "vDf", strict=True):
@@ -332,11 +330,11 @@ class LobeUnit(PipelinedUnit):
         return g.register("term", term, value, product, lit, formula="v + D·f")
 
 
-def _checked(parameters: Lobe, tables: Sequence[LobeTable] | None) -> list[LobeTable] | None:
+def _checked(model: Lobe, tables: Sequence[LobeTable] | None) -> list[LobeTable] | None:
     if tables is None:
         return None
-    if len(tables) != parameters.banks:
-        raise ValueError(f"there must be a table for each of {parameters.banks} banks, not {len(tables)}")
+    if len(tables) != model.banks:
+        raise ValueError(f"there must be a table for each of {model.banks} banks, not {len(tables)}")
     for table in tables:
-        parameters.check(table)
+        model.check(table)
     return list(tables)

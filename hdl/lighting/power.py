@@ -27,7 +27,7 @@ class PowerUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Power
+    model : Power
         Bit-accurate model: kind of operand.
     form : str
         ``"pipelined"`` or ``"sequential"``.
@@ -69,12 +69,10 @@ class PowerUnit(PipelinedUnit):
         "total": "s + x − s·x",
     }
 
-    def __init__(
-        self, parameters: Power | None = None, *, form: Literal["pipelined", "sequential"] = "pipelined"
-    ):
+    def __init__(self, model: Power | None = None, *, form: Literal["pipelined", "sequential"] = "pipelined"):
         if form not in ("pipelined", "sequential"):
             raise ValueError(f"form must be 'pipelined' or 'sequential', not {form!r}")
-        self.parameters = p = parameters or Power()
+        self.model = p = model or Power()
         self.form = form
         super().__init__(
             highlight_shape(p),
@@ -86,7 +84,7 @@ class PowerUnit(PipelinedUnit):
 
     def datapath(self, m, operands):
         """Complement of the cosine, two cycles; then the bits of the exponent, lowest first."""
-        p, register = self.parameters, self.register
+        p, register = self.model, self.register
         complement = one_minus(p, operands.operand).extend(SQ(5, 34))
         complement = register(m, complement, "one_minus_cosine")
         dark = register(m, operands.dark, "dark")
@@ -97,7 +95,7 @@ class PowerUnit(PipelinedUnit):
 
     def _pipelined(self, m, start):
         """Three cycles a bit: product, difference, saturation; squares and products in parallel."""
-        p, register = self.parameters, self.register
+        p, register = self.model, self.register
         format = p.COMPLEMENT_FORMAT
         x = register(m, start, "x_0")
         s = None
@@ -132,7 +130,7 @@ class PowerUnit(PipelinedUnit):
 
     def _sequential(self, m, start):
         """Bit j: its square starts at stage 3 + 4j, its product at 4 + 4j; both end four cycles later."""
-        p, at, register = self.parameters, self.at, self.register
+        p, at, register = self.model, self.at, self.register
         format = p.COMPLEMENT_FORMAT
         bits = range(p.EXPONENT_BITS)
         x, s = (Signal(FixedShape(format), name=name) for name in "xs")

@@ -22,9 +22,9 @@ __all__ = ["SlopeUnit", "SpecularUnit", "highlight_shape", "one_minus", "slope_s
 _SHIFT_BITS = 4
 
 
-def highlight_shape(parameters: HighlightOperand) -> data.StructLayout:
+def highlight_shape(model: HighlightOperand) -> data.StructLayout:
     """Shape of a unit's input: the operand, and whether the beat is dark, so that its term is 0."""
-    return data.StructLayout({"operand": FixedShape(parameters.operand_format), "dark": unsigned(1)})
+    return data.StructLayout({"operand": FixedShape(model.operand_format), "dark": unsigned(1)})
 
 
 def slope_shape() -> data.StructLayout:
@@ -38,9 +38,9 @@ def slope_shape() -> data.StructLayout:
     )
 
 
-def one_minus(parameters: HighlightOperand, operand: FixedValue) -> FixedValue:
+def one_minus(model: HighlightOperand, operand: FixedValue) -> FixedValue:
     """One minus the cosine, exact, of either kind of operand."""
-    if parameters.operand == "cosine":
+    if model.operand == "cosine":
         return FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item()) - operand
     return operand
 
@@ -57,7 +57,7 @@ class SlopeUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Specular
+    model : Specular
         Bit-accurate model.
 
     Members
@@ -70,13 +70,13 @@ class SlopeUnit(wiring.Component):
     Source: docs/theory/units.md#specular-unit; [T] figure 3.6; [C].
     """
 
-    def __init__(self, parameters: Specular | None = None):
-        self.parameters = parameters or Specular()
+    def __init__(self, model: Specular | None = None):
+        self.model = model or Specular()
         super().__init__({"exponent": In(Specular.EXPONENT_BITS), "slope": Out(slope_shape())})
 
     def elaborate(self, platform):
         """Slope and PROM, then normalisation, a cycle each."""
-        p = self.parameters
+        p = self.model
         m = Module()
         if p.slope_terms is None:
             code = self._look_up(m, "slopes", p.slopes.codes, p.SLOPE_FORMAT)
@@ -142,7 +142,7 @@ class SpecularUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Specular
+    model : Specular
         Bit-accurate model: reflection model, kind of operand, form.
     initiation_interval : int
         Cycles from an input to the next, at least 1.
@@ -174,13 +174,13 @@ class SpecularUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: Specular | None = None,
+        model: Specular | None = None,
         *,
         initiation_interval: int = 1,
         exponent: int | None = None,
         shares_slope: bool = False,
     ):
-        self.parameters = p = parameters or Specular()
+        self.model = p = model or Specular()
         if exponent is not None and not 1 <= exponent <= MAX_EXPONENT:
             raise ValueError(f"exponent must be 1 to {MAX_EXPONENT}, not {exponent}")
         if exponent is not None and shares_slope:
@@ -203,11 +203,11 @@ class SpecularUnit(PipelinedUnit):
         )
 
     @staticmethod
-    def multiplications(parameters: Specular, exponent: int | None = None) -> int:
+    def multiplications(model: Specular, exponent: int | None = None) -> int:
         """Multiplications M, as in the table above; an initiation interval of M needs one multiplier."""
-        chords = 3 if parameters.is_coscos else int(parameters.is_exponential)
-        by_slope = exponent is None and not parameters.as_published
-        return by_slope + parameters.squarings + chords
+        chords = 3 if model.is_coscos else int(model.is_exponential)
+        by_slope = exponent is None and not model.as_published
+        return by_slope + model.squarings + chords
 
     def datapath(self, m, operands):
         """The graph, and slope and boundary."""
@@ -216,7 +216,7 @@ class SpecularUnit(PipelinedUnit):
 
     def _frame_values(self, m: Module) -> tuple[FixedValue, Value, FixedValue]:
         """K, s + 1 and the boundary: constants, from outside, or two cycles after the exponent."""
-        p = self.parameters
+        p = self.model
         if self.exponent is not None:
             (scale, shift), boundary = p.scale(self.exponent), p.boundaries[self.exponent]
             return (
@@ -234,7 +234,7 @@ class SpecularUnit(PipelinedUnit):
 
     def _describe(self) -> Word:
         """Words from the operand to the result."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
         operand = g.input("operand", lambda operands: operands.operand)
         self._dark = dark = g.input("dark", lambda operands: operands.dark)
 
@@ -316,7 +316,7 @@ class SpecularUnit(PipelinedUnit):
 
     def _as_published(self, product: Word) -> Word:
         """Base of either sign, its square, and the comparator on the square."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
 
         def base(product, dark):
             code = Value.cast(product.truncate(17))
@@ -333,7 +333,7 @@ class SpecularUnit(PipelinedUnit):
 
     def _cosine(self, argument: Word, product: Word, below_one: Callable, lit: Word) -> Word:
         """Base of ``coscos``: e at the same time as the product p; ``p + p e``; the cosine."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
         code = g.wire("excess_code", lambda x: Value.cast(x)[8:], argument)
         e = self._interpolate("excess", p.excess, code)
         product = g.wire("p", lambda product: FixedValue(p.BASE_FORMAT, below_one(product)), product)
@@ -345,7 +345,7 @@ class SpecularUnit(PipelinedUnit):
 
     def _exponential(self, product: Word, lit: Word) -> Word:
         """``2^-power``: chords, then the shift."""
-        p, g = self.parameters, self._graph
+        p, g = self.model, self._graph
 
         def power(product):
             return Value.cast(product.truncate(21).scale(4))

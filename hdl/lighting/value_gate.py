@@ -21,7 +21,7 @@ class ValueGateUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : ValueGate
+    model : ValueGate
         Bit-accurate model.
     lights : int
         Number of lights, at least 1.
@@ -44,13 +44,13 @@ class ValueGateUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: ValueGate | None = None,
+        model: ValueGate | None = None,
         lights: int = 1,
         *,
         exponent: int | None = None,
         takes_threshold: bool = False,
     ):
-        self.parameters = p = parameters or ValueGate()
+        self.model = p = model or ValueGate()
         self.lights = lights
         self.exponent = exponent
         self.takes_threshold = takes_threshold
@@ -72,7 +72,7 @@ class ValueGateUnit(PipelinedUnit):
 
     def datapath(self, m, operands):
         """Sums and differences; the least u, and whether it holds; the comparison."""
-        p = self.parameters
+        p = self.model
         shift = p.LEVEL_FORMAT.fraction_bits - p.THRESHOLD_FORMAT.fraction_bits
         threshold = self._threshold(m) << shift
         lit = []
@@ -92,7 +92,7 @@ class ValueGateUnit(PipelinedUnit):
 
     def _threshold(self, m):
         """The word of the PROM, two cycles after the exponent."""
-        p, width = self.parameters, self.parameters.THRESHOLD_FORMAT.width
+        p, width = self.model, self.model.THRESHOLD_FORMAT.width
         if self.takes_threshold:
             return self.register(m, self.constants, "threshold")
         if self.exponent is not None:

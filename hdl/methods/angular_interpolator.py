@@ -14,7 +14,7 @@ from blysk.hdl.methods.interpolator import InterpolatorUnit
 __all__ = ["AngularInterpolatorUnit"]
 
 
-class AngularInterpolatorUnit(InterpolatorUnit, parameters=AngularInterpolator):
+class AngularInterpolatorUnit(InterpolatorUnit, model=AngularInterpolator):
     """Angular setup and highlight cosine in series, for L and for H of each light in parallel.
 
     `AngularInterpolator` is the bit-accurate model. All series are equal and have the same input and the same
@@ -23,7 +23,7 @@ class AngularInterpolatorUnit(InterpolatorUnit, parameters=AngularInterpolator):
 
     Parameters
     ----------
-    parameters : AngularInterpolator
+    model : AngularInterpolator
         Bit-accurate model.
     lights : int
         Number of lights, at least 1.
@@ -34,15 +34,15 @@ class AngularInterpolatorUnit(InterpolatorUnit, parameters=AngularInterpolator):
     """
 
     @classmethod
-    def setup_intervals(cls, parameters):
+    def setup_intervals(cls, model):
         """Initiation intervals of the angular setup."""
         return range(1, 7)
 
-    def __init__(self, parameters: AngularInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
+    def __init__(self, model: AngularInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
         self._chains = {
             (light, name): (
-                AngularSetupUnit(parameters.setup, initiation_interval=self.setup_interval),
+                AngularSetupUnit(model.setup, initiation_interval=self.setup_interval),
                 HighlightCosineUnit(),
             )
             for light in range(lights)

@@ -15,7 +15,7 @@ EMPTY_SEGMENT_CYCLES = 3
 """Cycles of the adaptive normaliser for a segment without a pixel."""
 
 
-class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInterpolator):
+class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpolator):
     """The adaptive normaliser; `BisectionInterpolator` is the bit-accurate model.
 
     `latency` and `setup_interval` are those of a span of one segment; more segments take longer (see
@@ -23,7 +23,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInte
 
     Parameters
     ----------
-    parameters : BisectionInterpolator
+    model : BisectionInterpolator
         Threshold, factor of the bisection unit, specular operand.
     lights : int
         Number of lights, at least 1.
@@ -33,9 +33,9 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInte
     Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7.
     """
 
-    def __init__(self, parameters: BisectionInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
-        self._normaliser = AdaptiveNormaliserUnit(parameters.normaliser)
+    def __init__(self, model: BisectionInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
+        self._normaliser = AdaptiveNormaliserUnit(model.normaliser)
         self.latency = self._normaliser.preparation(0) + self.product_latency
         self.setup_interval = self._normaliser.interval(0)
 
@@ -45,7 +45,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, parameters=BisectionInte
         A span's levels are counted while the previous span is divided.
         """
         unit = self._normaliser
-        normaliser = unit.parameters
+        normaliser = unit.model
         steps = np.asarray(spans.length) - 1
         cosine = np.einsum("ij,ij->i", spans.normal_left / ONE, spans.normal_right / ONE)
         q = (1 - cosine) / 4

@@ -35,7 +35,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     Parameters
     ----------
-    parameters : LocalChordInterpolator
+    model : LocalChordInterpolator
         Formats.
     lights : int
         Number of lights, at least 1.
@@ -55,7 +55,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         ``factors``, too.
     taken : :py:`Out(1)`
         High for one cycle as the words of the span accepted before are taken in.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights, ...)))`
+    o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights, ...)))`
         Operands of the pixels.
 
     Source: docs/theory/interpolation.md#forward-differences; [T] figure 2.10.
@@ -63,14 +63,14 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     def __init__(
         self,
-        parameters: LocalChordInterpolator | None = None,
+        model: LocalChordInterpolator | None = None,
         lights: int = 1,
         *,
         highlights: bool = True,
         gated: bool = False,
         factors: Sequence[int] = (),
     ):
-        self.parameters = p = parameters or LocalChordInterpolator()
+        self.model = p = model or LocalChordInterpolator()
         self.gated, self.factors = gated, tuple(factors)
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
         differences = chord_differences_shape(lights, highlights, p.setup, len(self.factors))
@@ -92,23 +92,19 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         )
 
     @classmethod
-    def begin(cls, parameters, start):
+    def begin(cls, model, start):
         """The start; where adding half a step of the result takes an adder, `rounded` adds it."""
-        return (
-            start.extend(parameters.format)
-            if cls._adds_late(parameters)
-            else super().begin(parameters, start)
-        )
+        return start.extend(model.format) if cls._adds_late(model) else super().begin(model, start)
 
     @classmethod
-    def rounded(cls, parameters, value):
+    def rounded(cls, model, value):
         """The value, with half a step of the result if `begin` has not added it."""
-        return super().begin(parameters, value) if cls._adds_late(parameters) else value
+        return super().begin(model, value) if cls._adds_late(model) else value
 
     @staticmethod
-    def _adds_late(parameters: DifferenceAccumulator) -> bool:
+    def _adds_late(model: DifferenceAccumulator) -> bool:
         """Whether the start has a bit of the weight of half a step of the result."""
-        return parameters.start_format.fraction_bits > parameters.result_format.fraction_bits
+        return model.start_format.fraction_bits > model.result_format.fraction_bits
 
     @property
     def span(self):
@@ -136,10 +132,10 @@ class ChordAccumulatorUnit(AccumulatorUnit):
             for name in self.functions:
                 words = start[name], light[name].first, light[name].second
                 value = result["cosine" if name == "diffuse" else name]
-                yield f"{name}_{index}", self.parameters.accumulators[name], words, value
+                yield f"{name}_{index}", self.model.accumulators[name], words, value
         for index, light in enumerate(self.factors):
             words = self.span.factor_start[index], *(self.span.factors[index][n] for n in ("first", "second"))
-            yield f"factor_{light}", self.parameters.accumulators["factor"], words, values[light].factor
+            yield f"factor_{light}", self.model.accumulators["factor"], words, values[light].factor
 
 
 class ChordSpansUnit(wiring.Component):
@@ -151,7 +147,7 @@ class ChordSpansUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : LocalChordInterpolator
+    model : LocalChordInterpolator
         Bit-accurate model.
     lights : int
         Number of lights, at least 1.
@@ -172,7 +168,7 @@ class ChordSpansUnit(wiring.Component):
         Spans of one pixel, of which the first value counts, or of three and more.
     long : :py:`In(1)`
         Whether the span that is offered has more than one pixel: its source knows without the length.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+    o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights)))`
         Operands of the pixels.
     out_of_range : :py:`Out(1)`
         High for one cycle for each span with a word that does not fit.
@@ -184,7 +180,7 @@ class ChordSpansUnit(wiring.Component):
 
     def __init__(
         self,
-        parameters: LocalChordInterpolator,
+        model: LocalChordInterpolator,
         lights: int,
         *,
         initiation_interval: int = 3,
@@ -195,7 +191,7 @@ class ChordSpansUnit(wiring.Component):
     ):
         self._gate = gate
         self._setup = ChordSetupUnit(
-            parameters.setup,
+            model.setup,
             lights,
             initiation_interval=initiation_interval,
             length_bits=length_bits,
@@ -205,7 +201,7 @@ class ChordSpansUnit(wiring.Component):
         self.multipliers = self._setup.multipliers
         gated = gate is not None
         self._accumulator = ChordAccumulatorUnit(
-            parameters, lights, highlights=highlights, gated=gated, factors=factors
+            model, lights, highlights=highlights, gated=gated, factors=factors
         )
         # A cycle for the count of the differences that wait.
         self.latency = self._setup.latency + 1 + self._accumulator.latency

@@ -12,7 +12,7 @@ from blysk.golden.beats import Spans
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import PipelinedUnit, connect
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
@@ -69,14 +69,14 @@ class InterpolatorUnit(wiring.Component):
 
     Each method has a subclass, which names the class of its bit-accurate model::
 
-        class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolator):
+        class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
 
     and sets three attributes: `latency`, cycles from a span to its first pixel while nothing is stalled;
     `setup_interval`, least cycles from a span to the next; and `cycles_per_pixel`.
 
     Parameters
     ----------
-    parameters : Interpolator
+    model : Interpolator
         Bit-accurate model.
     lights : int
         Number of lights, at least 1.
@@ -92,15 +92,16 @@ class InterpolatorUnit(wiring.Component):
     gate : ValueGateUnit or None
         From `gate_inside`: decides which spans have no highlight; operands then have ``gated``.
     takes_threshold : bool
-        Whether a threshold tells where highlights end, in place of the exponent; see `Design.threshold_of`.
+        Whether a threshold tells where highlights end, in place of the exponent; see
+        `ShadingPipeline.threshold_of`.
     factors : sequence of int
-        Indices of the lights that fade, for methods that serve them; see `Design`.
+        Indices of the lights that fade, for methods that serve them; see `ShadingPipeline`.
 
     Members
     -------
     i : :py:`In(stream.Signature(span_shape(lights, highlights=highlights, length_bits=length_bits)))`
         Spans of length 1 or more.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+    o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights)))`
         Operands of the pixels.
     constants : :py:`In(light_vectors_shape(lights))`
         L and H of each light; constant while spans are inside. See `constant_members`.
@@ -124,28 +125,28 @@ class InterpolatorUnit(wiring.Component):
     DEFAULT_INTERVAL = 4
     """Largest `setup_interval` that is taken where none is given."""
 
-    def __init_subclass__(cls, *, parameters: type[Interpolator] | None = None, **options):
+    def __init_subclass__(cls, *, model: type[Interpolator] | None = None, **options):
         super().__init_subclass__(**options)
-        if parameters is not None:
-            InterpolatorUnit.UNITS[parameters] = cls
+        if model is not None:
+            InterpolatorUnit.UNITS[model] = cls
 
     @classmethod
-    def setup_intervals(cls, parameters: Interpolator) -> Sequence[int]:
+    def setup_intervals(cls, model: Interpolator) -> Sequence[int]:
         """Setup intervals that the method can be built for; empty where it has no choice."""
         return ()
 
     @classmethod
-    def gate_inside(cls, design: Design) -> ValueGateUnit | None:
+    def gate_inside(cls, design: ShadingPipeline) -> ValueGateUnit | None:
         """The gate that decides inside this unit, of a design with a gate; ``None``: there is none inside."""
         return None
 
     @classmethod
-    def gate_beside(cls, design: Design, setup_interval: int) -> PipelinedUnit | None:
+    def gate_beside(cls, design: ShadingPipeline, setup_interval: int) -> PipelinedUnit | None:
         """The gate that decides beside this unit, from the same spans; ``None``: there is none beside.
 
         Parameters
         ----------
-        design : Design
+        design : ShadingPipeline
             A design with a gate.
         setup_interval : int
             Cycles from a span to the next in this unit; the gate takes spans as often.
@@ -210,13 +211,13 @@ class InterpolatorUnit(wiring.Component):
         return span_normals_shape(length_bits)
 
     @classmethod
-    def span_options(cls, parameters: Interpolator) -> dict[str, bool]:
+    def span_options(cls, model: Interpolator) -> dict[str, bool]:
         """Further arguments of `span_shape` that follow from the model; none by default."""
         return {}
 
     def __init__(
         self,
-        parameters: Interpolator,
+        model: Interpolator,
         lights: int,
         *,
         setup_interval: int | None = None,
@@ -227,16 +228,16 @@ class InterpolatorUnit(wiring.Component):
         takes_threshold: bool = False,
         factors: Sequence[int] = (),
     ):
-        intervals = self.setup_intervals(parameters)
+        intervals = self.setup_intervals(model)
         if setup_interval not in (None, *intervals):
             choice = spelled(intervals) if intervals else "left out"
-            raise ValueError(f"setup_interval of {parameters.name} must be {choice}, not {setup_interval}")
+            raise ValueError(f"setup_interval of {model.name} must be {choice}, not {setup_interval}")
         if intervals:
             most = self.DEFAULT_INTERVAL
             self.setup_interval = setup_interval or max(
                 interval for interval in intervals if interval <= most
             )
-        self.parameters = parameters
+        self.model = model
         self.lights = lights
         self.highlights = highlights
         self.length_bits = length_bits
@@ -245,14 +246,14 @@ class InterpolatorUnit(wiring.Component):
         self.takes_threshold = takes_threshold
         self.factors = tuple(factors)
         further = {"factors": len(factors)} if factors else {}
-        further |= self.span_options(parameters)
+        further |= self.span_options(model)
         span = self.span_shape(lights, highlights=highlights, length_bits=length_bits, **further)
         gated, factored = gate is not None, bool(factors)
         members = {
             "i": In(stream.Signature(span)),
             "o": Out(
                 stream.Signature(
-                    operands_shape(parameters, lights, highlights=highlights, gated=gated, factored=factored)
+                    operands_shape(model, lights, highlights=highlights, gated=gated, factored=factored)
                 )
             ),
             "out_of_range": Out(1),
@@ -268,10 +269,10 @@ class NormalInterpolatorUnit(InterpolatorUnit):
     highlights.
     """
 
-    def __init__(self, parameters: NormalInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
+    def __init__(self, model: NormalInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
         self._products = LightProductsUnit(
-            parameters, lights, highlights=self.highlights, initiation_interval=self.product_interval
+            model, lights, highlights=self.highlights, initiation_interval=self.product_interval
         )
         self.product_latency = self._products.latency
         self.cycles_per_pixel = max(self.cycles_per_pixel, self.product_interval)

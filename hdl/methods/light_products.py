@@ -17,7 +17,7 @@ __all__ = ["LightProductsUnit", "operands_shape"]
 
 
 def operands_shape(
-    parameters: Interpolator,
+    model: Interpolator,
     lights: int,
     *,
     highlights: bool = True,
@@ -28,7 +28,7 @@ def operands_shape(
 
     Parameters
     ----------
-    parameters : Interpolator
+    model : Interpolator
         Formats.
     lights : int
         Number of lights.
@@ -39,9 +39,9 @@ def operands_shape(
     factored : bool
         Whether factors of the lights that fade come with them; the factor of another light is 0, and unused.
     """
-    operands = {"cosine": FixedShape(parameters.COSINE_FORMAT)}
+    operands = {"cosine": FixedShape(model.COSINE_FORMAT)}
     if highlights:
-        operands["highlight"] = FixedShape(parameters.highlight_format)
+        operands["highlight"] = FixedShape(model.highlight_format)
     if gated:
         operands["gated"] = 1
     if factored:
@@ -58,7 +58,7 @@ class LightProductsUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : NormalInterpolator
+    model : NormalInterpolator
         Operand of the specular unit.
     lights : int
         Number of lights, at least 1.
@@ -71,7 +71,7 @@ class LightProductsUnit(PipelinedUnit):
     -------
     i : :py:`In(stream.Signature(ArrayLayout(SQ(1, 17), 3)))`
         Normals.
-    o : :py:`Out(stream.Signature(operands_shape(parameters, lights, highlights=highlights)))`
+    o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights)))`
         Operands.
     constants : :py:`In(light_vectors_shape(lights))`
         L and H; constant while beats are inside.
@@ -81,13 +81,13 @@ class LightProductsUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: NormalInterpolator | None = None,
+        model: NormalInterpolator | None = None,
         lights: int = 1,
         *,
         highlights: bool = True,
         initiation_interval: int = 1,
     ):
-        self.parameters = parameters = parameters or LinearInterpolator()
+        self.model = model = model or LinearInterpolator()
         self.lights = lights
         self.highlights = highlights
         self._graph = graph = Dataflow(initiation_interval)
@@ -100,13 +100,13 @@ class LightProductsUnit(PipelinedUnit):
                 )
             }
             if highlights:
-                product = chord if parameters.uses_chord else dot
+                product = chord if model.uses_chord else dot
                 vector = lambda *_, i=i: self.constants[i].halfway  # noqa: E731
                 words["highlight"] = product(graph, f"highlight_{i}", normal, vector, symbol=f"H_{i}")
             self._words.append(words)
         super().__init__(
             normal_shape(),
-            operands_shape(parameters, lights, highlights=highlights),
+            operands_shape(model, lights, highlights=highlights),
             latency=max(word.stage for word in words.values()),
             initiation_interval=initiation_interval,
             constants=light_vectors_shape(lights),

@@ -13,7 +13,7 @@ from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
 __all__ = ["LinearInterpolatorUnit"]
 
 
-class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolator):
+class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
     """Normals on a straight line; `LinearInterpolator` is the bit-accurate model.
 
     The difference setup of a straight line, ``P = N_r - N_l``, and the accumulator. A span that is out of
@@ -21,7 +21,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolat
 
     Parameters
     ----------
-    parameters : LinearInterpolator
+    model : LinearInterpolator
         The specular operand.
     lights : int
         Number of lights, at least 1.
@@ -32,12 +32,12 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, parameters=LinearInterpolat
     """
 
     @classmethod
-    def setup_intervals(cls, parameters):
+    def setup_intervals(cls, model):
         """Initiation intervals of the difference setup."""
         return range(1, 8)
 
-    def __init__(self, parameters: LinearInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
+    def __init__(self, model: LinearInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
         self._setup = DifferenceSetupUnit(
             initiation_interval=self.setup_interval, length_bits=self.length_bits, order=1
         )

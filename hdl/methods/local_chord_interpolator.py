@@ -17,7 +17,7 @@ from blysk.hdl.methods.interpolator import InterpolatorUnit
 __all__ = ["LocalChordInterpolatorUnit"]
 
 
-class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpolator):
+class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator):
     """Chord setup, then accumulators: spans with values in, the operands of their pixels out.
 
     `LocalChordInterpolator` is the bit-accurate model. No multiplier a pixel; the attribute ``multipliers``
@@ -28,7 +28,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
 
     Parameters
     ----------
-    parameters : LocalChordInterpolator
+    model : LocalChordInterpolator
         Bit-accurate model.
     lights : int
         Number of lights, at least 1.
@@ -55,7 +55,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         return np.minimum(spans.length, 3) * self.setup_interval // 3
 
     @classmethod
-    def setup_intervals(cls, parameters):
+    def setup_intervals(cls, model):
         """Initiation intervals of the chord setup that save multipliers of one light."""
         return (1, 2, 3, 6)
 
@@ -64,10 +64,10 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, parameters=LocalChordInterpol
         """Three values of each operand of each light, of the factors of lights that fade, and the length."""
         return span_operands_shape(lights, highlights, length_bits, factors)
 
-    def __init__(self, parameters: LocalChordInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
+    def __init__(self, model: LocalChordInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
         self._spans = ChordSpansUnit(
-            parameters,
+            model,
             lights,
             initiation_interval=self.setup_interval,
             highlights=self.highlights,

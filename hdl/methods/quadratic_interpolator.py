@@ -16,7 +16,7 @@ from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 __all__ = ["QuadraticInterpolatorUnit"]
 
 
-class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInterpolator):
+class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpolator):
     """Normals on a quadratic curve; `QuadraticInterpolator` is the bit-accurate model.
 
     Middle normal and G/P/Q find the coefficients of a span; forward differences, or an evaluator, find the
@@ -32,7 +32,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
 
     Parameters
     ----------
-    parameters : QuadraticInterpolator
+    model : QuadraticInterpolator
         Form and specular operand.
     lights : int
         Number of lights, at least 1.
@@ -44,15 +44,15 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
     """
 
     @classmethod
-    def setup_intervals(cls, parameters):
+    def setup_intervals(cls, model):
         """Initiation intervals of the middle normal and the difference setup."""
-        return range(1, 8) if parameters.form == "differences" else range(0)
+        return range(1, 8) if model.form == "differences" else range(0)
 
-    def __init__(self, parameters: QuadraticInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
-        differences = parameters.form == "differences"
+    def __init__(self, model: QuadraticInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
+        differences = model.form == "differences"
         interval = self.setup_interval if differences else 4
-        self._middle = MiddleNormalUnit(parameters.middle_normal, initiation_interval=interval)
+        self._middle = MiddleNormalUnit(model.middle_normal, initiation_interval=interval)
         self._gpq = GPQUnit()
         before = self._middle.latency + self._gpq.latency
         if differences:
@@ -60,9 +60,9 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
             self._accumulator = DifferenceAccumulatorUnit()
             after = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
         else:
-            self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(parameters.form))
+            self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(model.form))
             # With two cycles a pixel an interval of 7 ends between two pixels.
-            self.setup_interval = 7 if parameters.form == "direct" else 8
+            self.setup_interval = 7 if model.form == "direct" else 8
             self.cycles_per_pixel = max(self.cycles_per_pixel, self._evaluator.cycles_per_pixel)
             after = self._evaluator.latency
         self.latency = before + after + self.product_latency
@@ -76,7 +76,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, parameters=QuadraticInte
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=depth)
         length = stream.Signature(self.length_bits).create(path=("length",))
         connect_slice(m, lengths.r_stream, length)
-        differences = self.parameters.form == "differences"
+        differences = self.model.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload
         # Written a cycle late, as the handshake is known late.

@@ -16,7 +16,7 @@ from blysk.hdl.methods.interpolator import InterpolatorUnit, flag_spans
 __all__ = ["QuotientInterpolatorUnit"]
 
 
-class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator):
+class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     """Spans of vectors in, N·L and places in lobes' tables out; `QuotientInterpolator` is the model.
 
     `QuotientSpansUnit` gives the words of the pixels, `QuotientUnit` their quotients. A span of two pixels or
@@ -25,7 +25,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
 
     Parameters
     ----------
-    parameters : QuotientInterpolator
+    model : QuotientInterpolator
         Kind of the highlight.
     lights : int
         Number of lights, at least 1.
@@ -46,9 +46,9 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
         return vectors_shape(QuotientSpans(lights, highlights, mirror and highlights), length_bits)
 
     @classmethod
-    def span_options(cls, parameters):
+    def span_options(cls, model):
         """Whether y is multiplied by cos a."""
-        return {"mirror": parameters.mirror}
+        return {"mirror": model.mirror}
 
     room_after = 0
 
@@ -70,9 +70,9 @@ class QuotientInterpolatorUnit(InterpolatorUnit, parameters=QuotientInterpolator
         """``begun``, for the pipeline."""
         return {"begun": Out(1)}
 
-    def __init__(self, parameters: QuotientInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
-        spans = parameters.spans(lights, self.highlights)
+    def __init__(self, model: QuotientInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
+        spans = model.spans(lights, self.highlights)
         # Where a pixel takes several cycles, one multiplier has the time for a span.
         self._spans = QuotientSpansUnit(spans, self.length_bits, serial=self.product_interval > 1)
         self._quotient = QuotientUnit(Quotient(spans), self.product_interval)

@@ -13,7 +13,7 @@ from blysk.hdl.methods.interpolator import InterpolatorUnit, span_words
 __all__ = ["RecurrenceInterpolatorUnit"]
 
 
-class RecurrenceInterpolatorUnit(InterpolatorUnit, parameters=RecurrenceInterpolator):
+class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator):
     """Recurrence setup, then a recurrence unit for each light, with a copy for L and one for H.
 
     `RecurrenceInterpolator` is the bit-accurate model. All recurrence units are equal and have the same input
@@ -23,7 +23,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, parameters=RecurrenceInterpol
 
     Parameters
     ----------
-    parameters : RecurrenceInterpolator
+    model : RecurrenceInterpolator
         Bit-accurate model.
     lights : int
         Number of lights, at least 1.
@@ -34,14 +34,14 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, parameters=RecurrenceInterpol
     """
 
     @classmethod
-    def setup_intervals(cls, parameters):
+    def setup_intervals(cls, model):
         """Initiation intervals of the recurrence setup that save multipliers of one light."""
         return range(1, 47)
 
-    def __init__(self, parameters: RecurrenceInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
-        self._setup = RecurrenceSetupUnit(parameters.setup, lights, initiation_interval=self.setup_interval)
-        self._recurrences = [RecurrenceUnit(parameters.setup.recurrence) for _ in range(lights)]
+    def __init__(self, model: RecurrenceInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
+        self._setup = RecurrenceSetupUnit(model.setup, lights, initiation_interval=self.setup_interval)
+        self._recurrences = [RecurrenceUnit(model.setup.recurrence) for _ in range(lights)]
         unit = self._recurrences[0]
         self.latency = self._setup.latency + SLICE_LATENCY + unit.latency
 

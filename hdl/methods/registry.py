@@ -13,12 +13,12 @@ for _module in pkgutil.iter_modules(methods.__path__):
         pkgutil.resolve_name(f"{methods.__name__}.{_module.name}")
 
 
-def unit_of(parameters: Interpolator) -> type[InterpolatorUnit]:
+def unit_of(model: Interpolator) -> type[InterpolatorUnit]:
     """Class of the unit of a method.
 
     Parameters
     ----------
-    parameters : Interpolator
+    model : Interpolator
         Bit-accurate model of the method.
 
     Raises
@@ -26,10 +26,10 @@ def unit_of(parameters: Interpolator) -> type[InterpolatorUnit]:
     TypeError
         If the method has no unit.
     """
-    method = type(parameters)
+    method = type(model)
     if method not in InterpolatorUnit.UNITS:
         raise TypeError(
             f"{method.__name__} has no unit: {methods.__name__} needs a file *_interpolator.py with a class "
-            f"of parameters={method.__name__}"
+            f"of model={method.__name__}"
         )
     return InterpolatorUnit.UNITS[method]

@@ -22,14 +22,14 @@ class LineAccumulatorUnit(AccumulatorUnit):
 
     Parameters
     ----------
-    parameters : RenormaliseInterpolator
+    model : RenormaliseInterpolator
         Formats.
     length_bits : int
         Bits of the length.
     """
 
-    def __init__(self, parameters: RenormaliseInterpolator, length_bits: int = LENGTH_BITS):
-        self.parameters = parameters
+    def __init__(self, model: RenormaliseInterpolator, length_bits: int = LENGTH_BITS):
+        self.model = model
         members = {"line": line_shape(length_bits), "length": line_shape(length_bits)["length"].shape}
         super().__init__(
             data.StructLayout(members | {"span": 1}),
@@ -42,13 +42,13 @@ class LineAccumulatorUnit(AccumulatorUnit):
 
     def quadratics(self, values):
         """The components, with second differences of 0."""
-        p, line = self.parameters.accumulator, self.span.line
+        p, line = self.model.accumulator, self.span.line
         zero = FixedValue.constant(p.difference_format, 0)
         for c in range(3):
             yield f"vector_{c}", p, (line.start[c], line.step[c], zero), values.vector[c]
 
 
-class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=RenormaliseInterpolator):
+class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInterpolator):
     """Line setup, accumulator, renormaliser; `RenormaliseInterpolator` is the bit-accurate model.
 
     Eight multipliers for the renormaliser, ``ceil(9 / setup_interval)`` for the setup. A span is flagged at
@@ -56,7 +56,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
 
     Parameters
     ----------
-    parameters : RenormaliseInterpolator
+    model : RenormaliseInterpolator
         The specular operand.
     lights : int
         Number of lights, at least 1.
@@ -70,7 +70,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
     """An interval of 4 takes as many multipliers."""
 
     @classmethod
-    def setup_intervals(cls, parameters):
+    def setup_intervals(cls, model):
         """Initiation intervals of the line setup that save multipliers."""
         return (1, 2, 3, 4, 5, 9)
 
@@ -81,10 +81,10 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, parameters=Renormalise
         ends = dict.fromkeys(("normal_left", "normal_right"), vector_shape())
         return data.StructLayout({**members, **ends})
 
-    def __init__(self, parameters: RenormaliseInterpolator, lights: int, **options):
-        super().__init__(parameters, lights, **options)
+    def __init__(self, model: RenormaliseInterpolator, lights: int, **options):
+        super().__init__(model, lights, **options)
         self._setup = LineSetupUnit(initiation_interval=self.setup_interval, length_bits=self.length_bits)
-        self._accumulator = LineAccumulatorUnit(parameters, self.length_bits)
+        self._accumulator = LineAccumulatorUnit(model, self.length_bits)
         self._renormaliser = RenormaliserUnit()
         units = self._setup, self._accumulator, self._renormaliser
         self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency

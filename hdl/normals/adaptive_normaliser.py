@@ -43,7 +43,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : AdaptiveNormaliser
+    model : AdaptiveNormaliser
         Bit-accurate model, which knows threshold and factor.
 
     Members
@@ -57,9 +57,9 @@ class AdaptiveNormaliserUnit(wiring.Component):
     Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7.
     """
 
-    def __init__(self, parameters: AdaptiveNormaliser | None = None):
-        self.parameters = parameters or AdaptiveNormaliser()
-        self._bisection = BisectionUnit(self.parameters.bisection)
+    def __init__(self, model: AdaptiveNormaliser | None = None):
+        self.model = model or AdaptiveNormaliser()
+        self._bisection = BisectionUnit(self.model.bisection)
         super().__init__(
             {
                 "i": In(stream.Signature(span_normals_shape(AdaptiveNormaliser.LENGTH_BITS))),
@@ -96,7 +96,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def elaborate(self, platform):
         """Levels, segments, FIFO, normals."""
-        p = self.parameters
+        p = self.model
         m = Module()
         segment_shape = data.StructLayout(
             {
@@ -124,7 +124,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
     def _count(self, m, r, s, ends, multiplier):
         """Bisect, count the levels, hand the span over."""
         read, write = ends.read_port(), ends.write_port()
-        address = Signal(self.parameters.depth + 1, name="write_address")
+        address = Signal(self.model.depth + 1, name="write_address")
         m.d.comb += write.addr.eq(Cat(address, r.bank))
         self._reciprocal(m, r)
         m.submodules.bisection = self._bisection
@@ -149,7 +149,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _reciprocal(self, m, r: "_Levels") -> None:
         """Reciprocal of m - 1 and its shift, long before the first bisection is done."""
-        bits = self.parameters.LENGTH_BITS
+        bits = self.model.LENGTH_BITS
         position = Signal(range(bits))
         below_top = Signal(range(bits))
         m.d.sync += [
@@ -174,7 +174,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _store_ends(self, m, r: "_Levels", address, write) -> None:
         """Ends of segments into their memory: those of the span, then the bisection's results."""
-        whole, bisection = 1 << self.parameters.depth, self._bisection
+        whole, bisection = 1 << self.model.depth, self._bisection
         m.d.comb += [
             bisection.o.ready.eq(1),
             r.next_index.eq(r.index + (r.half << 1)),
@@ -196,7 +196,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _begin(self, m, r: "_Levels") -> None:
         """A span is taken, and its ends go into the bisection at once."""
-        whole, bisection = 1 << self.parameters.depth, self._bisection
+        whole, bisection = 1 << self.model.depth, self._bisection
         m.d.comb += [
             self.i.ready.eq(bisection.i.ready),
             bisection.i.payload.normal_a.eq(self.i.payload.normal_left),
@@ -214,7 +214,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _bisect(self, m, r: "_Levels", read) -> None:
         """Pairs of neighbouring ends of a level, from the second on, into the bisection."""
-        bisection, bits = self._bisection, self.parameters.depth + 1
+        bisection, bits = self._bisection, self.model.depth + 1
         m.d.comb += [
             read.addr.eq(Cat(Mux(r.step == 0, r.index, r.next_index)[:bits], r.bank)),
             bisection.i.payload.normal_a.eq(r.end_a),
@@ -230,7 +230,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
             m.d.comb += bisection.i.valid.eq(1)
             with m.If(bisection.i.ready):
                 m.d.sync += [r.step.eq(0), r.index.eq(r.next_index)]
-                with m.If(r.next_index == 1 << self.parameters.depth):
+                with m.If(r.next_index == 1 << self.model.depth):
                     m.next = "drain"
 
     def _next_level(self, m, r: "_Levels", s: "_Segments") -> None:
@@ -256,7 +256,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _count_levels(self, m, r: "_Levels", s: "_Segments", multiplier: SteppedMultiplier) -> None:
         """Number of levels, by ``q + q^2`` and its limits."""
-        p = self.parameters
+        p = self.model
         with m.If(r.step != 0):
             m.d.sync += r.step.eq(r.step + 1)
         with m.Elif(multiplier.free):
@@ -307,7 +307,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 s.reciprocal.eq(r.reciprocal),
                 s.shift.eq(r.shift),
                 s.levels.eq(r.levels),
-                s.spacing.eq((1 << self.parameters.depth) >> r.levels),
+                s.spacing.eq((1 << self.model.depth) >> r.levels),
                 s.amount.eq(Mux(r.shift > r.levels, r.shift - 1 - r.levels, 0)),
                 s.left.eq(r.span.normal_left),
                 s.remaining.eq(r.span.length),
@@ -317,7 +317,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _prepare_segment(self, m, s: "_Segments", multiplier: SteppedMultiplier) -> None:
         """Pixels, start and step of a segment."""
-        p, product = self.parameters, multiplier.product
+        p, product = self.model, multiplier.product
         multiplier.issue(2, FixedValue(COMPONENT, Cat(s.offset, Const(0, 18 - len(s.offset)))), s.reciprocal)
         whole_pixels = s.available >> s.levels
         # 2^levels - 1 more, so that the shift rounds up.
@@ -345,8 +345,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _end_segment(self, m, s: "_Segments", read, fifo) -> None:
         """Right end of a segment; the segment into the FIFO, or none without a pixel; on to the next."""
-        whole = 1 << self.parameters.depth
-        following = Signal(self.parameters.depth + 2)
+        whole = 1 << self.model.depth
+        following = Signal(self.model.depth + 2)
         m.d.comb += [
             following.eq(s.index + s.spacing),
             read.addr.eq(Cat(Mux(s.index == whole, s.index, following)[: len(s.index)], s.bank)),
@@ -381,7 +381,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     def _back(self, m, fifo, segment_shape, ready_spans, begun):
         """Interpolate: an accumulating adder a component."""
-        p = self.parameters
+        p = self.model
         segment = data.View(segment_shape, fifo.r_data)
         inside, out_of_range = Signal(name="inside"), Signal(name="span_out_of_range")
         valid = Signal(name="pixel_valid")
@@ -422,8 +422,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
 class _Levels:
     """Registers and wires of the part that counts a span's levels."""
 
-    def __init__(self, parameters: AdaptiveNormaliser, span_shape: data.StructLayout):
-        p, bits, depth = parameters, parameters.LENGTH_BITS, parameters.depth
+    def __init__(self, model: AdaptiveNormaliser, span_shape: data.StructLayout):
+        p, bits, depth = model, model.LENGTH_BITS, model.depth
         self.span = Signal(span_shape)
         self.step = Signal(3)
         # Half of the memory of ends.
@@ -451,8 +451,8 @@ class _Levels:
 class _Segments:
     """Registers and wires of the part that prepares segments: the results of the first part, and its own."""
 
-    def __init__(self, parameters: AdaptiveNormaliser):
-        p, bits, depth = parameters, parameters.LENGTH_BITS, parameters.depth
+    def __init__(self, model: AdaptiveNormaliser):
+        p, bits, depth = model, model.LENGTH_BITS, model.depth
         component = FixedShape(COMPONENT)
         self.busy = Signal()
         # The last segment goes; the next span may come.

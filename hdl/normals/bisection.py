@@ -13,12 +13,12 @@ from blysk.hdl.core.stream import PipelinedUnit
 __all__ = ["BisectionUnit", "coefficient"]
 
 
-def coefficient(parameters: Bisection, power: int, first_step: Value) -> FixedValue:
+def coefficient(model: Bisection, power: int, first_step: Value) -> FixedValue:
     """Coefficient of the factor's polynomial.
 
     Parameters
     ----------
-    parameters : Bisection
+    model : Bisection
         Model.
     power : int
         Power of the coefficient.
@@ -28,13 +28,11 @@ def coefficient(parameters: Bisection, power: int, first_step: Value) -> FixedVa
     """
     codes = []
     for first in (False, True):
-        constant, rest = parameters.polynomial(first)
+        constant, rest = model.polynomial(first)
         number = rest[power - 1] if power else constant
         codes.append(Const(number.codes.item(), signed(number.format.width)))
     code, first_code = codes
-    return FixedValue(
-        number.format, code if parameters.max_angle == 45 else Mux(first_step, first_code, code)
-    )
+    return FixedValue(number.format, code if model.max_angle == 45 else Mux(first_step, first_code, code))
 
 
 class BisectionUnit(PipelinedUnit):
@@ -59,7 +57,7 @@ class BisectionUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Bisection
+    model : Bisection
         Bit-accurate model, which knows degree, widest span and coefficients.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to ``s + 6``. ``None``: ``s + 3``.
@@ -81,9 +79,9 @@ class BisectionUnit(PipelinedUnit):
     Source: docs/theory/interpolation.md#bisection; [T] 2.1, figure 2.6.
     """
 
-    def __init__(self, parameters: Bisection | None = None, *, initiation_interval: int | None = None):
-        self.parameters = parameters or Bisection()
-        steps = self.parameters.steps
+    def __init__(self, model: Bisection | None = None, *, initiation_interval: int | None = None):
+        self.model = model or Bisection()
+        steps = self.model.steps
         interval = checked_interval(initiation_interval, steps + 6, steps + 3)
         self._graph = Dataflow(interval, low_latency=True)
         self._words = self._describe()
@@ -113,7 +111,7 @@ class BisectionUnit(PipelinedUnit):
 
     def _describe(self) -> dict:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         a, b = (
             g.input(name, lambda operands, name=name: operands[name]) for name in ("normal_a", "normal_b")
         )

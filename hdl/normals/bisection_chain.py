@@ -30,7 +30,7 @@ class BisectionChainUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : BisectionChain
+    model : BisectionChain
         Bit-accurate model, which knows the factor.
 
     Members
@@ -44,8 +44,8 @@ class BisectionChainUnit(wiring.Component):
     Source: docs/theory/interpolation.md#bisection; [T] 2.1.
     """
 
-    def __init__(self, parameters: BisectionChain | None = None):
-        self.parameters = parameters or BisectionChain()
+    def __init__(self, model: BisectionChain | None = None):
+        self.model = model or BisectionChain()
         super().__init__(
             {
                 "i": In(
@@ -69,12 +69,12 @@ class BisectionChainUnit(wiring.Component):
 
     def latency(self, level: int) -> int:
         """Cycles from input to output of a span of that level."""
-        return 17 + level * (3 * self.parameters.bisection.steps + 8)
+        return 17 + level * (3 * self.model.bisection.steps + 8)
 
     def elaborate(self, platform):
         """Dot product, then one round of the multiplier a level, then six products."""
         m = Module()
-        registers = _Registers(self.parameters, self.i.payload.shape())
+        registers = _Registers(self.model, self.i.payload.shape())
         span, step = registers.span, registers.step
         first_u = self._first_u(m, registers)
         self._operands(m, registers)
@@ -131,7 +131,7 @@ class BisectionChainUnit(wiring.Component):
 
     def _operands(self, m: Module, r: "_Registers") -> None:
         """Words that a round makes of u, in three cycles."""
-        p = self.parameters.bisection
+        p = self.model.bisection
         limit = FixedValue.constant(p.ANGLE_FORMAT, p.widest_narrow.values.item())
         one = FixedValue.constant(p.OPERAND_FORMAT, p.ONE.values.item())
         operand = r.cosine if p.reads_cosine(False) else r.narrow_angle
@@ -150,7 +150,7 @@ class BisectionChainUnit(wiring.Component):
 
     def _factor(self, m: Module, r: "_Registers", multiplier: SteppedMultiplier) -> None:
         """``e`` of a round by Horner's form, and the flag of a span that is too wide."""
-        p, aligned = self.parameters.bisection, multiplier.product.scale(-1)
+        p, aligned = self.model.bisection, multiplier.product.scale(-1)
         for done in range(p.steps):
             power = p.steps - done
             factor = r.total if done else coefficient(p, power, r.first_step)
@@ -170,7 +170,7 @@ class BisectionChainUnit(wiring.Component):
         word, product = r.u.format, multiplier.product
         half_l = (r.weight_l + FixedValue.constant(word, 1)).scale(-1)
         half_m = r.weight_m.scale(-1)
-        after = 3 + 3 * self.parameters.bisection.steps
+        after = 3 + 3 * self.model.bisection.steps
         multiplier.issue(after, r.e.scale(2), r.cosine)
         multiplier.issue(after + 1, r.e.scale(2), half_l.truncate(17).saturate(COMPONENT))
         multiplier.issue(after + 2, r.e.scale(2), half_m.truncate(17).saturate(COMPONENT))
@@ -209,8 +209,8 @@ class BisectionChainUnit(wiring.Component):
 class _Registers:
     """Registers that the states of a `BisectionChainUnit` share."""
 
-    def __init__(self, parameters: BisectionChain, span_shape: data.StructLayout):
-        p, word = parameters.bisection, FixedShape(BisectionChain.WEIGHT_FORMAT)
+    def __init__(self, model: BisectionChain, span_shape: data.StructLayout):
+        p, word = model.bisection, FixedShape(BisectionChain.WEIGHT_FORMAT)
         self.span = Signal(span_shape)
         self.remaining = Signal(BisectionChain.LEVEL_BITS)
         self.step = Signal(range(3 * p.steps + 8))

@@ -90,12 +90,12 @@ class AccumulatorUnit(wiring.Component):
             m.d.sync += self._span.eq(self.i.payload)
 
     @classmethod
-    def begin(cls, parameters: DifferenceAccumulator, start: FixedValue) -> FixedValue:
+    def begin(cls, model: DifferenceAccumulator, start: FixedValue) -> FixedValue:
         """First value of an accumulator: the start, and half a step of the result, so that cutting rounds."""
-        return start + FixedValue.constant(parameters.format, parameters.result_format.step / 2)
+        return start + FixedValue.constant(model.format, model.result_format.step / 2)
 
     @classmethod
-    def rounded(cls, parameters: DifferenceAccumulator, value: FixedValue) -> FixedValue:
+    def rounded(cls, model: DifferenceAccumulator, value: FixedValue) -> FixedValue:
         """The value that the result is cut from: here ``value`` itself."""
         return value
 
@@ -148,7 +148,7 @@ class AccumulatorUnit(wiring.Component):
 class DifferenceAccumulatorUnit(AccumulatorUnit):
     """Normals of a span by ``N += W; W += 2 G dt^2``, three quadratics; see `AccumulatorUnit`.
 
-    ``parameters``, a `DifferenceAccumulator`, is the bit-accurate model.
+    ``model``, a `DifferenceAccumulator`, is the bit-accurate model.
 
     Members
     -------
@@ -161,7 +161,7 @@ class DifferenceAccumulatorUnit(AccumulatorUnit):
     """
 
     def __init__(self):
-        self.parameters = DifferenceAccumulator()
+        self.model = DifferenceAccumulator()
         super().__init__(difference_shape(), normal_shape())
 
     def quadratics(self, values):
@@ -169,4 +169,4 @@ class DifferenceAccumulatorUnit(AccumulatorUnit):
         span = self.span
         for c in range(3):
             operands = span.start[c], span.first[c], span.second[c]
-            yield f"normal_{c}", self.parameters, operands, values[c]
+            yield f"normal_{c}", self.model, operands, values[c]

@@ -67,7 +67,7 @@ class DifferenceSetupUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : DifferenceSetup
+    model : DifferenceSetup
         Bit-accurate model, which knows the order of the products.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to 7, or to 9 in the order of [T]. ``None``: as many as there are
@@ -95,7 +95,7 @@ class DifferenceSetupUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: DifferenceSetup | None = None,
+        model: DifferenceSetup | None = None,
         *,
         initiation_interval: int | None = None,
         order: Literal[1, 2] = 2,
@@ -103,10 +103,10 @@ class DifferenceSetupUnit(PipelinedUnit):
     ):
         if order not in (1, 2):
             raise ValueError(f"order must be 1 or 2, not {order!r}")
-        self.parameters = parameters or DifferenceSetup()
+        self.model = model or DifferenceSetup()
         self.order = order
         self.length_bits = checked_length_bits(length_bits)
-        longest = 9 if self.parameters.as_published else 7
+        longest = 9 if self.model.as_published else 7
         uses = longest if order == 2 else 3
         interval = checked_interval(initiation_interval, longest, uses)
         self._graph = Dataflow(interval)
@@ -145,7 +145,7 @@ class DifferenceSetupUnit(PipelinedUnit):
                     f"first_{c}", reciprocal, p, shift, lambda p, c=c: p[c], _plus_one
                 )
             return words
-        describe = self._as_published if self.parameters.as_published else self._products
+        describe = self._as_published if self.model.as_published else self._products
         describe(words, p, g.input("g", lambda operands: operands.g), reciprocal, shift)
         return words
 

@@ -20,7 +20,7 @@ class DotProductUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : DotProduct
+    model : DotProduct
         Bit-accurate model, which knows the number formats.
 
     Members
@@ -40,16 +40,16 @@ class DotProductUnit(PipelinedUnit):
         "sum": "a·b",
     }
 
-    def __init__(self, parameters: DotProduct | None = None):
-        self.parameters = parameters or DotProduct()
+    def __init__(self, model: DotProduct | None = None):
+        self.model = model or DotProduct()
         super().__init__(
             data.StructLayout(
                 {
-                    "a": data.ArrayLayout(FixedShape(self.parameters.a_format), 3),
-                    "b": data.ArrayLayout(FixedShape(self.parameters.b_format), 3),
+                    "a": data.ArrayLayout(FixedShape(self.model.a_format), 3),
+                    "b": data.ArrayLayout(FixedShape(self.model.b_format), 3),
                 }
             ),
-            FixedShape(self.parameters.result_format),
+            FixedShape(self.model.result_format),
             latency=3,
         )
 

@@ -33,7 +33,7 @@ class GPQUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : GPQ
+    model : GPQ
         Bit-accurate model.
 
     Members
@@ -56,8 +56,8 @@ class GPQUnit(PipelinedUnit):
         "q_.*": "Q = N_l",
     }
 
-    def __init__(self, parameters: GPQ | None = None):
-        self.parameters = parameters or GPQ()
+    def __init__(self, model: GPQ | None = None):
+        self.model = model or GPQ()
         super().__init__(
             data.StructLayout(
                 {

@@ -33,7 +33,7 @@ class LineSetupUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : LineSetup
+    model : LineSetup
         Bit-accurate model.
     initiation_interval : int
         Cycles from an input to the next, 1 to 9.
@@ -57,12 +57,12 @@ class LineSetupUnit(PipelinedUnit):
 
     def __init__(
         self,
-        parameters: LineSetup | None = None,
+        model: LineSetup | None = None,
         *,
         initiation_interval: int = 4,
         length_bits: int = LENGTH_BITS,
     ):
-        self.parameters = parameters or LineSetup()
+        self.model = model or LineSetup()
         self.length_bits = checked_length_bits(length_bits)
         self._graph = Dataflow(initiation_interval)
         self._words = self._describe()
@@ -77,7 +77,7 @@ class LineSetupUnit(PipelinedUnit):
 
     def _describe(self) -> dict:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         left, right, length = (
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right", "length")

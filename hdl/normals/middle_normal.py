@@ -35,7 +35,7 @@ class MiddleNormalUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : MiddleNormal
+    model : MiddleNormal
         Bit-accurate model, which knows the fit of h.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to 9. ``None``: 6.
@@ -56,8 +56,8 @@ class MiddleNormalUnit(PipelinedUnit):
     Source: docs/theory/interpolation.md#middle-normal; [T] 2.2.
     """
 
-    def __init__(self, parameters: MiddleNormal | None = None, *, initiation_interval: int | None = None):
-        self.parameters = parameters or MiddleNormal()
+    def __init__(self, model: MiddleNormal | None = None, *, initiation_interval: int | None = None):
+        self.model = model or MiddleNormal()
         interval = checked_interval(initiation_interval, _MULTIPLICATIONS, 6)
         self._graph = Dataflow(interval)
         self._words = self._describe()
@@ -88,7 +88,7 @@ class MiddleNormalUnit(PipelinedUnit):
 
     def _describe(self) -> dict:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         left, right = (
             g.input(name, lambda operands, name=name: operands[name])
             for name in ("normal_left", "normal_right")

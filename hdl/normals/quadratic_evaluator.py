@@ -38,7 +38,7 @@ class QuadraticEvaluatorUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : QuadraticEvaluator
+    model : QuadraticEvaluator
         Bit-accurate model, which knows the form.
 
     Members
@@ -51,9 +51,9 @@ class QuadraticEvaluatorUnit(wiring.Component):
     Source: docs/theory/interpolation.md#quadratic-normals; [T] figures 2.9 a and b.
     """
 
-    def __init__(self, parameters: QuadraticEvaluator | None = None):
-        self.parameters = parameters or QuadraticEvaluator()
-        direct = self.parameters.form == "direct"
+    def __init__(self, model: QuadraticEvaluator | None = None):
+        self.model = model or QuadraticEvaluator()
+        direct = self.model.form == "direct"
         self.latency = 14 if direct else 17
         self.cycles_per_pixel = 1 if direct else 2
         span = data.StructLayout({**curve_shapes(), "length": unsigned(LENGTH_BITS)})
@@ -62,7 +62,7 @@ class QuadraticEvaluatorUnit(wiring.Component):
     def elaborate(self, platform):
         """Step of the span, sum of its steps and pixel counter, then the polynomial pixel by pixel."""
         m = Module()
-        p = self.parameters
+        p = self.model
         m.submodules.step = step = _StepUnit(p)
         m.submodules.polynomial = polynomial = _DirectUnit() if p.form == "direct" else _HornerUnit()
         connect(m, wiring.flipped(self.i), step.i)
@@ -104,14 +104,14 @@ class QuadraticEvaluatorUnit(wiring.Component):
 class _StepUnit(PipelinedUnit):
     """Step ``dt = 1/(m - 1)`` and the coefficients. Latency 8, initiation interval 7: one register each."""
 
-    def __init__(self, parameters: QuadraticEvaluator):
-        self.parameters = parameters
+    def __init__(self, model: QuadraticEvaluator):
+        self.model = model
         span = {**curve_shapes(), "length": unsigned(LENGTH_BITS)}
         self._graph = Dataflow(7)
         self._words = self._describe(span)
         super().__init__(
             data.StructLayout(span),
-            data.StructLayout({**span, "step": FixedShape(parameters.STEP_FORMAT)}),
+            data.StructLayout({**span, "step": FixedShape(model.STEP_FORMAT)}),
             latency=self._words["step"].stage,
             initiation_interval=7,
         )
@@ -125,7 +125,7 @@ class _StepUnit(PipelinedUnit):
 
     def _describe(self, span) -> dict:
         """Words of the results: the reciprocal, shifted in two stages, and the operands."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         words = {name: g.input(name, lambda operands, name=name: operands[name]) for name in span}
         reciprocal, shift = reciprocal_words(g, words["length"], reciprocal_table(p.RECIPROCAL_FORMAT))
         coarse = g.register(

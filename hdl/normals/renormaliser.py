@@ -32,7 +32,7 @@ class RenormaliserUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : Renormaliser
+    model : Renormaliser
         Bit-accurate model.
 
     Members
@@ -58,8 +58,8 @@ class RenormaliserUnit(PipelinedUnit):
         r"word_(\d)_\d+": r"w_\1",
     }
 
-    def __init__(self, parameters: Renormaliser | None = None):
-        self.parameters = parameters or Renormaliser()
+    def __init__(self, model: Renormaliser | None = None):
+        self.model = model or Renormaliser()
         super().__init__(
             data.StructLayout({"vector": vector_shape(), "span": 1}),
             data.StructLayout({"normal": normal_shape(), "out_of_range": unsigned(1), "span": 1}),
@@ -74,7 +74,7 @@ class RenormaliserUnit(PipelinedUnit):
 
     def datapath(self, m, operands):
         """Shift, square, octave and offset in its segment, ``c0 - x (c1 - x c2)``, ``r w``."""
-        p, register = self.parameters, self.register
+        p, register = self.model, self.register
         word, too_short = self._scaled(m, operands.vector)
         m.submodules.dot_product = dot_product = DotProductUnit()
         for c in range(3):
@@ -112,7 +112,7 @@ class RenormaliserUnit(PipelinedUnit):
 
     def _scaled(self, m, vector):
         """w, four cycles after the vector; and whether it is too short, two cycles after it."""
-        p, register = self.parameters, self.register
+        p, register = self.model, self.register
         codes = [vector[c].as_value() for c in range(3)]
         magnitudes = [Mux(code[-1], ~code, code)[:-1] for code in codes]
         magnitude = register(m, magnitudes[0] | magnitudes[1] | magnitudes[2], "magnitude")
@@ -137,7 +137,7 @@ class RenormaliserUnit(PipelinedUnit):
 
     def _coefficients(self, m, segment):
         """``c0``, ``c1`` and ``c2`` of the segment, one cycle later."""
-        p = self.parameters
+        p = self.model
         names, formats = ("c0", "c1", "c2"), (p.C0_FORMAT, p.C1_FORMAT, p.C2_FORMAT)
         layout = data.StructLayout(dict(zip(names, map(FixedShape, formats), strict=True)))
         rows = zip(*(word.values.tolist() for word in p.coefficients), strict=True)

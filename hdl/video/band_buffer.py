@@ -7,23 +7,23 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.band_buffer import BandBuffer
-from blysk.hdl.geometry.depth_test import is_inside
+from blysk.hdl.geometry.depth_tester import is_inside
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.video.display_timing import timing_shape
 
 __all__ = ["BandBufferUnit", "band_pixel_shape", "shown_shape"]
 
 
-def band_pixel_shape(parameters: BandBuffer) -> data.StructLayout:
+def band_pixel_shape(model: BandBuffer) -> data.StructLayout:
     """Shape of a pixel that is drawn: column, line of the band, colour."""
-    width, lines = parameters.mode.horizontal.visible, parameters.lines
+    width, lines = model.mode.horizontal.visible, model.lines
     place = {"x": unsigned((width - 1).bit_length()), "y": unsigned((lines - 1).bit_length())}
     return data.StructLayout(place | {channel: unsigned(8) for channel in "rgb"})
 
 
-def shown_shape(parameters: BandBuffer) -> data.StructLayout:
+def shown_shape(model: BandBuffer) -> data.StructLayout:
     """Shape of a cycle of the pixel clock: the timing, and the colour."""
-    timing = timing_shape(parameters.mode).members
+    timing = timing_shape(model.mode).members
     return data.StructLayout(dict(timing) | {channel: unsigned(8) for channel in "rgb"})
 
 
@@ -47,20 +47,20 @@ class BandBufferUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : BandBuffer
+    model : BandBuffer
         Bit-accurate model.
 
     Members
     -------
     request : :py:`Out(stream.Signature(band))`
         Bands to draw, in the order of the picture, without those whose slot has begun.
-    pixels : :py:`In(stream.Signature(band_pixel_shape(parameters)))`
+    pixels : :py:`In(stream.Signature(band_pixel_shape(model)))`
         Pixels of the band asked for last; one that is outside it is lost.
     done : :py:`In(stream.Signature(band))`
         Number of that band, when all its pixels have been taken.
-    timing : :py:`In(timing_shape(parameters.mode))`
+    timing : :py:`In(timing_shape(model.mode))`
         Domain ``pixel``.
-    shown : :py:`Out(shown_shape(parameters))`
+    shown : :py:`Out(shown_shape(model))`
         Domain ``pixel``: the timing a cycle later, and the colour.
     status : :py:`Out(counters_shape("late_bands", "frames"))`
         Bands replaced by the background, and frames begun, since the reset.
@@ -70,16 +70,16 @@ class BandBufferUnit(wiring.Component):
 
     latency = 1
 
-    def __init__(self, parameters: BandBuffer | None = None):
-        self.parameters = parameters or BandBuffer()
-        self._band = unsigned((self.parameters.bands - 1).bit_length())
+    def __init__(self, model: BandBuffer | None = None):
+        self.model = model or BandBuffer()
+        self._band = unsigned((self.model.bands - 1).bit_length())
         super().__init__(
             {
                 "request": Out(stream.Signature(self._band)),
-                "pixels": In(stream.Signature(band_pixel_shape(self.parameters))),
+                "pixels": In(stream.Signature(band_pixel_shape(self.model))),
                 "done": In(stream.Signature(self._band)),
-                "timing": In(timing_shape(self.parameters.mode)),
-                "shown": Out(shown_shape(self.parameters)),
+                "timing": In(timing_shape(self.model.mode)),
+                "shown": Out(shown_shape(self.model)),
                 "status": Out(counters_shape("late_bands", "frames")),
             }
         )
@@ -87,7 +87,7 @@ class BandBufferUnit(wiring.Component):
     def elaborate(self, platform):
         """The memory, both sides of it, and the signals that cross between them."""
         m = Module()
-        given, width = self.parameters, sum(self.parameters.colour_bits)
+        given, width = self.model, sum(self.model.colour_bits)
         m.submodules.colours = memory = Memory(shape=width, depth=2 * given.pixels, init=[])
         # Written in `sync`: a buffer is filled, and its band. Written in `pixel`: it is free, and it was not
         # shown; the slot, and its beginning.
@@ -104,19 +104,19 @@ class BandBufferUnit(wiring.Component):
         return Signal(self._band, name=name, init=init)
 
     def _plus_one(self, band: Value) -> Value:
-        return Mux(band == self.parameters.bands - 1, 0, band + 1)
+        return Mux(band == self.model.bands - 1, 0, band + 1)
 
     @property
     def _clear(self) -> int:
         """The background's word, by which words are XORed: a memory of zeros is cleared."""
         return sum(
-            int(code) << sum(self.parameters.colour_bits[:k])
-            for k, code in enumerate(self.parameters.kept(self.parameters.background))
+            int(code) << sum(self.model.colour_bits[:k])
+            for k, code in enumerate(self.model.kept(self.model.background))
         )
 
     def _draw(self, m: Module, write) -> None:
         """Clear a free buffer that was not shown, ask for its band, write its pixels, hand it over."""
-        given = self.parameters
+        given = self.model
         freed, begun = Signal(2, name="freed_seen"), Signal(name="begun_seen")
         m.submodules += [FFSynchronizer(self._freed, freed), FFSynchronizer(self._begun, begun)]
         before, slot = Signal(name="begun_before"), self._number("slot_seen", given.bands - 1)
@@ -167,7 +167,7 @@ class BandBufferUnit(wiring.Component):
 
     def _show(self, m: Module, read, clear) -> None:
         """Choose the buffer of each slot, read and clear it along with the timing, and give it back."""
-        given, timing = self.parameters, self.timing
+        given, timing = self.model, self.timing
         line, frame = given.mode.horizontal, given.mode.vertical
         filled = Signal(2, name="filled_seen")
         m.submodules += FFSynchronizer(self._filled, filled, o_domain="pixel")

@@ -5,10 +5,10 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.golden.video.band_depth import BandDepth
-from blysk.hdl.geometry.depth_test import DepthMemory, is_inside
+from blysk.hdl.geometry.depth_tester import DepthMemory, is_inside
 
 __all__ = ["BandDepthUnit"]
 
@@ -21,7 +21,7 @@ class BandDepthUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : BandDepth
+    model : BandDepth
         Bit-accurate model.
     x_bits, y_bits : int
         Bits of the coordinates.
@@ -38,14 +38,14 @@ class BandDepthUnit(wiring.Component):
     Source: docs/theory/video.md#bands; not in the documents.
     """
 
-    def __init__(self, parameters: BandDepth, x_bits: int, y_bits: int):
-        self.parameters = parameters
+    def __init__(self, model: BandDepth, x_bits: int, y_bits: int):
+        self.model = model
         super().__init__({"memory": In(DepthMemory(x_bits, y_bits)), "begin": In(1), "busy": Out(1)})
 
     def elaborate(self, platform):
         """The memory; the tag; the sweep."""
         m = Module()
-        given, port = self.parameters, self.memory
+        given, port = self.model, self.memory
         bits = given.tag_bits
         m.submodules.depths = memory = Memory(shape=DEPTH.width + bits, depth=given.words, init=[])
         read, write = memory.read_port(), memory.write_port()
@@ -69,7 +69,7 @@ class BandDepthUnit(wiring.Component):
         m.d.comb += [
             read.addr.eq(address(port.read_place)),
             read.en.eq(port.read_enable),
-            port.read_data.eq(Mux((its_tag == tag) & ~outside, depth, DepthTest.CLEARED)),
+            port.read_data.eq(Mux((its_tag == tag) & ~outside, depth, DepthTester.CLEARED)),
             write.en.eq((port.write_enable & is_inside(port.write_place, given.size)) | self.busy),
             write.addr.eq(Mux(self.busy, place, address(port.write_place))),
             write.data.eq(Mux(self.busy, Cat(port.write_data, before), Cat(port.write_data, tag))),

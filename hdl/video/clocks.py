@@ -18,7 +18,7 @@ class ClockUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : ClockPlan
+    model : ClockPlan
         Dividers.
 
     Members
@@ -34,15 +34,15 @@ class ClockUnit(wiring.Component):
     Source: docs/theory/video.md#display; Lattice FPGA-TN-02200, ECP5 sysCLOCK PLL.
     """
 
-    def __init__(self, parameters: ClockPlan):
-        self.parameters = parameters
+    def __init__(self, model: ClockPlan):
+        self.model = model
         self.clocks = {name: Signal(name=f"{name}_clock") for name in ("sync", "pixel", "serial")}
         super().__init__({"reference": In(1)})
 
     def elaborate(self, platform):
         """The PLL; a gate a clock."""
         m = Module()
-        plan, locked, loop = self.parameters, Signal(name="locked"), Signal(name="loop")
+        plan, locked, loop = self.model, Signal(name="locked"), Signal(name="loop")
         always = {name: Signal(name=f"{name}_always") for name in self.clocks}
         outputs = {
             "OP": (plan.loop, loop),

@@ -20,7 +20,7 @@ class ControlsUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Controls
+    model : Controls
         Bit-accurate model.
 
     Members
@@ -37,9 +37,9 @@ class ControlsUnit(wiring.Component):
     Source: docs/theory/video.md#bands; not in the documents.
     """
 
-    def __init__(self, parameters: Controls | None = None):
-        self.parameters = parameters or Controls()
-        given = self.parameters
+    def __init__(self, model: Controls | None = None):
+        self.model = model or Controls()
+        given = self.model
         super().__init__(
             {
                 "buttons": In(len(BUTTONS)),
@@ -52,7 +52,7 @@ class ControlsUnit(wiring.Component):
     def elaborate(self, platform):
         """Buttons, then the state."""
         m = Module()
-        given = self.parameters
+        given = self.model
         pressed = dict(zip(BUTTONS, self._pressed(m), strict=True))
         angle = Signal(ANGLE_BITS, name="angle_now", init=given.first)
         running, backwards = Signal(name="running", init=1), Signal(name="backwards")
@@ -71,12 +71,12 @@ class ControlsUnit(wiring.Component):
         return m
 
     def _counts(self):
-        return ("material", self.parameters.materials), ("light", self.parameters.lights)
+        return ("material", self.model.materials), ("light", self.model.lights)
 
     def _pressed(self, m: Module) -> Signal:
         """Whether each button goes down on this cycle, without bounces."""
         down = Signal(len(BUTTONS), name="down")
-        count = Signal(self.parameters.debounce_bits, name="count")
+        count = Signal(self.model.debounce_bits, name="count")
         state, pressed = Signal.like(down, name="state"), Signal.like(down, name="pressed")
         m.submodules.down = FFSynchronizer(self.buttons, down)
         m.d.sync += count.eq(count + 1)

@@ -25,7 +25,7 @@ class DisplayUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : BandBuffer
+    model : BandBuffer
         Mode, lines of a band, colours.
 
     Members
@@ -38,9 +38,9 @@ class DisplayUnit(wiring.Component):
     Source: docs/theory/video.md#display.
     """
 
-    def __init__(self, parameters: BandBuffer | None = None):
-        self.parameters = parameters or BandBuffer()
-        self.bands = BandBufferUnit(self.parameters)
+    def __init__(self, model: BandBuffer | None = None):
+        self.model = model or BandBuffer()
+        self.bands = BandBufferUnit(self.model)
         members = dict(self.bands.signature.members)
         del members["timing"], members["shown"]
         super().__init__(members | {"pairs": Out(data.ArrayLayout(2, LANES))})
@@ -49,7 +49,7 @@ class DisplayUnit(wiring.Component):
         """The units in a row."""
         m = Module()
         to_pixel, to_serial = DomainRenamer("pixel"), DomainRenamer("serial")
-        bands, timing = self.bands, DisplayTimingUnit(DisplayTiming(self.parameters.mode))
+        bands, timing = self.bands, DisplayTimingUnit(DisplayTiming(self.model.mode))
         m.submodules.bands, m.submodules.timing = bands, to_pixel(timing)
         for name in ("request", "pixels", "done"):
             wiring.connect(m, getattr(bands, name), wiring.flipped(getattr(self, name)))

@@ -30,25 +30,25 @@ class DisplayTimingUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : DisplayTiming
+    model : DisplayTiming
         Bit-accurate model.
 
     Members
     -------
-    o : :py:`Out(timing_shape(parameters.mode))`
+    o : :py:`Out(timing_shape(model.mode))`
         The cycle.
 
     Source: docs/theory/video.md#display.
     """
 
-    def __init__(self, parameters: DisplayTiming | None = None):
-        self.parameters = parameters or DisplayTiming()
-        super().__init__({"o": Out(timing_shape(self.parameters.mode))})
+    def __init__(self, model: DisplayTiming | None = None):
+        self.model = model or DisplayTiming()
+        super().__init__({"o": Out(timing_shape(self.model.mode))})
 
     def elaborate(self, platform):
         """Count pixels, and lines at the end of each."""
         m = Module()
-        line, frame = self.parameters.mode.horizontal, self.parameters.mode.vertical
+        line, frame = self.model.mode.horizontal, self.model.mode.vertical
         shape: data.StructLayout = self.o.shape()
         x, y = Signal(shape["x"].shape, name="x"), Signal(shape["y"].shape, init=frame.visible, name="y")
         m.d.sync += x.eq(x + 1)

@@ -33,7 +33,7 @@ class DrawCommandsUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : DrawCommands
+    model : DrawCommands
         Bit-accurate model with the words, fixed at build time.
 
     Members
@@ -46,11 +46,11 @@ class DrawCommandsUnit(wiring.Component):
     Source: docs/theory/video.md#bands; [T] chapter 4.
     """
 
-    def __init__(self, parameters: DrawCommands):
-        self.parameters = parameters
+    def __init__(self, model: DrawCommands):
+        self.model = model
         super().__init__(
             {
-                "i": In(stream.Signature(walk_request_shape(len(parameters.words)))),
+                "i": In(stream.Signature(walk_request_shape(len(model.words)))),
                 "o": Out(stream.Signature(command_shape())),
             }
         )
@@ -58,7 +58,7 @@ class DrawCommandsUnit(wiring.Component):
     def elaborate(self, platform):
         """The address, and the word behind it."""
         m = Module()
-        words = self.parameters.codes
+        words = self.model.codes
         m.submodules.commands = memory = Memory(shape=COMMAND_BITS, depth=len(words), init=words)
         read = memory.read_port()
         address, first_band = Signal.like(self.i.payload.start, name="address"), Signal(name="first_band")

@@ -14,7 +14,7 @@ from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.render import STATUS as RENDERED
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 from blysk.hdl.video.band_depth import BandDepthUnit
 from blysk.hdl.video.controls import ControlsUnit
 from blysk.hdl.video.draw_commands import DrawCommandsUnit
@@ -53,7 +53,7 @@ class DrawUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Drawing
+    model : Drawing
         Bit-accurate model, with all contents of memories.
 
     Members
@@ -72,10 +72,10 @@ class DrawUnit(wiring.Component):
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
 
-    def __init__(self, parameters: Drawing):
-        self.parameters = given = parameters
+    def __init__(self, model: Drawing):
+        self.model = given = model
         design = given.renderer.design
-        self.render = RenderUnit(given.renderer)
+        self.render = RendererUnit(given.renderer)
         self.depth = BandDepthUnit(BandDepth((given.size[0], given.lines)), design.x_bits, design.y_bits)
         self.mesh, self.commands = MeshMemoryUnit(given.mesh), DrawCommandsUnit(given.commands)
         self.vertex = VertexUnit(given.transform, given.mesh.index_bits)
@@ -126,7 +126,7 @@ class DrawUnit(wiring.Component):
 
     def _band(self, m: Module) -> None:
         """One band after the other."""
-        given, commands = self.parameters, self.commands
+        given, commands = self.model, self.commands
         # Behind a register: a word of the memory comes late in its cycle.
         self._command_in = stream.Signature(commands.o.payload.shape()).create(path=("command",))
         connect_register(m, "waiting_command", commands.o, self._command_in)

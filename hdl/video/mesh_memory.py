@@ -27,7 +27,7 @@ class MeshMemoryUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : MeshMemory
+    model : MeshMemory
         The vertices.
 
     Members
@@ -42,19 +42,19 @@ class MeshMemoryUnit(wiring.Component):
 
     latency = 2
 
-    def __init__(self, parameters: MeshMemory):
-        self.parameters = parameters
+    def __init__(self, model: MeshMemory):
+        self.model = model
         super().__init__(
             {
                 "i": In(stream.Signature(range_shape())),
-                "o": Out(stream.Signature(mesh_vertex_shape(parameters.index_bits))),
+                "o": Out(stream.Signature(mesh_vertex_shape(model.index_bits))),
             }
         )
 
     def elaborate(self, platform):
         """A counter, the memory, and the index beside its word."""
         m = Module()
-        given = self.parameters
+        given = self.model
         m.submodules.vertices = memory = Memory(
             shape=given.VERTEX_BITS, depth=given.vertices, init=given.vertex_words
         )

@@ -38,7 +38,7 @@ class MotionUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Motion
+    model : Motion
         Bit-accurate model with the coefficients.
 
     Members
@@ -58,11 +58,11 @@ class MotionUnit(wiring.Component):
         "total": "Σ a·b",
     }
 
-    def __init__(self, parameters: Motion):
-        self.parameters = parameters
+    def __init__(self, model: Motion):
+        self.model = model
         super().__init__(
             {
-                "i": In(stream.Signature(turn_shape(parameters.slots))),
+                "i": In(stream.Signature(turn_shape(model.slots))),
                 "o": Out(stream.Signature(entry_shape())),
             }
         )
@@ -70,7 +70,7 @@ class MotionUnit(wiring.Component):
     def elaborate(self, platform):
         """Cosine and sine, then for each entry two products and their sum."""
         m = Module()
-        given = self.parameters
+        given = self.model
         mask = (1 << OFFSET.width) - 1, (1 << ENTRY.width) - 1
         columns = (given.constant, given.cosine, given.sine)
         rows = [

@@ -19,7 +19,7 @@ class SerialiserUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Serialiser
+    model : Serialiser
         Bit-accurate model.
 
     Members
@@ -34,9 +34,9 @@ class SerialiserUnit(wiring.Component):
 
     latency = 1
 
-    def __init__(self, parameters: Serialiser | None = None):
-        self.parameters = parameters or Serialiser()
-        lanes = self.parameters.lanes
+    def __init__(self, model: Serialiser | None = None):
+        self.model = model or Serialiser()
+        lanes = self.model.lanes
         super().__init__(
             {
                 "i": In(stream.Signature(data.ArrayLayout(unsigned(BITS), lanes))),
@@ -47,10 +47,10 @@ class SerialiserUnit(wiring.Component):
     def elaborate(self, platform):
         """A shift register a lane, and one bit that goes with the last pair."""
         m = Module()
-        pairs = self.parameters.PAIRS
+        pairs = self.model.PAIRS
         # One bit for each pair that is left; a word is taken in by an empty register, or at the last pair.
         left = Signal(pairs, name="left")
-        lanes = [Signal(BITS, name=f"lane_{k}", reset_less=True) for k in range(self.parameters.lanes)]
+        lanes = [Signal(BITS, name=f"lane_{k}", reset_less=True) for k in range(self.model.lanes)]
         payload = Signal(self.o.payload.shape(), name="pair")
         m.d.comb += [payload[k].eq(lane[:2]) for k, lane in enumerate(lanes)]
         advance = skid_buffer(m, self.o, left[0], payload)

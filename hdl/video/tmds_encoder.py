@@ -19,7 +19,7 @@ class TmdsEncoderUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : TmdsEncoder
+    model : TmdsEncoder
         Bit-accurate model.
 
     Members
@@ -39,9 +39,9 @@ class TmdsEncoderUnit(PipelinedUnit):
     Source: docs/theory/video.md#tmds.
     """
 
-    def __init__(self, parameters: TmdsEncoder | None = None):
-        self.parameters = parameters or TmdsEncoder()
-        super().__init__(SYMBOL, unsigned(BITS), latency=self.parameters.latency)
+    def __init__(self, model: TmdsEncoder | None = None):
+        self.model = model or TmdsEncoder()
+        super().__init__(SYMBOL, unsigned(BITS), latency=self.model.latency)
 
     def datapath(self, m, operands):
         """XOR or XNOR by the ones of the byte; the chain's excess of ones; inversion and disparity."""

@@ -34,7 +34,7 @@ class TriangleAssemblyUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : TriangleAssembly
+    model : TriangleAssembly
         Bit-accurate model, with the mesh memory.
 
     Members
@@ -60,14 +60,14 @@ class TriangleAssemblyUnit(wiring.Component):
 
     latency = 6
 
-    def __init__(self, parameters: TriangleAssembly):
-        self.parameters = parameters
-        vertex = screen_vertex_shape(parameters.grid)
-        index = unsigned(parameters.mesh.index_bits)
+    def __init__(self, model: TriangleAssembly):
+        self.model = model
+        vertex = screen_vertex_shape(model.grid)
+        index = unsigned(model.mesh.index_bits)
         super().__init__(
             {
                 "i": In(stream.Signature(draw_shape())),
-                "o": Out(stream.Signature(triangle_shape(parameters.grid))),
+                "o": Out(stream.Signature(triangle_shape(model.grid))),
                 "write": In(stream.Signature(data.StructLayout({"index": index, "vertex": vertex}))),
                 "constants": In(band_rows_shape()),
                 "status": Out(counters_shape(*COUNTERS)),
@@ -78,7 +78,7 @@ class TriangleAssemblyUnit(wiring.Component):
     def elaborate(self, platform):
         """The walk through the triangles' words; the corners' words; the test of the band."""
         m = Module()
-        mesh = self.parameters.mesh
+        mesh = self.model.mesh
         m.submodules.triangles = triangles = Memory(
             shape=3 * mesh.index_bits, depth=mesh.triangles, init=mesh.triangle_words
         )
@@ -135,7 +135,7 @@ class TriangleAssemblyUnit(wiring.Component):
 
     def _gather(self, m: Module, advance, walks, corner, word, material) -> dict:
         """Shift corners in; the range of their scanlines, and whether one is outside."""
-        grid = self.parameters.grid
+        grid = self.model.grid
         arrives, arriving = Signal(name="arrives"), Signal(2, name="arriving")
         corners = [Signal(word.shape(), name=f"corner_{k}") for k in range(3)]
         low, high = (Signal(signed(X_BITS), name=name) for name in ("low", "high"))

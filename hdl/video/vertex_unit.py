@@ -53,7 +53,7 @@ class VertexUnit(PipelinedUnit):
 
     Parameters
     ----------
-    parameters : VertexTransform
+    model : VertexTransform
         Bit-accurate model.
     index_bits : int
         Bits of the index that goes with a vertex.
@@ -73,15 +73,15 @@ class VertexUnit(PipelinedUnit):
     """
 
     def __init__(
-        self, parameters: VertexTransform | None = None, index_bits: int = 9, initiation_interval: int = 30
+        self, model: VertexTransform | None = None, index_bits: int = 9, initiation_interval: int = 30
     ):
         if initiation_interval < 15:
             raise ValueError(f"initiation_interval must be at least 15, not {initiation_interval}")
-        self.parameters = parameters or VertexTransform()
+        self.model = model or VertexTransform()
         self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
-        vertex = screen_vertex_shape(self.parameters.grid)
+        vertex = screen_vertex_shape(self.model.grid)
         super().__init__(
             mesh_vertex_shape(index_bits),
             data.StructLayout({"index": unsigned(index_bits), "vertex": vertex}),
@@ -108,7 +108,7 @@ class VertexUnit(PipelinedUnit):
 
     def _describe(self) -> dict[str, Word]:
         """Words of the results."""
-        g, p = self._graph, self.parameters
+        g, p = self._graph, self.model
         position, normal = (
             g.input(name, lambda operands, name=name: operands[name]) for name in ("position", "normal")
         )
@@ -188,7 +188,7 @@ class VertexUnit(PipelinedUnit):
 
     def _over(self, rounded: FixedValue) -> Value:
         """Whether a coordinate saturates."""
-        above = Value.cast(rounded)[self.parameters.place.width - 1 :]
+        above = Value.cast(rounded)[self.model.place.width - 1 :]
         return above.any() & ~above.all()
 
     def datapath(self, m, operands):

@@ -8,7 +8,7 @@ from blysk.golden.bus.registers import ADDRESS_BITS, ERRORS, WORD_BITS, Register
 from blysk.hdl.bus.bus import BusUnit
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 from blysk.sim.api.options import DOCUMENTS
 from blysk.sim.run_files import MARK
 
@@ -44,9 +44,9 @@ def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
     return dict(zip(DOCUMENTS, texts, strict=True))
 
 
-def frame_text(core: ShadingPipelineUnit | RenderUnit | GeometryUnit) -> str:
+def frame_text(core: ShadingPipelineUnit | RendererUnit | GeometryUnit) -> str:
     """Of which frame the vectors of a core's spans or corners are; empty where of none of a light."""
-    unit = core.geometry if isinstance(core, RenderUnit) else core
+    unit = core.geometry if isinstance(core, RendererUnit) else core
     if isinstance(unit, GeometryUnit) and unit.rotates:
         return FRAME.replace("the light's", "light 0's")
     return FRAME if unit.vectors else ""
@@ -109,7 +109,7 @@ def _markdown(unit: BusUnit, name: str) -> str:
 
 
 def _layouts(unit: BusUnit) -> Iterator[tuple[str, ByteLayout]]:
-    layouts = unit.framing.parameters
+    layouts = unit.framing.model
     yield "s_axis_tdata", layouts.given
     yield "m_axis_tdata", layouts.made
 

@@ -7,7 +7,7 @@ from blysk.hdl.bus.bus import PORT_DESCRIPTIONS, BusUnit
 from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCRIPTIONS
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 from blysk.sim.api.bus_documents import frame_text, layout_lines
 
 __all__ = ["bus_descriptions", "bus_header", "triangle_descriptions"]
@@ -25,12 +25,12 @@ _PATHS = {
 }
 
 
-def triangle_descriptions(unit: RenderUnit | GeometryUnit) -> dict[str, str]:
+def triangle_descriptions(unit: RendererUnit | GeometryUnit) -> dict[str, str]:
     """Descriptions of the ports of a core that takes triangles."""
     given = dict(RENDER_PORT_DESCRIPTIONS)
     if frame := frame_text(unit):
         given["i_normal"] += f", {frame}"
-    if isinstance(unit, RenderUnit):
+    if isinstance(unit, RendererUnit):
         return given
     made = set(unit.o.payload.shape().members)
     words = {
@@ -64,7 +64,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
         Lines of the frame constants, with the addresses of its write port, and of their example.
     """
     framing, map = unit.framing, unit.map
-    packets, layouts = framing.packets, framing.parameters
+    packets, layouts = framing.packets, framing.model
     # Words are told by the layouts and the map.
     kept = [line for line in of_core if not line.startswith(("status_", "constants_", "before the first"))]
     registers = [

@@ -67,11 +67,11 @@ class DesignCost:
         )
 
 
-class Design(pipeline.Design):
+class Design(pipeline.ShadingPipeline):
     """A design of the golden layer, equal to that, with `cost`."""
 
     @classmethod
-    def of(cls, design: pipeline.Design) -> "Design":
+    def of(cls, design: pipeline.ShadingPipeline) -> "Design":
         """The same design with a cost."""
         return cls(**{field.name: getattr(design, field.name) for field in fields(design)})
 
@@ -114,8 +114,8 @@ class Design(pipeline.Design):
         return {}
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, pipeline.Design):
+        if not isinstance(other, pipeline.ShadingPipeline):
             return NotImplemented
         return all(getattr(self, field.name) == getattr(other, field.name) for field in fields(self))
 
-    __hash__ = pipeline.Design.__hash__
+    __hash__ = pipeline.ShadingPipeline.__hash__

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, Unpack, cast
 from blysk.golden.build import BuildError
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED, preset
 from blysk.golden.render import Renderer
@@ -20,7 +20,7 @@ from blysk.sim.errors import OptionError
 
 __all__ = ["built", "design", "design_of", "refused_counts"]
 
-AnyDesign = TypeVar("AnyDesign", bound=Design)
+AnyDesign = TypeVar("AnyDesign", bound=ShadingPipeline)
 
 
 @with_options({**COUNTS, **DESIGN})
@@ -100,7 +100,7 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
     return replace(made, materials=materials)
 
 
-def _check_interval(settings: Settings, design: Design) -> None:
+def _check_interval(settings: Settings, design: ShadingPipeline) -> None:
     """Refuse a setup interval that the method's hardware is not built for."""
     # The hardware's description takes a second to import.
     from blysk.hdl.methods.interpolator import spelled
@@ -112,9 +112,9 @@ def _check_interval(settings: Settings, design: Design) -> None:
         raise settings.refuse("setup_interval", f"method {design.method} is not built for it", remedy)
 
 
-def _check_parameter(settings: Settings, design: Design) -> None:
+def _check_parameter(settings: Settings, design: ShadingPipeline) -> None:
     """Refuse a caller's roughness or exponent that the reflection model does not take."""
-    parameter = design.specular.model.PARAMETER if design.specular else None
+    parameter = design.specular.reflection.PARAMETER if design.specular else None
     for name, used in (("roughness", parameter == "roughness"), ("exponent", parameter is not None)):
         # A scene file's material may have both: it serves several models.
         if name in settings.given and name not in settings.origins and not used:
@@ -165,7 +165,7 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
 
 
 @contextmanager
-def refused_counts(design: Design | None) -> Iterator[None]:
+def refused_counts(design: ShadingPipeline | None) -> Iterator[None]:
     """Turn the refusal of a scene by the caller's own design, if there is one, into an `OptionError`."""
     try:
         yield

@@ -109,7 +109,7 @@ class Option(NamedTuple):
     key: str = ""
 
 
-class Model(Choice):
+class ReflectionOption(Choice):
     """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
 
     def __init__(self) -> None:
@@ -319,7 +319,7 @@ DESIGN: dict[str, Option] = {
         "pipeline.method",
     ),
     "model": Option(
-        Model(),
+        ReflectionOption(),
         "blinn",
         "Reflection model. Every method serves it; only phong needs quotient. FILE.csv: a curve of N.H.",
         "pipeline.model",

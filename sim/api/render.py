@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any, Unpack, cast
 
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import built, design_of, refused_counts
@@ -75,7 +75,7 @@ class Rendering:
     seconds: dict[str, float]
 
     @property
-    def design(self) -> Design:
+    def design(self) -> ShadingPipeline:
         """The full pipeline."""
         return self.specialisation.full
 
@@ -116,7 +116,7 @@ class Rendering:
 def prepare_rendering(
     settings: Settings,
     *,
-    design: Design | None = None,
+    design: ShadingPipeline | None = None,
     engine: Engine | str = "auto",
     frames: int = 0,
     remote: bool = False,
@@ -172,7 +172,7 @@ def prepare_rendering(
     return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds)
 
 
-def _large(design: Design) -> str:
+def _large(design: ShadingPipeline) -> str:
     """Text of large counts of a design, for which the first build of its model takes long."""
     counts = ("lights", design.lights), ("materials", design.materials)
     many = ", ".join(f"{count:,} {what}" for what, count in counts if count > 4)
@@ -180,7 +180,7 @@ def _large(design: Design) -> str:
 
 
 def _simulator(
-    design: Design, scene: Scene, settings: Settings, engine: str
+    design: ShadingPipeline, scene: Scene, settings: Settings, engine: str
 ) -> FrameSimulator | TriangleSimulator:
     """The simulator of the geometry that is asked for."""
     if settings["pipes"] > scene.height:
@@ -196,7 +196,7 @@ def _simulator(
     return TriangleSimulator(Renderer(design), size, engine)
 
 
-def _built(settings: Settings, design: Design) -> Design:
+def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
     """The design, built by the settings.
 
     Raises
@@ -222,7 +222,7 @@ def _built(settings: Settings, design: Design) -> Design:
         raise
 
 
-def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:
+def _check_lobes(scene: Scene, design: ShadingPipeline, settings: Settings) -> None:
     """Refuse materials with more lobes than the pipeline has tables, or with others than its fixed ones."""
     counted = len(scene.materials) == design.materials and len(scene.lights) <= design.lights
     if not (design.loads_tables and counted):
@@ -234,7 +234,7 @@ def _check_lobes(scene: Scene, design: Design, settings: Settings) -> None:
         raise settings.refuse("model", reason, remedy or "build the pipeline for it", design.model) from None
 
 
-def _design(settings: Settings) -> Design:
+def _design(settings: Settings) -> ShadingPipeline:
     """The design of the settings, for the scene's lights and one material."""
     source, lights = settings.source, settings.lights
     viewer = source.viewer if isinstance(source, Scene) else settings["viewer"]
@@ -246,7 +246,7 @@ def _design(settings: Settings) -> Design:
     return replace(made, factors=tuple(index for index, light in enumerate(lights) if light.fades))
 
 
-def _specialised(scenes: Sequence[Scene], design: Design, settings: Settings) -> Specialisation:
+def _specialised(scenes: Sequence[Scene], design: ShadingPipeline, settings: Settings) -> Specialisation:
     if settings["specialise"]:
         return specialise(scenes, design, exact=not settings["short_words"])
     return Specialisation(design, (), tuple(scenes))
@@ -266,7 +266,7 @@ def _shrink(settings: Settings, error: CompilerMissing) -> None:
 
 def prepared(
     source: Source | Scene,
-    design: Design | None,
+    design: ShadingPipeline | None,
     engine: str,
     options: Mapping[str, Any],
     *,
@@ -286,7 +286,7 @@ def prepared(
 def render(
     source: Source | Scene = "teapot",
     *,
-    design: Design | None = None,
+    design: ShadingPipeline | None = None,
     engine: Engine = "auto",
     vcd: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from blysk.golden.frames.compare import Comparison, FrameErrors, compare, compare_triangles
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.metrics import error_map
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
@@ -48,7 +48,7 @@ class RenderedFrame:
     """
 
     scene: Scene
-    design: Design
+    design: ShadingPipeline
     simulated: SimulatedFrame | SimulatedTriangleFrame
     name: str
     details: dict[str, Any]
@@ -134,7 +134,7 @@ class RenderedFrame:
     def save_comparison(self, path: str | os.PathLike[str]) -> None:
         """Write one picture of the simulated frame, the golden frame and the error map; see `save`."""
         parameter = self.design.highlight_parameter(self.scene.materials[0])
-        name = self.design.specular.model.PARAMETER if self.design.specular else "exponent"
+        name = self.design.specular.reflection.PARAMETER if self.design.specular else "exponent"
         highlight = "" if name is None else f", {name} {parameter:.4g}"
         subtitle = "no pixel shows the surface"
         if self.figures["visible_pixels"]:

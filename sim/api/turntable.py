@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Unpack, overload
 
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.design import refused_counts
 from blysk.sim.api.options import DESIGN, MAX_FRAMES, RENDERING, SCENE, Engine, Option, RenderOptions, Source
@@ -100,7 +100,7 @@ def turntable(
     source: Source | Scene = "teapot",
     frames: int = 36,
     *,
-    design: Design | None = None,
+    design: ShadingPipeline | None = None,
     engine: Engine = "auto",
     **options: Unpack[RenderOptions],
 ) -> Turntable:

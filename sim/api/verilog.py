@@ -11,7 +11,7 @@ from blysk.golden.frame_constants import address_table
 from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.scene import BACK_FACES
 from blysk.golden.render import Renderer
@@ -21,7 +21,7 @@ from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
 from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions
 from blysk.sim.api.design import built
 from blysk.sim.api.options import BUILD, BuildOptions
@@ -40,9 +40,9 @@ ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 
 def header_of(unit: ShadingUnit) -> list[str]:
     """Description of a pipeline, in lines: version, design and cycles; of several, also their streams."""
-    parameters = unit.parameters
-    several = parameters if isinstance(parameters, PixelPipelines) else None
-    made = parameters.design if isinstance(parameters, PixelPipelines) else parameters
+    model = unit.model
+    several = model if isinstance(model, PixelPipelines) else None
+    made = model.design if isinstance(model, PixelPipelines) else model
     gate = ", highlight gate" if made.gate else ""
     lines = [
         f"blysk {version('blysk')} shading pipeline, MIT licence",
@@ -85,7 +85,7 @@ def header_of(unit: ShadingUnit) -> list[str]:
     return lines
 
 
-def _vector_lines(made: Design) -> list[str]:
+def _vector_lines(made: ShadingPipeline) -> list[str]:
     """How the vectors of spans are made, for a method that takes them."""
     model = made.vector_spans
     mirrored = ["y_k is times cos a of light k; s0 is y of light 0 times its sin a."] if model.mirror else []
@@ -130,7 +130,7 @@ def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[st
     return [f"{several.pipes} pipelines; pipeline k takes spans with y mod {several.pipes} = k; {streams}"]
 
 
-def _render_header(unit: RenderUnit) -> list[str]:
+def _render_header(unit: RendererUnit) -> list[str]:
     """Description of a core from triangles to pixels: its pipeline without its input, and its geometry."""
     first, *lines = (
         line.replace("latency", "shading: latency") if line.startswith("latency") else line
@@ -141,7 +141,7 @@ def _render_header(unit: RenderUnit) -> list[str]:
         first.replace("shading pipeline", "triangles to pixels"),
         *lines,
         *_geometry_lines(unit.geometry),
-        *_axes_lines(unit.parameters),
+        *_axes_lines(unit.model),
         *_coarse_lines(unit),
         "memory_*: a depth for each pixel; read data a clock after the place; before a picture's first pixel "
         "the core writes all ones to every pixel of the picture, one a clock",
@@ -161,10 +161,10 @@ def _axes_lines(renderer: Renderer) -> list[str]:
     ]
 
 
-def _coarse_lines(unit: RenderUnit) -> list[str]:
+def _coarse_lines(unit: RendererUnit) -> list[str]:
     if unit.coarse is None:
         return []
-    given = unit.coarse.parameters
+    given = unit.coarse.model
     return [
         f"coarse depth test: pictures of at most {given.width}x{given.height}, {given.blocks:,} words of "
         f"{given.word_bits} bits; the first span of a picture waits for {given.swept:,} cycles"
@@ -200,9 +200,9 @@ def _geometry_header(unit: GeometryUnit) -> list[str]:
     return [f"blysk {version('blysk')} triangles to spans, MIT licence", _FORMATS, *_geometry_lines(unit)]
 
 
-def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, str]:
+def _descriptions(unit: ShadingUnit | RendererUnit, pipes: int) -> Mapping[str, str]:
     """Descriptions of the ports of a core with pixels as output."""
-    if isinstance(unit, RenderUnit):
+    if isinstance(unit, RendererUnit):
         return triangle_descriptions(unit)
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
     texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
@@ -210,7 +210,9 @@ def _descriptions(unit: ShadingUnit | RenderUnit, pipes: int) -> Mapping[str, st
 
 
 @with_options(BUILD, BuildOptions)
-def verilog(design: Design | None = None, name: str = "blysk", **options: Unpack[BuildOptions]) -> str:
+def verilog(
+    design: ShadingPipeline | None = None, name: str = "blysk", **options: Unpack[BuildOptions]
+) -> str:
     """Verilog-2001 of a pipeline for synthesis, with a table of its ports and frame constants.
 
     Parameters
@@ -228,12 +230,12 @@ def verilog(design: Design | None = None, name: str = "blysk", **options: Unpack
         If the name is no Verilog identifier, the method takes values of a span and the core triangles, the
         design cannot have that number of pipelines, or the bus does not serve the core.
     """
-    return verilog_and_unit(built(Design() if design is None else design, options), name)[0]
+    return verilog_and_unit(built(ShadingPipeline() if design is None else design, options), name)[0]
 
 
 def verilog_and_unit(
-    design: Design, name: str
-) -> tuple[str, ShadingUnit | RenderUnit | GeometryUnit | BusUnit]:
+    design: ShadingPipeline, name: str
+) -> tuple[str, ShadingUnit | RendererUnit | GeometryUnit | BusUnit]:
     """Verilog of the core that the design's `Build` asks for, and the unit that it was made from.
 
     Raises
@@ -252,13 +254,13 @@ def verilog_and_unit(
     lobe = p.specular if isinstance(p.specular, Lobe) else None
     loads = lobe is not None and lobe.fixed is None
     core = unit.framing.core if isinstance(unit, BusUnit) else unit
-    renderer = core.parameters if isinstance(core, RenderUnit) else None
+    renderer = core.model if isinstance(core, RendererUnit) else None
     axes = [f"axis {axis}" for axis in renderer.axes] if renderer else []
     constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads, p.span_members, axes)
     if isinstance(core, GeometryUnit):
         lines = _geometry_header(core)
     else:
-        lines = _render_header(core) if isinstance(core, RenderUnit) else header_of(core)
+        lines = _render_header(core) if isinstance(core, RendererUnit) else header_of(core)
     words = [*constants, *example_of(p, renderer)]
     descriptions: Mapping[str, str]
     if isinstance(unit, BusUnit):

@@ -8,7 +8,7 @@ from blysk.golden.frames.triangle_frame import triangle_constants
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.value_gate import ValueGate
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
@@ -23,7 +23,7 @@ AMBIENT, DIFFUSE, SPECULAR, EXPONENT = 0.05, 0.4, 0.55, 50
 _PER_LINE = 8
 
 
-def example_of(design: Design, renderer: Renderer | None = None) -> list[str]:
+def example_of(design: ShadingPipeline, renderer: Renderer | None = None) -> list[str]:
     """Lines: all writes for a grey surface and white light along the viewer, in decimal.
 
     Parameters
@@ -69,7 +69,7 @@ def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
     operand, parts, first = "u", [], "u = 1 - N.H"
     if isinstance(lobe, QuotientLobe):
         operand = "s"
-        first = "s = (1 - R.V)/2" if lobe.model.MIRROR else "s = 1 - (N.H)^2"
+        first = "s = (1 - R.V)/2" if lobe.reflection.MIRROR else "s = 1 - (N.H)^2"
         if lobe.parts == 2:
             half = lobe.entries // 2
             parts = [

@@ -60,7 +60,7 @@ def draw_frame(
     """
     with all_or_none(), _stages() as stage:
         engine = "pysim" if vcd else engine
-        ready = prepare_rendering(settings, engine=engine, stage=partial(_told, stage))
+        ready = prepare_rendering(settings, engine=engine, stage=partial(_show_stage, stage))
         stage.set_description_str("rasterising and simulating")
         frame = _frame(ready, vcd)
         stage.set_description_str("comparing with the golden renderer")
@@ -116,7 +116,7 @@ def draw_turntable(
             engine=engine,
             frames=len(pictures),
             remote=bool(address),
-            stage=partial(_told, stage),
+            stage=partial(_show_stage, stage),
         )
         stage.set_description_str("rasterising and simulating")
         report = _animation(ready, pictures, jobs, address, drawn)
@@ -146,7 +146,7 @@ def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
         raise
 
 
-def _told(bar: tqdm, text: str) -> None:
+def _show_stage(bar: tqdm, text: str) -> None:
     """Show a stage of the work; for a stage that may take long, print its time, also without a terminal."""
     bar.set_description_str(text)
     if text == SPECIALISING:

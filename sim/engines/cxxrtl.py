@@ -37,14 +37,14 @@ from blysk.hdl.emit.yosys import AmaranthYosys
 from blysk.sim.engines.beats import word_count
 from blysk.sim.engines.cache import cache_folder, code_version, private_folder, warn_of_cache
 from blysk.sim.engines.compilers import Compiler, compiler_missing, find_compilers
-from blysk.sim.engines.engine import Ports, SimulationError, Stimulus, StopReason, Trace
+from blysk.sim.engines.engine import Drive, Ports, SimulationError, StopReason, Trace
 from blysk.sim.engines.guards import group_registers
 from blysk.sim.engines.parts import read_parts
-from blysk.sim.engines.pysim import Model as Interpreted
+from blysk.sim.engines.pysim import Interpreted
 from blysk.sim.engines.words import plain_words
 from blysk.sim.errors import InputError
 
-__all__ = ["Model", "runtime_folder", "sources_of"]
+__all__ = ["Compiled", "runtime_folder", "sources_of"]
 
 # A component whose model is in the cache is not elaborated; Amaranth would tell so when it is deleted.
 warnings.filterwarnings("ignore", message=r"<blysk\.", category=UnusedElaboratable)
@@ -216,12 +216,12 @@ def sources_of(component: Component) -> tuple[str, str]:
     Parameters
     ----------
     component : Component
-        As for `Model`.
+        As for `Compiled`.
 
     Raises
     ------
     SimulationError, ValueError
-        As `Model` raises them for the component.
+        As `Compiled` raises them for the component.
     """
     text = _generate(_netlist_of(component))
     return text, _header(text) + _members(Ports(component)) + _source("cxxrtl_driver.cc")
@@ -319,7 +319,7 @@ def _room(width: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.empty((count, width), dtype=np.uint32), np.empty(count, dtype=np.int64)
 
 
-class Model:
+class Compiled:
     """A component compiled to machine code.
 
     The library comes from the cache, or is built; a built one is compared with pysim on its first run and
@@ -394,8 +394,8 @@ class Model:
             failures.append(failure)
         raise compiler_missing(failures)
 
-    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None = None) -> Trace:
-        """Drive a stimulus from power-up; see `engine.Model`.
+    def run(self, drive: Drive, progress: Callable[[int], object] | None = None) -> Trace:
+        """Run from power-up; see `engine.Prepared`.
 
         Raises
         ------
@@ -403,22 +403,22 @@ class Model:
             If a newly built model and pysim differ in the first cycles.
         """
         if self._unchecked is not None:
-            self._check(stimulus)
-        return self._run(stimulus, progress)
+            self._check(drive)
+        return self._run(drive, progress)
 
-    def _check(self, stimulus: Stimulus) -> None:
+    def _check(self, drive: Drive) -> None:
         component, target, entry = self._unchecked
-        write, after = stimulus.write, stimulus.write_after
+        write, after = drive.write, drive.write_after
         # The writes of 1024 materials take pysim half of the time of a build.
         if len(write) > 2 * _CHECK_WRITES:
             kept = np.r_[:_CHECK_WRITES, len(write) - _CHECK_WRITES : len(write)]
             write, after = write[kept], None if after is None else after[kept]
         limit = len(write) + _CHECK_CYCLES
         first = replace(
-            stimulus,
+            drive,
             write=write,
             write_after=after,
-            input=stimulus.input[:_CHECK_BEATS],
+            input=drive.input[:_CHECK_BEATS],
             count=None,
             idle_timeout=limit,
             limit=limit,
@@ -435,37 +435,37 @@ class Model:
             os.replace(target, entry)
         self._unchecked = None
 
-    def _run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
+    def _run(self, drive: Drive, progress: Callable[[int], object] | None) -> Trace:
         width = word_count(self.ports.o)
-        input_cycles = np.empty(len(stimulus.input), dtype=np.int64)
+        input_cycles = np.empty(len(drive.input), dtype=np.int64)
         status = np.zeros(
             (1, 0 if self.ports.status is None else word_count(self.ports.status)), dtype=np.uint32
         )
         arrays = {
-            name: np.ascontiguousarray(getattr(stimulus, name))
+            name: np.ascontiguousarray(getattr(drive, name))
             for name in ("constants", "write", "input", "input_stalls", "output_stalls", "write_after")
-            if getattr(stimulus, name) is not None
+            if getattr(drive, name) is not None
         }
         arrays |= {"input_cycles": input_cycles, "status": status}
         job = _Job(
             **{name: array.ctypes.data for name, array in arrays.items()},
-            write_count=len(stimulus.write),
-            input_count=len(stimulus.input),
-            input_period=len(stimulus.input_stalls),
-            output_period=len(stimulus.output_stalls),
-            count=-1 if stimulus.count is None else stimulus.count,
-            idle_timeout=stimulus.idle_timeout,
-            settle=stimulus.settle,
+            write_count=len(drive.write),
+            input_count=len(drive.input),
+            input_period=len(drive.input_stalls),
+            output_period=len(drive.output_stalls),
+            count=-1 if drive.count is None else drive.count,
+            idle_timeout=drive.idle_timeout,
+            settle=drive.settle,
             last=-1,
         )
-        output, cycles = _room(width, _BATCH if stimulus.count is None else min(stimulus.count, _ROOM))
+        output, cycles = _room(width, _BATCH if drive.count is None else min(drive.count, _ROOM))
         handle = self._library.blysk_open()
         try:
             end = StopReason.LIMIT
-            while end == StopReason.LIMIT and job.clock != stimulus.limit:
-                batch = _BATCH if stimulus.limit is None else min(_BATCH, stimulus.limit - job.clock)
+            while end == StopReason.LIMIT and job.clock != drive.limit:
+                batch = _BATCH if drive.limit is None else min(_BATCH, drive.limit - job.clock)
                 # At most one beat a cycle.
-                most = job.given + batch if stimulus.count is None else min(job.given + batch, stimulus.count)
+                most = job.given + batch if drive.count is None else min(job.given + batch, drive.count)
                 if most > len(output):
                     more = _room(width, max(batch, len(output)))
                     output, cycles = (

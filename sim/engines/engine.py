@@ -30,7 +30,7 @@ from amaranth.lib.wiring import Component, Flow
 from blysk.sim.engines.beats import word_count
 from blysk.sim.errors import CompilerMissing, SimulationError
 
-__all__ = ["CompilerMissing", "Model", "Ports", "SimulationError", "Stimulus", "StopReason", "Trace"]
+__all__ = ["CompilerMissing", "Drive", "Ports", "Prepared", "SimulationError", "StopReason", "Trace"]
 
 
 class Ports:
@@ -96,7 +96,7 @@ class Ports:
 
 
 @dataclass(frozen=True)
-class Stimulus:
+class Drive:
     """All that an engine drives, packed by `beats.pack`, and when it stops.
 
     Parameters
@@ -182,8 +182,8 @@ class Trace:
         return None
 
 
-class Model(Protocol):
+class Prepared(Protocol):
     """A component prepared for an engine: any number of runs, each from power-up."""
 
-    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None) -> Trace:
-        """Drive the stimulus; ``progress`` gets the number of output beats so far, once a batch of cycles."""
+    def run(self, drive: Drive, progress: Callable[[int], object] | None) -> Trace:
+        """Run from power-up; ``progress`` gets the number of output beats so far, once a batch of cycles."""

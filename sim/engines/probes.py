@@ -13,7 +13,7 @@ from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
@@ -65,7 +65,7 @@ class ObservedPipeline(Component):
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         Design of the pipeline; with one light, with a gate or without.
 
     Members
@@ -83,7 +83,7 @@ class ObservedPipeline(Component):
         If the design has not exactly one light.
     """
 
-    def __init__(self, design: Design):
+    def __init__(self, design: ShadingPipeline):
         if design.lights != 1:
             raise ValueError("a pipeline with one light is observed")
         self.design = design
@@ -195,7 +195,7 @@ def _ages(fragment: Fragment, operands: Value) -> dict[str, int]:
 
 def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Probe, Value]]:
     """Each probe and the value that it watches."""
-    design = unit.parameters
+    design = unit.model
 
     def number(name, title, block, value, age, exact, scale=1.0, format: Format | None = None):
         if format is not None:

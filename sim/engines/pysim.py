@@ -10,9 +10,9 @@ from amaranth.lib.wiring import Component
 from amaranth.sim import Simulator
 
 from blysk.sim.engines.beats import word_count
-from blysk.sim.engines.engine import Ports, Stimulus, StopReason, Trace
+from blysk.sim.engines.engine import Drive, Ports, StopReason, Trace
 
-__all__ = ["Model"]
+__all__ = ["Interpreted"]
 
 _BATCH = 1000
 _PERIOD = 1e-8
@@ -42,7 +42,7 @@ def _deep_expressions() -> Iterator[None]:
         sys.setrecursionlimit(limit)
 
 
-class Model:
+class Interpreted:
     """A component for Amaranth's simulator.
 
     Parameters
@@ -58,8 +58,8 @@ class Model:
         self.ports = Ports(component)
         self.vcd = vcd
 
-    def run(self, stimulus: Stimulus, progress: Callable[[int], object] | None = None) -> Trace:
-        """Drive a stimulus from power-up; see `engine.Model`.
+    def run(self, drive: Drive, progress: Callable[[int], object] | None = None) -> Trace:
+        """Run from power-up; see `engine.Prepared`.
 
         Raises
         ------
@@ -69,7 +69,7 @@ class Model:
         result: list[Trace] = []
 
         async def bench(ctx):
-            result.append(await self._drive(ctx, stimulus, progress))
+            result.append(await self._drive(ctx, drive, progress))
 
         with _deep_expressions():
             simulator = Simulator(self.component)
@@ -84,17 +84,17 @@ class Model:
             simulator.run()
         return result[0]
 
-    async def _drive(self, ctx, stimulus: Stimulus, progress) -> Trace:
+    async def _drive(self, ctx, drive: Drive, progress) -> Trace:
         component, ports = self.component, self.ports
         # Raw bits, whatever the payload's shape.
         input_payload = Value.cast(component.i.payload).as_unsigned()
         output_payload = Value.cast(component.o.payload).as_unsigned()
-        inputs, writes = _codes(stimulus.input), _codes(stimulus.write)
-        after = [0] * len(writes) if stimulus.write_after is None else stimulus.write_after.tolist()
-        input_stalls, output_stalls = stimulus.input_stalls.tolist(), stimulus.output_stalls.tolist()
-        count = stimulus.count
-        if stimulus.constants.size:
-            ctx.set(Value.cast(component.constants).as_unsigned(), _codes(stimulus.constants)[0])
+        inputs, writes = _codes(drive.input), _codes(drive.write)
+        after = [0] * len(writes) if drive.write_after is None else drive.write_after.tolist()
+        input_stalls, output_stalls = drive.input_stalls.tolist(), drive.output_stalls.tolist()
+        count = drive.count
+        if drive.constants.size:
+            ctx.set(Value.cast(component.constants).as_unsigned(), _codes(drive.constants)[0])
         if ports.write is not None:
             write_payload = Value.cast(component.write.payload).as_unsigned()
             ctx.set(write_payload, -1)
@@ -105,12 +105,12 @@ class Model:
         written, offered, held = 0, False, None
         clock, last, end = 0, -1, StopReason.LIMIT
         ctx.set(input_payload, -1)
-        while clock != stimulus.limit:
+        while clock != drive.limit:
             complete = count is not None and len(input_cycles) == len(inputs) and len(output) == count
-            if complete and written == len(writes) and clock - last > stimulus.settle:
+            if complete and written == len(writes) and clock - last > drive.settle:
                 end = StopReason.DONE
                 break
-            if clock - last > stimulus.idle_timeout:
+            if clock - last > drive.idle_timeout:
                 end = (
                     StopReason.DONE
                     if count is None and len(input_cycles) == len(inputs)

@@ -14,10 +14,10 @@ from blysk.sim.engines import cxxrtl, pysim
 from blysk.sim.engines.beats import dtype_of, pack, unpack
 from blysk.sim.engines.engine import (
     CompilerMissing,
-    Model,
+    Drive,
     Ports,
+    Prepared,
     SimulationError,
-    Stimulus,
     StopReason,
     Trace,
 )
@@ -57,17 +57,17 @@ class Run:
     engine: str
 
 
-_models: WeakKeyDictionary[Component, Model] = WeakKeyDictionary()
+_models: WeakKeyDictionary[Component, Prepared] = WeakKeyDictionary()
 
 
-def _compiled(component: Component, origin: Any) -> Model:
+def _compiled(component: Component, origin: Any) -> Prepared:
     if component not in _models:
-        _models[component] = cxxrtl.Model(component, origin)
+        _models[component] = cxxrtl.Compiled(component, origin)
     return _models[component]
 
 
-def _interpreted(component: Component, vcd: str | None) -> Model:
-    return pysim.Model(component, vcd)
+def _interpreted(component: Component, vcd: str | None) -> Prepared:
+    return pysim.Interpreted(component, vcd)
 
 
 def _pattern(name: str, stalls) -> np.ndarray:
@@ -130,8 +130,8 @@ def stimulus_of(
     output_stalls: np.ndarray | None = None,
     idle_timeout: int = 10_000,
     settle: int = 64,
-) -> Stimulus:
-    """Stimulus for an engine, packed and checked; the arguments are those of `simulate`.
+) -> Drive:
+    """Drive for an engine, packed and checked; the arguments are those of `simulate`.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def stimulus_of(
     if count is not None and settle > idle_timeout:
         raise ValueError(f"settle must be at most idle_timeout, {idle_timeout}, not {settle}")
     packed, writes = pack(ports.i, beats), _writes(ports.write, write)
-    return Stimulus(
+    return Drive(
         input=packed,
         write=writes,
         write_after=None if write_after is None else _places(write_after, len(writes), len(packed)),
@@ -200,7 +200,8 @@ def simulate(
         ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine or, with a warning that says why, pysim
         where no compiler works.
     origin : optional
-        What the component is made from, as for `cxxrtl.Model`; with it a model in the cache is found faster.
+        What the component is made from, as for `cxxrtl.Compiled`. With it the component is found faster in
+        the cache.
     input_stalls, output_stalls : bool array, optional
         One value a cycle, repeated for ever; ``True`` keeps the source from offering a new beat, or the sink
         from being ready. At least one value must be ``False``.
@@ -236,7 +237,7 @@ def simulate(
     if vcd is not None and engine != "pysim":
         raise ValueError(f"waveforms need engine 'pysim', not {engine!r}")
     ports = Ports(component)
-    stimulus = stimulus_of(
+    drive = stimulus_of(
         component,
         beats,
         count=count,
@@ -249,8 +250,8 @@ def simulate(
         settle=settle,
     )
     model, engine = _model_of(component, engine, origin, vcd)
-    trace = model.run(stimulus, progress)
-    _judge(stimulus, trace)
+    trace = model.run(drive, progress)
+    _judge(drive, trace)
     return Run(
         beats=_unpacked(ports.o, trace.output),
         cycles=trace.cycles,
@@ -261,7 +262,7 @@ def simulate(
     )
 
 
-def _model_of(component: Component, engine: str, origin: Any, vcd: str | None) -> tuple[Model, str]:
+def _model_of(component: Component, engine: str, origin: Any, vcd: str | None) -> tuple[Prepared, str]:
     """A component's model in an engine, and the engine's name; pysim for ``auto`` without a compiler."""
     if engine != "pysim":
         try:
@@ -282,7 +283,7 @@ def _unpacked(shape, words: np.ndarray) -> np.ndarray:
     return beats
 
 
-def _judge(stimulus: Stimulus, trace: Trace) -> None:
+def _judge(drive: Drive, trace: Trace) -> None:
     """Raise `SimulationError` if the run ended otherwise than complete or at its limit."""
     where = f"at clock {trace.clock}, output beat {len(trace.output)}"
     if trace.end == StopReason.DROPPED:
@@ -290,12 +291,12 @@ def _judge(stimulus: Stimulus, trace: Trace) -> None:
     if trace.end == StopReason.CHANGED:
         raise SimulationError(f"{where}: the payload changed while the beat waited for ready")
     if trace.end == StopReason.EXTRA:
-        raise SimulationError(f"{where}: a beat more than the {stimulus.count} expected")
+        raise SimulationError(f"{where}: a beat more than the {drive.count} expected")
     if trace.end == StopReason.STUCK:
-        expected = "" if stimulus.count is None else f" of {stimulus.count}"
+        expected = "" if drive.count is None else f" of {drive.count}"
         raise SimulationError(
-            f"nothing moved for {stimulus.idle_timeout} cycles up to clock {trace.clock}: "
+            f"nothing moved for {drive.idle_timeout} cycles up to clock {trace.clock}: "
             f"{len(trace.output)}{expected} output beats came, "
-            f"{len(trace.input_cycles)} of {len(stimulus.input)} input beats and "
-            f"{trace.write_count} of {len(stimulus.write)} writes were taken"
+            f"{len(trace.input_cycles)} of {len(drive.input)} input beats and "
+            f"{trace.write_count} of {len(drive.write)} writes were taken"
         )

@@ -47,7 +47,7 @@ def build(component: Component) -> bytes:
     SimulationError
         If Yosys cannot translate the component, or the compiler refuses the result.
     ValueError
-        As `cxxrtl.Model` raises it; or if the component has constants, or lacks the stream ``write`` or a
+        As `cxxrtl.Compiled` raises it; or if the component has constants, or lacks the stream ``write`` or a
         status.
     """
     ports = Ports(component)

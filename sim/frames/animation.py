@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from PIL import Image
 
 from blysk.golden.frames.compare import compare, compare_triangles
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
@@ -118,19 +118,19 @@ class Animation:
     ----------
     scene : Scene
         The scene; each frame has a camera of its own.
-    design : Design
+    design : ShadingPipeline
         The pipeline.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
-    full : Design, optional
+    full : ShadingPipeline, optional
         The pipeline that ``design`` is a specialisation of: the frames' errors are against its method and
         model. ``None``: ``design`` itself.
     """
 
     scene: Scene
-    design: Design
+    design: ShadingPipeline
     engine: str = "cxxrtl"
-    full: Design | None = None
+    full: ShadingPipeline | None = None
 
 
 @dataclass(frozen=True)
@@ -154,12 +154,12 @@ _animation: Animation | None = None
 
 
 @functools.lru_cache(maxsize=1)
-def _simulator(design: Design, engine: str) -> FrameSimulator:
+def _simulator(design: ShadingPipeline, engine: str) -> FrameSimulator:
     return FrameSimulator(design, engine)
 
 
 @functools.lru_cache(maxsize=1)
-def _triangle_simulator(design: Design, engine: str, size: tuple[int, int]) -> TriangleSimulator:
+def _triangle_simulator(design: ShadingPipeline, engine: str, size: tuple[int, int]) -> TriangleSimulator:
     return TriangleSimulator(Renderer(design), size, engine)
 
 

@@ -21,15 +21,15 @@ class MergedDrawUnit(wiring.Component):
 
     Parameters
     ----------
-    parameters : Drawing
+    model : Drawing
         What is drawn.
     """
 
-    def __init__(self, parameters: Drawing):
-        self.parameters, self.unit = parameters, DrawUnit(parameters)
-        design = parameters.renderer.design
+    def __init__(self, model: Drawing):
+        self.model, self.unit = model, DrawUnit(model)
+        design = model.renderer.design
         pixel = drawn_band_pixel_shape(design.x_bits, design.y_bits)
-        band = band_shape(parameters.bands)
+        band = band_shape(model.bands)
         super().__init__(
             {
                 "i": In(stream.Signature(data.StructLayout({"band": band, "buttons": unsigned(4)}))),

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from blysk.golden.frames.compare import BORDER, Comparison
-from blysk.golden.frames.frame import Frame
+from blysk.golden.frames.frame import Picture
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.error_names import ERRORS
 from blysk.sim.frames.frame import SimulatedFrame
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def frame_figures(
-    scene: Scene, design: Design, frame: SimulatedFrame, comparison: Comparison
+    scene: Scene, design: ShadingPipeline, frame: SimulatedFrame, comparison: Comparison
 ) -> dict[str, Any]:
     """Figures of a frame, ready for `write_json`.
 
@@ -65,7 +65,7 @@ def frame_figures(
 
 
 def triangle_figures(
-    scene: Scene, design: Design, frame: SimulatedTriangleFrame, comparison: Comparison
+    scene: Scene, design: ShadingPipeline, frame: SimulatedTriangleFrame, comparison: Comparison
 ) -> dict[str, Any]:
     """Figures of a frame by simulated geometry, ready for `write_json`.
 
@@ -111,7 +111,7 @@ def triangle_figures(
     }
 
 
-def sharp_lobes(scene: Scene, design: Design) -> int:
+def sharp_lobes(scene: Scene, design: ShadingPipeline) -> int:
     """Number of lobes that the method ``quotient`` has over 0.25 LSB off between two entries of a table."""
     if not isinstance(design.specular, QuotientLobe):
         return 0
@@ -120,10 +120,14 @@ def sharp_lobes(scene: Scene, design: Design) -> int:
 
 
 def _figures(
-    scene: Scene, design: Design, frame: SimulatedFrame | SimulatedTriangleFrame, triangles: int, visible: int
+    scene: Scene,
+    design: ShadingPipeline,
+    frame: SimulatedFrame | SimulatedTriangleFrame,
+    triangles: int,
+    visible: int,
 ) -> dict[str, Any]:
     """Figures that every frame has."""
-    material, model = scene.materials[0], design.specular and design.specular.model
+    material, model = scene.materials[0], design.specular and design.specular.reflection
     return {
         "method": design.method,
         "model": design.model,
@@ -245,7 +249,7 @@ def saving_figures(specialisation: Specialisation) -> dict[str, Any]:
     }
 
 
-def difference_figures(frame: Frame, full_frame: Frame) -> dict[str, int]:
+def difference_figures(frame: Picture, full_frame: Picture) -> dict[str, int]:
     """Largest difference of a channel between two frames, and how many pixels differ."""
     difference = np.abs(full_frame.image.astype(np.int16) - frame.image)
     return {

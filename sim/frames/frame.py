@@ -9,10 +9,10 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants, writes_of
-from blysk.golden.frames.frame import Frame, frame_buffer
+from blysk.golden.frames.frame import Picture, frame_buffer
 from blysk.golden.frames.prepare import constants_of, prepare, with_tables
 from blysk.golden.number.unit_vector import COMPONENT, quantise
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.scene import Scene
@@ -26,7 +26,7 @@ __all__ = ["FrameSimulator", "SimulatedFrame", "beats_of", "sample_constants", "
 
 
 @dataclass(frozen=True)
-class SimulatedFrame(Frame):
+class SimulatedFrame(Picture):
     """A frame of the simulated pipeline, with the time that the hardware takes.
 
     Parameters
@@ -86,7 +86,7 @@ class FrameSimulator:
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         The pipeline: method, reflection model, number of lights and so on; its `Build` has the number of
         pipelines.
     engine : str
@@ -107,7 +107,7 @@ class FrameSimulator:
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
 
-    def __init__(self, design: Design, engine: str = "auto"):
+    def __init__(self, design: ShadingPipeline, engine: str = "auto"):
         start = perf_counter()
         self.design = design
         self.engine = engine
@@ -192,7 +192,7 @@ def _colors(beats: np.ndarray) -> np.ndarray:
     return np.stack([beats[channel] for channel in "rgb"], axis=-1)
 
 
-def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
+def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
     """Some spans of every kind, and constants with lights from all sides, to check a new model with."""
     rng = np.random.default_rng(2025)
     length = np.r_[1, 2, 3, rng.integers(0, min(24, 1 << design.length_bits), 37)]
@@ -222,7 +222,7 @@ def _sample(design: Design) -> tuple[Spans, list[FrameConstants]]:
     return spans, sample_constants(design, rng)
 
 
-def sample_constants(design: Design, rng: np.random.Generator | None = None) -> list[FrameConstants]:
+def sample_constants(design: ShadingPipeline, rng: np.random.Generator | None = None) -> list[FrameConstants]:
     """Frame constants of each material of a design, with lights from all sides, to check a new model with."""
     rng = np.random.default_rng(2025) if rng is None else rng
     half = COMPONENT.max_code // 2
@@ -239,7 +239,7 @@ def sample_constants(design: Design, rng: np.random.Generator | None = None) -> 
     return constants
 
 
-def sample_material(design: Design, index: int) -> Material:
+def sample_material(design: ShadingPipeline, index: int) -> Material:
     """Sample material number ``index``, with an exponent or lobe that the pipeline serves."""
     material = Material((0.08, 0.05, 0.03), (0.5,) * 3, (0.6,) * 3, design.build.exponent or 7 + index % 64)
     if not design.loads_tables:
@@ -247,5 +247,5 @@ def sample_material(design: Design, index: int) -> Material:
     lobe = design.specular
     if lobe.fixed is None:
         return replace(material, exponent=7 + index % lobe.banks)
-    name, value = lobe.model.PARAMETER, lobe.fixed[index % lobe.banks]
+    name, value = lobe.reflection.PARAMETER, lobe.fixed[index % lobe.banks]
     return replace(material, **({} if name is None else {name: value}))

@@ -11,7 +11,7 @@ import numpy as np
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import Cost, cost_of
@@ -28,14 +28,15 @@ class Reduction(NamedTuple):
     reason : str
         One line that names the part and why it is not needed.
     changes : dict
-        New values of fields of `Design`; for a field that is itself a record, a dict of its changed fields.
+        New values of fields of `ShadingPipeline`. For a field that is itself a record: a dict of its changed
+        fields.
     """
 
     reason: str
     changes: dict[str, Any]
 
 
-def _without(design: Design, reduction: Reduction) -> Design:
+def _without(design: ShadingPipeline, reduction: Reduction) -> ShadingPipeline:
     changes = {
         name: replace(getattr(design, name), **value) if isinstance(value, dict) else value
         for name, value in reduction.changes.items()
@@ -49,7 +50,7 @@ class Specialisation:
 
     Parameters
     ----------
-    full : Design
+    full : ShadingPipeline
         The pipeline with every part.
     reductions : tuple of Reduction
         The parts that the scenes do not need.
@@ -57,12 +58,12 @@ class Specialisation:
         The scenes that `design` draws: lights without effect left out, and equal materials merged.
     """
 
-    full: Design
+    full: ShadingPipeline
     reductions: tuple[Reduction, ...]
     scenes: tuple[Scene, ...]
 
     @cached_property
-    def design(self) -> Design:
+    def design(self) -> ShadingPipeline:
         """The smallest pipeline."""
         return reduce(_without, self.reductions, self.full)
 
@@ -74,7 +75,7 @@ class Specialisation:
 
 
 def specialise(
-    scenes: Scene | Sequence[Scene], full: Design | None = None, *, exact: bool = True
+    scenes: Scene | Sequence[Scene], full: ShadingPipeline | None = None, *, exact: bool = True
 ) -> Specialisation:
     """The smallest pipeline for a scene, without the parts that the scene does not use.
 
@@ -90,7 +91,7 @@ def specialise(
     ----------
     scenes : Scene or sequence of Scene
         One scene, or several that differ in the camera only.
-    full : Design, optional
+    full : ShadingPipeline, optional
         Method and model, with as many lights and materials as the scene; by default those of `preset`.
     exact : bool
         Whether the pixels must be those of the full pipeline to the bit.
@@ -127,7 +128,7 @@ def _constants(scene: Scene, lights: int | None, mirror: bool = False) -> list[F
 
 
 def _without_dark_lights(
-    scenes: tuple[Scene, ...], full: Design, exact: bool
+    scenes: tuple[Scene, ...], full: ShadingPipeline, exact: bool
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     constants = _constants(scenes[0], full.lights, full.mirror)
     bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
@@ -149,7 +150,7 @@ def _without_dark_lights(
 
 
 def _without_equal_materials(
-    scenes: tuple[Scene, ...], full: Design
+    scenes: tuple[Scene, ...], full: ShadingPipeline
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     keys = [
         (*of.writes()["data"].tolist(), full.highlight_parameter(material), material.two_sided)
@@ -174,7 +175,7 @@ def _without_equal_materials(
 
 
 def _without_highlights(
-    design: Design, prepared: Sequence[PreparedFrame], constants: Sequence[FrameConstants]
+    design: ShadingPipeline, prepared: Sequence[PreparedFrame], constants: Sequence[FrameConstants]
 ) -> list[Reduction]:
     if design.specular is None or not design.lights:
         return []
@@ -194,7 +195,7 @@ def _without_highlights(
 
 
 def _with_fixed_values(
-    design: Design, constants: Sequence[FrameConstants], reductions: Sequence[Reduction]
+    design: ShadingPipeline, constants: Sequence[FrameConstants], reductions: Sequence[Reduction]
 ) -> list[Reduction]:
     """Reductions by fixed values: exponent or tables, if there is specular light, and grey colours."""
     found = []
@@ -216,7 +217,7 @@ def _with_fixed_values(
     return found
 
 
-def _with_fewer_bits(full: Design, scene: Scene, longest: int) -> list[Reduction]:
+def _with_fewer_bits(full: ShadingPipeline, scene: Scene, longest: int) -> list[Reduction]:
     """Reductions: coordinates with the bits of the picture's size, lengths with those of the longest span."""
     found = []
     for name, side, what in (("x_bits", scene.width, "columns"), ("y_bits", scene.height, "rows")):

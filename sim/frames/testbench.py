@@ -11,7 +11,7 @@ import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.prepare import constants_of, prepare
-from blysk.golden.pipeline import Design, Pixels, Spans
+from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light
@@ -32,13 +32,13 @@ _TRIANGLES = 400
 
 
 def teapot_frame(
-    design: Design, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
+    design: ShadingPipeline, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
 ) -> tuple[Spans, list[FrameConstants], Pixels]:
     """A teapot for a pipeline, with as many lights and materials as it has, and no term too bright.
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         The pipeline.
     size : two ints
         Width and height of the picture.
@@ -96,8 +96,8 @@ def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[s
         For each of ``writes``, ``spans``, ``pixels`` and ``status`` a column of codes for each port, all of
         one length. See `teapot_frame`.
     """
-    several = isinstance(unit.parameters, PixelPipelines)
-    spans, constants, pixels = teapot_frame(unit.parameters.design if several else unit.parameters)
+    several = isinstance(unit.model, PixelPipelines)
+    spans, constants, pixels = teapot_frame(unit.model.design if several else unit.model)
     tables = {
         "writes": ("write", writes_of(constants)),
         "spans": ("i", beats_of(unit, spans)),

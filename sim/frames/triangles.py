@@ -14,14 +14,14 @@ from blysk.golden.frames.missed import missed_pieces
 from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles, triangle_constants
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles
-from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, Frame, Triangles
+from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, FrameSettings, Triangles
 from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.hdl.core.stream import connect
 from blysk.hdl.geometry.geometry import WAITING_TRIANGLES
 from blysk.hdl.geometry.triangles import counters_shape
-from blysk.hdl.render import STATUS, WAITING_SPANS, RenderUnit
+from blysk.hdl.render import STATUS, WAITING_SPANS, RendererUnit
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import sample_constants
@@ -39,9 +39,9 @@ _PAUSE = 10_000
 
 
 class _Timed(wiring.Component):
-    """A `RenderUnit` with one counter more, ``busy``: the cycles in which something is inside it."""
+    """A `RendererUnit` with one counter more, ``busy``: the cycles in which something is inside it."""
 
-    def __init__(self, unit: RenderUnit):
+    def __init__(self, unit: RendererUnit):
         self._unit = unit
         super().__init__(dict(unit.signature.members) | {"status": Out(counters_shape(*STATUS, "busy"))})
 
@@ -71,7 +71,7 @@ class SimulatedTriangleFrame:
     sent : SceneTriangles
         The triangles that were sent, with the frame's constants.
     counts : dict of str to int
-        `RenderUnit`'s counters, and `missed_pieces`.
+        `RendererUnit`'s counters, and `missed_pieces`.
     written : int
         Pixels written, with those that a nearer surface replaced later.
     visible : int
@@ -118,7 +118,7 @@ def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
         Width and height of the picture, 1 to 4095.
     """
     rng, grid, count = np.random.default_rng(2025), renderer.geometry.grid, 12
-    frame, steps = Frame.centred(*size), grid.steps
+    frame, steps = FrameSettings.centred(*size), grid.steps
     near = np.minimum(size, 16) * steps
     middle = np.array([frame.left, frame.top]) * steps + rng.integers(0, near, (count, 1, 2))
     corner = middle + rng.integers(-8 * steps, 8 * steps, (count, 3, 2))
@@ -167,13 +167,13 @@ class TriangleSimulator:
     ):
         self.renderer, self.size, self.engine, self.angle = renderer, size, engine, angle
         self._origin = renderer, size
-        self._render = RenderUnit(*self._origin)
+        self._render = RendererUnit(*self._origin)
         self._unit = _Timed(self._render)
         self._check()
 
     def _check(self) -> None:
         """Compare the pixels of some triangles by the new simulation model with the bit-accurate model."""
-        triangles, frame = sample_triangles(self.renderer, self.size), Frame.centred(*self.size)
+        triangles, frame = sample_triangles(self.renderer, self.size), FrameSettings.centred(*self.size)
         constants = sample_constants(self.renderer.design)
         if self.renderer.rows:
             given = np.random.default_rng(2026).uniform(-0.5, 0.5, (self.renderer.design.lights - 1, 3, 3))
@@ -194,7 +194,7 @@ class TriangleSimulator:
         if not all(np.array_equal(run.beats[name], value) for name, value in expected.beats.items()):
             raise SimulationError("the simulated hardware's pixels are not those of its bit-accurate model")
 
-    def _constants(self, frame: Frame) -> dict[str, int]:
+    def _constants(self, frame: FrameSettings) -> dict[str, int]:
         """Codes of the frame's constants, as for the first picture."""
         return frame.codes | ({} if self.renderer.coarse is None else {"picture": 0})
 

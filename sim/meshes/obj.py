@@ -119,24 +119,24 @@ def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None
 def _library_files(name: str, folder: Path, found: Found) -> list[Path]:
     """Files that a statement names, as a name with spaces, or as several names; others are told."""
     bare = name.partition(" #")[0].strip()
-    files, told = [], {}
+    files, reasons = [], {}
     for part in dict.fromkeys([name, bare, *bare.split()]):
         try:
             target = inside(folder, part, part.replace("\\", "/"))
         except Refused:
-            told[part] = _REASONS[1]
+            reasons[part] = _REASONS[1]
             continue
         if not os.path.isfile(target):
-            told[part] = _REASONS[0]
+            reasons[part] = _REASONS[0]
         elif part in (name, bare):
             return [target]
         else:
             files.append(target)
     if name and not files:
-        told = {bare: max(told.values(), key=_REASONS.index)}
+        reasons = {bare: max(reasons.values(), key=_REASONS.index)}
     for part in bare.split() if files else [bare]:
-        if part in told:
-            found.tell(f"the material file {shown(part)!r}, {told[part]}")
+        if part in reasons:
+            found.tell(f"the material file {shown(part)!r}, {reasons[part]}")
     return files
 
 

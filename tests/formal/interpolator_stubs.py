@@ -183,7 +183,7 @@ def loop(self, m, name, start, starts, *others):
     x = Signal(WORD_BITS, name=name)
     with m.If(starts):
         m.d.sync += x.eq(word(start[0]))
-    format = self.parameters.result_format
+    format = self.model.result_format
     return FixedValue(format, Cat(x, Const(0, format.width - WORD_BITS)))
 
 
@@ -206,8 +206,8 @@ class Line(AccumulatorUnit):
 
     cycles_per_pixel = 1
 
-    def __init__(self, parameters):
-        unit = self.OF(parameters)
+    def __init__(self, model):
+        unit = self.OF(model)
         # Else its parts count as forgotten.
         Fragment.get(unit, None)
         super().__init__(unit.i.payload.shape(), unit.o.payload.shape())
@@ -239,10 +239,10 @@ class Vectors(Line):
     initiation_interval = INTERVAL
     quadratics = walk(vector_start, vector_line)
 
-    def __init__(self, *parameters, **options):
-        self.OF = lambda parameters: QuotientSpansUnit(*parameters, **options)
-        super().__init__(parameters)
-        self.begun, self.constants = Signal(name="begun"), self.OF(parameters).constants
+    def __init__(self, *model, **options):
+        self.OF = lambda model: QuotientSpansUnit(*model, **options)
+        super().__init__(model)
+        self.begun, self.constants = Signal(name="begun"), self.OF(model).constants
 
 
 def gate() -> ValueGateUnit:

@@ -7,6 +7,7 @@ import pytest
 from amaranth.hdl import Mux, Signal, signed
 
 import blysk.hdl.cosines.angular_setup
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.cosines.angular_setup import SPAN_ANGLES, AngularSetup
 from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.cosines.half_chord import HalfChord
@@ -19,7 +20,6 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.half_chord import HalfChordUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
-from blysk.sim.units.operands import pairs_at
 
 from .bounds import Bounds, cut_by, registers_of, unknown, word, wrapped_by
 from .prover import Harness

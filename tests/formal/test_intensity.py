@@ -107,7 +107,7 @@ PIXEL_BUGS = {
     "it moves while it is stalled": ("elaborate", "m.If(advance)", "m.If(1)"),
     "a pixel ends with a channel": (
         "_issue",
-        "ends_channel & (channel == self.parameters.channels - 1)",
+        "ends_channel & (channel == self.model.channels - 1)",
         "ends_channel",
     ),
     "a term is left out": (

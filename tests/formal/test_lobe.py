@@ -48,8 +48,8 @@ def registers_of(harness):
 class OfUnit:
     """A harness of a unit whose memory is outside, and values as they stood enabled cycles ago."""
 
-    def __init__(self, parameters):
-        self.unit = LobeUnit(parameters, shares_memory=True)
+    def __init__(self, model):
+        self.unit = LobeUnit(model, shares_memory=True)
         self.harness = Harness(self.unit)
         self.m, self.words = self.harness.m, registers_of(self.harness)
         self.moves = self.unit.advance
@@ -72,13 +72,13 @@ class OfUnit:
         self.harness.claim((self.age < cycles) | condition)
 
 
-def of_argument(parameters):
+def of_argument(model):
     """Two cycles on the argument is 1 - N·H, cut, at least 0; 0 for a beat that is dark or not in front."""
-    h = OfUnit(parameters)
-    bits, beat = parameters.fraction_bits, h.unit.i.payload
+    h = OfUnit(model)
+    bits, beat = model.fraction_bits, h.unit.i.payload
     operand = Value.cast(beat.operand)
     behind, exact = operand >= 1 << bits, operand
-    if parameters.operand == "cosine":
+    if model.operand == "cosine":
         behind, exact = operand <= 0, (ONE_SQUARED.codes.item() - operand) >> 34 - bits
     lit = h.before(~(behind | beat.dark))
     h.claim(h.words["lit"] == lit, 1)
@@ -87,12 +87,12 @@ def of_argument(parameters):
     return h.harness
 
 
-def of_address(parameters):
+def of_address(model):
     """Three cycles on the memory is asked for the word of the argument's octave and step; the rest is f.
 
     From the definition: row r, from 1 on, has the arguments from ``2^(r-1-E)`` to twice that.
     """
-    p, h = parameters, OfUnit(parameters)
+    p, h = model, OfUnit(model)
     bits, width = p.fraction_bits, p.fraction_bits - 1 - p.step_bits
     argument = h.before(h.words["argument"], 3)
     bank = Const(0)
@@ -117,13 +117,13 @@ def of_address(parameters):
     return h.harness
 
 
-def of_term(parameters):
+def of_term(model):
     """Whatever word with entries in range: the term is the exact sum, which does not wrap.
 
     What the unit keeps of a word is that word. Of what it keeps it is assumed that the entry and the next one
     are in range; of the product, which is cut, that f is from 0 to under 1.
     """
-    h = OfUnit(parameters)
+    h = OfUnit(model)
     word, kept = h.before(h.unit.table.word), h.words["value_9"]
     h.harness.claim(kept == h.before(word[:17]))
     step = h.before(word[17:]).as_signed()
@@ -156,9 +156,9 @@ def written(h):
     return write, value, begins
 
 
-def of_banks(parameters):
+def of_banks(model):
     """A word that is written is of the bank whose table began last."""
-    p, unit = parameters, LobeMemory(parameters)
+    p, unit = model, LobeMemory(model)
     h = Harness(unit)
     bank, (write, value, begins) = Signal(17, name="bank"), written(h)
     with h.m.If(write & begins):
@@ -173,9 +173,9 @@ def of_banks(parameters):
     return h
 
 
-def of_memory(parameters):
+def of_memory(model):
     """A word chosen freely is, once its values were written, what they make; no other write changes it."""
-    p, unit = parameters, LobeMemory(parameters)
+    p, unit = model, LobeMemory(model)
     h = Harness(unit)
     m = h.m
     bank, entry = h.free(range(p.banks), "bank"), h.free(range(p.entries), "entry")
@@ -388,5 +388,5 @@ def test_bugs_are_found(refute, inject, bug):
     """Injected into the unit, each refutes a claim."""
     claim, *change = BUGS[bug]
     inject(*change)
-    parameters = Lobe(operand="cosine", banks=3, octaves=6, steps=4)
-    refute(claim(SMALL if claim in (of_banks, of_memory) else parameters), 20)
+    model = Lobe(operand="cosine", banks=3, octaves=6, steps=4)
+    refute(claim(SMALL if claim in (of_banks, of_memory) else model), 20)

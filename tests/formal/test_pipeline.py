@@ -34,7 +34,7 @@ class Line(InterpolatorUnit):
     latency = 1
 
     @classmethod
-    def setup_intervals(cls, parameters):
+    def setup_intervals(cls, model):
         return range(1, 2)
 
     def elaborate(self, platform):
@@ -75,7 +75,7 @@ def decisions(span, lit):
 def stubs(monkeypatch):
     """A pipeline with three places, a `Line`, and units of a clock or two that hand its codes on."""
 
-    def pipeline(parameters, style="throughput"):
+    def pipeline(model, style="throughput"):
         interval = 2 if style == "compact" else 1
         # Longer than that of a dark beat, so that the lights are not in step.
         longer = 3 if style == "compact" else 1
@@ -93,18 +93,18 @@ def stubs(monkeypatch):
             monkeypatch.setattr(module, unit.__name__, short(unit, *options))
         monkeypatch.setitem(InterpolatorUnit.UNITS, LinearInterpolator, Line)
         monkeypatch.setattr(ShadingPipelineUnit, "_waiting_spans", UNCOUNTED + 1)
-        return ShadingPipelineUnit(parameters.built(style=style))
+        return ShadingPipelineUnit(model.built(style=style))
 
     return pipeline
 
 
-def of_writes(parameters):
+def of_writes(model):
     """Spans inside are those taken in whose last pixel has not left.
 
     Assumed, as `of_waiting_spans` and the proofs of the assembler have it: a last pixel leaves only while a
     span is inside, and there are at most as many as the FIFO of coordinates and the assembler hold.
     """
-    h = Harness(unit := ShadingPipelineUnit(parameters))
+    h = Harness(unit := ShadingPipelineUnit(model))
     inside = Signal(6)
     admitted = taken(unit.i) & (unit.i.payload.length != 0)
     finished = taken(unit.o) & unit.o.payload.last
@@ -138,17 +138,17 @@ def of_waiting_spans(unit, late):
     is, in the end.
     """
     h = Harness(unit)
-    span, parameters = unit.i.payload, unit.parameters
+    span, model = unit.i.payload, unit.model
 
     def image(span, place, last, pixel):
         right = (pixel.x == (span.x + place)[:2]) & (pixel.y == span.y) & (pixel.last == last)
-        if not parameters.lights:
+        if not model.lights:
             return right
-        codes = [(Value.cast(span.normal_left[0]) + place + k)[:2] for k in range(parameters.lights)]
-        lit = Value.cast(span.normal_right[0]) if parameters.gate else Const(-1, parameters.lights)
+        codes = [(Value.cast(span.normal_left[0]) + place + k)[:2] for k in range(model.lights)]
+        lit = Value.cast(span.normal_right[0]) if model.gate else Const(-1, model.lights)
         terms = (
             codes
-            if parameters.model is None
+            if model.model is None
             else [*codes, *(Mux(lit[k], code, 0) for k, code in enumerate(codes))]
         )
         return right & (pixel.r == Cat(terms))
@@ -162,7 +162,7 @@ def of_waiting_spans(unit, late):
     answers(h, unit.i.valid, unit.i.ready | leaves, late, unit.o.ready & ~unit.write.valid)
     answers(h, unit.write.valid, unit.write.ready | leaves, late, unit.o.ready)
     h.claim(~(unit.write.valid & taken(unit.i)))
-    if parameters.lights:
+    if model.lights:
         h.claim(taken(unit._interpolator.i) == (taken(unit.i) & (span.length != 0)))
     for light in unit._lights[1:]:
         h.claim(taken(light.i) == taken(unit._lights[0].i))
@@ -176,10 +176,10 @@ LIT = preset(method="linear", model="cosquad", exponent=10, grey=True, **NARROW)
 TWO_LIGHTS = preset(method="linear", model="cosquad", exponent=10, grey=True, lights=2, **NARROW)
 
 
-@pytest.mark.parametrize("parameters", [AMBIENT, LINEAR, GATED], ids=["ambient", "linear", "gated"])
-def test_writes_wait_for_spans(prove, parameters):
+@pytest.mark.parametrize("model", [AMBIENT, LINEAR, GATED], ids=["ambient", "linear", "gated"])
+def test_writes_wait_for_spans(prove, model):
     """Inductive: a write is taken as soon as no span is inside, not before, nor beside one that comes."""
-    prove(of_writes(parameters))
+    prove(of_writes(model))
 
 
 def test_constants_stay(prove):

@@ -80,8 +80,8 @@ def check(unit, exponent, codes):
         constants={"exponent": exponent},
     )
     terms = run.beats.astype(np.int64)
-    code = codes if unit.parameters.operand == "one_minus_cosine" else ONE_SQUARED.codes - codes
-    x = np.clip(code * unit.parameters.operand_format.step, 0, 1 - 2.0**-52)
+    code = codes if unit.model.operand == "one_minus_cosine" else ONE_SQUARED.codes - codes
+    x = np.clip(code * unit.model.operand_format.step, 0, 1 - 2.0**-52)
     under = np.exp(exponent * np.log1p(-x)) / Power.RESULT_FORMAT.step - terms
     rise = (terms - np.minimum.accumulate(terms)).max()
     assert rise <= RISE, "a term rises too far"
@@ -154,7 +154,7 @@ def of_darkness(operand):
     unit = PowerUnit(Power(operand))
     peak, end = 0, 1 << 25
     if operand == "cosine":
-        peak, end = ONE_SQUARED.codes.item(), unit.parameters.operand_format.min_code
+        peak, end = ONE_SQUARED.codes.item(), unit.model.operand_format.min_code
     beats = {"operand": np.array([peak, end, peak]), "dark": np.array([1, 0, 0], dtype=np.uint8)}
     for exponent in EXPONENTS:
         terms = simulate(unit, beats, count=3, constants={"exponent": exponent}).beats

@@ -40,19 +40,19 @@ class ShortSpansUnit(wiring.Component):
     """The unit with x and z of `BITS` bits, y = 0, exponents 0 and 1, ``l = x + z``, and few starts."""
 
     def __init__(self):
-        self.parameters = FewBits()
+        self.model = FewBits()
         vector = data.StructLayout({"x": signed(BITS), "z": signed(BITS)})
         span = {"start": vector, "step": vector, "exponent": 1, "length": LENGTH_BITS}
         super().__init__(
             {
                 "i": In(stream.Signature(data.StructLayout(span))),
-                "o": Out(stream.Signature(pixel_words_shape(self.parameters))),
+                "o": Out(stream.Signature(pixel_words_shape(self.model))),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.spans = self.spans = spans = QuotientSpansUnit(self.parameters, LENGTH_BITS)
+        m.submodules.spans = self.spans = spans = QuotientSpansUnit(self.model, LENGTH_BITS)
         spans.DEPTH = DEPTH
         given, payload = self.i.payload, spans.i.payload
         for name in ("start", "step"):

@@ -5,11 +5,11 @@ from itertools import product
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.number.fixed import SQ, Fixed, Format
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT, quantise
-from blysk.sim.units.operands import pairs_at
 
 from .bounds import unknown
 

@@ -72,9 +72,9 @@ def of_argument(unit, name, format, if_dark):
     with h.m.If(~h.register("held")):
         h.m.d.sync += [beat.eq(unit.i.payload), past.eq(first), past_dark.eq(dark), stand.eq(Cat(1, stand))]
     exact = Value.cast(beat.operand)
-    if unit.parameters.operand == "cosine":
+    if unit.model.operand == "cosine":
         exact = ONE_SQUARED.codes.item() - exact
-    cut = unit.parameters.operand_format.fraction_bits - format.fraction_bits
+    cut = unit.model.operand_format.fraction_bits - format.fraction_bits
     exact = exact >> cut if cut > 0 else exact << -cut
     h.claim(~stand[0] | ((first == exact) & (dark == beat.dark)))
     raised = Mux(past < 0, 0, past)
@@ -118,21 +118,21 @@ def check(unit, exponent):
     It is 0 where the exact one is under 2^-14, and not where that is over it, but for a hundredth of that;
     and 0 for a dark beat at the peak.
     """
-    parameters = unit.parameters
-    codes = operands(parameters, every_argument(parameters, exponent))
+    model = unit.model
+    codes = operands(model, every_argument(model, exponent))
     codes, dark = np.r_[codes, codes[0]], np.arange(len(codes) + 1) == len(codes)
     run = simulate(unit, {"operand": codes, "dark": dark}, count=len(codes), constants={"exponent": exponent})
-    operand, terms = Fixed(parameters.operand_format, codes), run.beats.astype(np.int64)
+    operand, terms = Fixed(model.operand_format, codes), run.beats.astype(np.int64)
     assert terms[0] >= 2**17 - 9, "no peak"
     assert not terms[-1], "a dark beat is lit"
     assert (np.diff(terms) <= 0).all(), "a term rises"
     cosine = operand.values + (1 - ONE_SQUARED.values)
-    if parameters.operand == "one_minus_cosine":
+    if model.operand == "one_minus_cosine":
         cosine = 1 - operand.values
-    exact = parameters.model.reflect(np.maximum(cosine, -1), exponent) * 2.0**14
+    exact = model.reflection.reflect(np.maximum(cosine, -1), exponent) * 2.0**14
     assert not terms[exact < 0.99].any(), "a term goes on past the cutoff"
     assert terms[~dark & (exact > 1.01)].all(), "a term ends before the cutoff"
-    np.testing.assert_array_equal(terms, parameters.compute(operand, dark, exponent).codes)
+    np.testing.assert_array_equal(terms, model.compute(operand, dark, exponent).codes)
 
 
 @pytest.mark.parametrize("operand", OPERANDS)

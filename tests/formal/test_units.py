@@ -7,6 +7,7 @@ import pytest
 from amaranth.hdl import Cat, Mux, Signal
 
 import blysk.hdl.core.stream
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.hdl.core.stream import PipelinedUnit
@@ -14,7 +15,6 @@ from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
-from blysk.sim.units.registry import RECORDS
 
 from ..lists import OF_DOCUMENTS
 from .prover import Harness

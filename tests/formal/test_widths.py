@@ -97,18 +97,18 @@ def test_no_word_wraps_whatever_the_operands(wraps, name):
     assert name not in UNITS or wrapped_by(UNITS[name]()) <= set(wraps)
 
 
-@pytest.mark.parametrize("parameters", [*product((1, 2), (45, 90), (False, True))])
-def test_no_word_of_a_bisection_wraps(wraps, parameters):
+@pytest.mark.parametrize("model", [*product((1, 2), (45, 90), (False, True))])
+def test_no_word_of_a_bisection_wraps(wraps, model):
     """Every word of u up to the flag, and those under 0 that lengths over 1 give."""
-    of_bisection(*parameters)
-    assert wrapped_by(BisectionUnit(Bisection(*parameters))) <= set(wraps)
+    of_bisection(*model)
+    assert wrapped_by(BisectionUnit(Bisection(*model))) <= set(wraps)
 
 
-@pytest.mark.parametrize("parameters", [*product((1, 2), (45, 90), (False, True))])
-def test_no_word_of_a_chain_of_bisections_wraps(wraps, parameters):
+@pytest.mark.parametrize("model", [*product((1, 2), (45, 90), (False, True))])
+def test_no_word_of_a_chain_of_bisections_wraps(wraps, model):
     """Every word of u up to the flag, and what each of 15 levels makes of it; u and the weights saturate."""
-    of_bisection_chain(*parameters)
-    assert wrapped_by(BisectionChainUnit(BisectionChain(Bisection(*parameters)))) <= set(wraps)
+    of_bisection_chain(*model)
+    assert wrapped_by(BisectionChainUnit(BisectionChain(Bisection(*model)))) <= set(wraps)
 
 
 def test_no_word_of_a_renormaliser_wraps(wraps):
@@ -203,11 +203,11 @@ def test_first_steps_of_the_recurrence_do_not_wrap():
     of_recurrence_prologue()
 
 
-@pytest.mark.parametrize("parameters", [{}, {"guard_bits": 20}, {"interleave": 4}])
-def test_words_of_the_recurrence_wrap_in_the_format_of_its_state(parameters):
+@pytest.mark.parametrize("model", [{}, {"guard_bits": 20}, {"interleave": 4}])
+def test_words_of_the_recurrence_wrap_in_the_format_of_its_state(model):
     """Of which it is proved that it holds them, in `test_recurrence`; a direct recurrence saturates."""
-    parameters = Recurrence(**parameters)
-    assert wrapped_by(RecurrenceUnit(parameters)) == {parameters.state_format}
+    model = Recurrence(**model)
+    assert wrapped_by(RecurrenceUnit(model)) == {model.state_format}
 
 
 @pytest.mark.seldom

@@ -208,8 +208,8 @@ def of_half_chord():
             HalfChord().compute(Fixed(UQ(2, 34), chord), np.zeros(chord.shape, bool))
 
 
-def of_specular_slopes(parameters):
-    assert len(parameters.slopes.codes) == 1 << parameters.EXPONENT_BITS
+def of_specular_slopes(model):
+    assert len(model.slopes.codes) == 1 << model.EXPONENT_BITS
 
 
 def sectors(degrees, one, like):

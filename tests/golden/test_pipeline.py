@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import Fixed
@@ -12,7 +13,6 @@ from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector
-from blysk.sim.units.operands import pairs_at
 
 AMBIENT = 0.1
 UP = np.array([0.0, 0.0, 1.0])

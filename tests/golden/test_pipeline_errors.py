@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import Specular
@@ -15,7 +16,6 @@ from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, Material, halfway_vector, intensity, saturate
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.sim.units.operands import pairs_at
 
 from ..lists import SPECULAR_MODELS
 

@@ -5,10 +5,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from blysk.bench.units.pipeline_spans import any_constants, any_spans
 from blysk.golden.build import PIPES
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import preset
-from blysk.sim.units.pipeline_spans import any_constants, any_spans
 
 
 def rows(pixels):

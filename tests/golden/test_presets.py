@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import (
     LOBES,
     METHOD_LINES,
@@ -48,7 +48,7 @@ def test_the_default_method_serves_every_model(model):
     assert made.method == ("renormalise" if model in MODELS else "quotient")
     assert made == preset(default_method(model), model)
     assert made.loads_tables == (model is not None and model not in MODELS)
-    assert Design() == preset()
+    assert ShadingPipeline() == preset()
 
 
 @pytest.mark.parametrize(

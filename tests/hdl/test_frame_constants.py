@@ -8,6 +8,7 @@ import pytest
 from amaranth.hdl import ResetInserter, Signal, Value
 from amaranth.sim import Simulator
 
+from blysk.bench.units.pipeline_spans import any_constants, any_spans
 from blysk.golden.frame_constants import (
     BANK_ADDRESS,
     FIELDS_OF_A_FRAME,
@@ -26,7 +27,6 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats
-from blysk.sim.units.pipeline_spans import any_constants, any_spans
 
 from ..checks import assert_beats_equal, words_of
 
@@ -379,7 +379,7 @@ def test_reset_clears_the_constants():
 
 def shade(unit, spans, constants, engine):
     """Pixels of the materials that there are equal the model's."""
-    pixels = pixel_beats(unit.parameters.compute(spans, constants[: unit.parameters.materials]))
+    pixels = pixel_beats(unit.model.compute(spans, constants[: unit.model.materials]))
     options = {"count": len(pixels["x"]), "write": writes_of(constants), "engine": engine}
     run = simulate(unit, beats_of(unit, spans), **options)
     assert_beats_equal(run.beats, pixels)

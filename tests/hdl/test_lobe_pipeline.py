@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from blysk.bench.units.lighting.highlight_gate import spans_about
+from blysk.bench.units.operands import component_words, sphere
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import with_tables
 from blysk.golden.lighting.highlight_gate import HighlightGate
@@ -20,8 +22,6 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import _sample, beats_of
 from blysk.sim.frames.testbench import pixel_beats
-from blysk.sim.units.lighting.highlight_gate import spans_about
-from blysk.sim.units.operands import component_words, sphere
 
 from ..checks import assert_beats_equal
 

@@ -186,9 +186,9 @@ QUOTIENTS = {
 @pytest.mark.parametrize(("lights", "highlights"), QUOTIENTS)
 def test_times_and_parts_of_quotients(lights, highlights):
     """No multiplier has more than 18 bits; the table of the root has 512 words of 30 bits."""
-    parameters = Quotient(QuotientSpans(lights, highlights))
+    model = Quotient(QuotientSpans(lights, highlights))
     for interval, stated in enumerate(zip(*QUOTIENTS[lights, highlights], strict=True), 1):
-        cost = cost_of(unit := QuotientUnit(parameters, interval))
+        cost = cost_of(unit := QuotientUnit(model, interval))
         assert (cost.multiplier_count, unit.latency) == stated
         assert (max(max(pair) for pair in cost.multipliers), cost.constant_multipliers) == (18, 0)
         assert cost.rom_bits == 512 * 30
@@ -196,7 +196,7 @@ def test_times_and_parts_of_quotients(lights, highlights):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("parameters", "multipliers"),
+    ("model", "multipliers"),
     [
         (QuotientSpans(), 5),
         (QuotientSpans(mirror=True), 6),
@@ -205,7 +205,7 @@ def test_times_and_parts_of_quotients(lights, highlights):
         (QuotientSpans(2, highlights=False), 3),
     ],
 )
-def test_parts_of_spans_of_quotients(parameters, multipliers):
-    cost = cost_of(unit := QuotientSpansUnit(parameters))
+def test_parts_of_spans_of_quotients(model, multipliers):
+    cost = cost_of(unit := QuotientSpansUnit(model))
     assert (cost.multipliers, cost.constant_multipliers) == ({(18, 18): multipliers}, 0)
     assert (unit.multipliers, unit.latency, unit.short_latency) == (multipliers, 7, 6)

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from amaranth.hdl import UnusedElaboratable
 
+from blysk.bench.units.operands import pairs_at
+from blysk.bench.units.pipeline import RECORD, case_of
+from blysk.bench.units.pipeline_spans import any_constants, any_spans, operands_of
 from blysk.golden.build import STYLES, Build
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
@@ -22,9 +25,6 @@ from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.testbench import pixel_beats
-from blysk.sim.units.operands import pairs_at
-from blysk.sim.units.pipeline import RECORD, case_of
-from blysk.sim.units.pipeline_spans import any_constants, any_spans, operands_of
 
 from ..checks import assert_beats_equal
 from ..lists import KINDS

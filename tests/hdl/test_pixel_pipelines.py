@@ -10,14 +10,14 @@ import pytest
 from amaranth.hdl import Value
 from amaranth.sim import Simulator
 
+from blysk.bench.units.pipeline_spans import any_constants, any_spans, ends_for
+from blysk.bench.units.record import STALLS
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import preset
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, WidePipelinesUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
-from blysk.sim.units.pipeline_spans import any_constants, any_spans, ends_for
-from blysk.sim.units.record import STALLS
 
 from ..checks import words_of
 
@@ -27,11 +27,11 @@ PLAIN = preset(model="cosquad", lights=0, x_bits=6, y_bits=4, length_bits=4)
 
 def shade(unit, spans, constants, **options):
     """Pixels of each lane, in the order in which they left, and the run."""
-    spans = ends_for(unit.parameters.design, spans)
+    spans = ends_for(unit.model.design, spans)
     beats = beats_of(unit, spans)
     options = {"count": None, "engine": "auto", "idle_timeout": 500, **options}
     run = simulate(unit, beats, write=writes_of(constants), **options)
-    present = run.beats["present"][:, np.newaxis] >> np.arange(unit.parameters.pipes) & 1 == 1
+    present = run.beats["present"][:, np.newaxis] >> np.arange(unit.model.pipes) & 1 == 1
     assert present.any(axis=1).all()
     pixels = run.beats["pixels"]
     return [pixels[:, k][present[:, k]] for k in range(present.shape[1])], run
@@ -56,7 +56,7 @@ def wide():
 def test_each_lane_equals_its_model_under_stalls(wide, shares):
     """Every pixel of every pipeline, in order; materials change; and the sums of the counters."""
     rng = np.random.default_rng([7, *(int(10 * share) for share in shares)])
-    model = wide.parameters
+    model = wide.model
     spans = any_spans(rng, model.design, rng.integers(0, 12, 400))
     constants = any_constants(rng, model.design, spans)
     patterns = [rng.random(period) < share for period, share in zip((997, 1009), shares, strict=True)]
@@ -102,7 +102,7 @@ def test_merged_stream_is_that_of_one_pipeline():
     rng = np.random.default_rng(6)
     spans = any_spans(rng, PLAIN, rng.integers(4, 9, 40))
     constants = any_constants(rng, PLAIN, spans)
-    expected = unit.parameters.compute(spans, constants)
+    expected = unit.model.compute(spans, constants)
     sent = {"count": len(expected.x), "write": writes_of(constants), "engine": "pysim"}
     run = simulate(unit, beats_of(unit, spans), **sent)
     np.testing.assert_array_equal(run.beats["x"], expected.x)
@@ -175,7 +175,7 @@ def test_writes_between_frames():
     for count in (25, 1, 1, 25):
         spans = any_spans(rng, PLAIN, rng.integers(1, 6, count))
         frames.append((spans, any_constants(rng, PLAIN, spans)))
-    expected = [unit.parameters.compute(spans, constants) for spans, constants in frames]
+    expected = [unit.model.compute(spans, constants) for spans, constants in frames]
     events, found = [], []
 
     async def send(context, port, words, name):

@@ -9,14 +9,14 @@ from amaranth.lib import data
 from amaranth.lib.wiring import Out
 
 from blysk.bench.quality.mutation import Wrapped
+from blysk.bench.units.record import length_of
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.build import Build
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.geometry.geometry import GeometryUnit
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import length_of
-from blysk.sim.units.registry import RECORDS
 
 from ..checks import assert_beats_equal
 
@@ -26,8 +26,8 @@ UNITS = {
     "geometry": ("geometry", GeometryUnit),
     "geometry, two lanes": ("geometry", partial(GeometryUnit, build=Build(top="geometry", setups=2))),
     "geometry, compact": ("geometry", partial(GeometryUnit, build=Build("compact"))),
-    "render": ("render", partial(RenderUnit, Renderer(DESIGN), (32, 24))),
-    "render, compact": ("render", partial(RenderUnit, Renderer(COMPACT), (32, 24))),
+    "render": ("render", partial(RendererUnit, Renderer(DESIGN), (32, 24))),
+    "render, compact": ("render", partial(RendererUnit, Renderer(COMPACT), (32, 24))),
 }
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.cosines import highlight_cosine, recurrence
+from blysk.bench.units.normals import difference_accumulator, quadratic_evaluator
 from blysk.golden.number.spans import pixels_of
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.cosines import highlight_cosine, recurrence
-from blysk.sim.units.normals import difference_accumulator, quadratic_evaluator
 
 from ..checks import assert_beats_equal, resets
 from .variants import mostly_long

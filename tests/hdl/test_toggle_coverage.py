@@ -14,9 +14,9 @@ from amaranth.lib import data
 from amaranth.lib.wiring import Out
 
 from blysk.bench.quality.mutation import Wrapped, stimuli_of, units_inside
-from blysk.sim.engines.cxxrtl import Model
+from blysk.bench.units.registry import RECORDS
+from blysk.sim.engines.cxxrtl import Compiled
 from blysk.sim.engines.toggles import _registers, _words
-from blysk.sim.units.registry import RECORDS
 
 
 class Edges(Wrapped):
@@ -58,7 +58,7 @@ def still_bits(record):
     edges = Edges(unit)
     if not edges.names:
         pytest.skip("all its registers are in parts that have a record")
-    model = Model(edges)
+    model = Compiled(edges)
     seen = np.bitwise_or.reduce(
         [model.run(stimulus, None).status[0] for stimulus in stimuli_of(record, unit)]
     )

@@ -90,7 +90,7 @@ def held(scene: Scene, design, light=LIGHT, **options) -> tuple[np.ndarray, floa
         light,
         COEFFICIENTS,
         scene.materials[0].exponent,
-        design.specular.model.name,
+        design.specular.reflection.name,
         steps=256,
         **options,
     )
@@ -224,7 +224,7 @@ def test_caster_finds_a_wrong_curve():
     """Ends joined without their magnitudes, as an earlier version did, are 10 LSB and more off."""
     scene = scene_of(MESHES["triangle"], camera_of("triangle", "perspective"), 50)
     wrong = shade_spans(
-        scene, rasterise(scene), "normalised", preset("renormalise", "cosquad").specular.model
+        scene, rasterise(scene), "normalised", preset("renormalise", "cosquad").specular.reflection
     )
     right = compare(
         scene, preset("renormalise", "cosquad"), model_frame(scene, preset("renormalise", "cosquad"))

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from cocotb_tools.runner import get_results, get_runner
 
+from blysk.bench.units.bus.framing import RECORD
 from blysk.golden.bus.registers import CONSTANTS
 from blysk.golden.frame_constants import MATERIAL_ADDRESS
 from blysk.golden.presets import preset
 from blysk.hdl.bus.bus import BusUnit
 from blysk.hdl.emit.verilog import emit
-from blysk.sim.units.bus.framing import RECORD
 
 from .verilog_bench import SIMULATORS, missing_tool, without_initial_values
 

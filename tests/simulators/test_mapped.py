@@ -12,13 +12,13 @@ import pytest
 
 from blysk.bench.tools.absorb_registers import absorb_registers
 from blysk.bench.tools.place_and_route import tool_versions
+from blysk.bench.units.record import length_of
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats, teapot_frame
-from blysk.sim.units.record import length_of
-from blysk.sim.units.registry import RECORDS
 
 from .mapped import connect, core, first, map_component, same, swap, verilog_of
 from .verilog_bench import BenchError, VerilogBench, assert_beats, missing_tool, pauses
@@ -127,7 +127,7 @@ def test_faults_injected_in_a_memory_are_found(check, fault):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "design", [pytest.param(of, id=f"{of.interpolator.name}-{of.specular.model.name}") for of in DESIGNS]
+    "design", [pytest.param(of, id=f"{of.interpolator.name}-{of.specular.reflection.name}") for of in DESIGNS]
 )
 def test_a_frame_of_a_pipeline(design, tmp_path):
     """The netlist before the step does the same, by proof; that of the default shades a frame."""

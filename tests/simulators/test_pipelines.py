@@ -6,10 +6,10 @@ A frame of each in one of both in the long run, and a small one of one in the qu
 import numpy as np
 import pytest
 
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.frame_constants import writes_of
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.frames.testbench import pixel_beats, teapot_frame
-from blysk.sim.units.registry import RECORDS
 
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool, pauses
 
@@ -32,7 +32,7 @@ def check(tmp_path):
         if missing_tool(simulator):
             pytest.skip(missing_tool(simulator))
         unit = PIPELINES[name]()
-        design = unit.parameters
+        design = unit.model
         spans, constants, pixels = teapot_frame(design, *size)
         found = VerilogBench(unit, tmp_path, **options).run(
             simulator,
@@ -69,6 +69,6 @@ def test_pipeline(check, name, simulator):
 )
 def test_a_frame_of_every_pipeline(check, name, simulator):
     (width, height), triangles = FRAMES[simulator]
-    design = PIPELINES[name]().parameters
+    design = PIPELINES[name]().model
     size = min(width, 1 << design.x_bits), min(height, 1 << design.y_bits)
     check(name, simulator, size, triangles, optimise=True)

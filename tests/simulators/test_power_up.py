@@ -9,9 +9,9 @@ cores on buses.
 import numpy as np
 import pytest
 
+from blysk.bench.units.record import length_of
+from blysk.bench.units.registry import RECORDS
 from blysk.hdl.emit.verilog import emit
-from blysk.sim.units.record import length_of
-from blysk.sim.units.registry import RECORDS
 
 from .verilog_bench import VerilogBench, assert_beats, missing_tool, pauses, without_initial_values
 

@@ -13,10 +13,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from blysk.bench.units.record import length_of
+from blysk.bench.units.registry import RECORDS
 from blysk.hdl.emit.verilog import emit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import length_of
-from blysk.sim.units.registry import RECORDS
 
 from ..lists import OF_DOCUMENTS, WHOLE
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool, pauses

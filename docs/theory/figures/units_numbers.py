@@ -60,7 +60,7 @@ def _errors() -> str:
         unit = (
             Power("one_minus_cosine")
             if name == "blinn_product"
-            else Specular(model.model, "one_minus_cosine")
+            else Specular(model.reflection, "one_minus_cosine")
         )
         bound = unit.ERROR if name == "blinn_product" else unit.error
         worst = 0.0
@@ -183,7 +183,7 @@ def _lobe_unit() -> str:
         )
     names = {"blinn": "Blinn", "beckmann": "Beckmann", "ggx": "GGX"}
     heads = [
-        f"{names[case.model.name]} {'n' if case.label == 'n' else 'a'} = {value:g}"
+        f"{names[case.reflection.name]} {'n' if case.label == 'n' else 'a'} = {value:g}"
         if k == 0
         else f"{value:g}"
         for case in CASES

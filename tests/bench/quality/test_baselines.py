@@ -19,6 +19,7 @@ from blysk.bench.quality.baselines import (
     read,
 )
 from blysk.bench.tools.blocks import ENTRIES as UNITS
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.build import STYLES
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
@@ -28,7 +29,6 @@ from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.errors import InputError
-from blysk.sim.units.registry import RECORDS
 
 BASELINES = read()
 

@@ -9,8 +9,8 @@ from blysk.bench.quality import equivalence, mutants
 from blysk.bench.quality.equivalence import Miter
 from blysk.bench.quality.mutants import LEAST, Score, main, scores, table, waived
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
+from blysk.bench.units.registry import RECORDS
 from blysk.sim.frames.workers import local_executor
-from blysk.sim.units.registry import RECORDS
 
 ROWS = [
     Score("diffuse", 10, ("a", "b"), ("c", "d")),

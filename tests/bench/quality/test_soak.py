@@ -21,16 +21,16 @@ from blysk.bench.quality.soak import (
     tasks_of_unit,
 )
 from blysk.bench.speed.verilator import Verilated
+from blysk.bench.units.record import Case, length_of, once
+from blysk.bench.units.registry import RECORDS
+from blysk.bench.units.triangles import frame_of
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import Triangles
 from blysk.golden.number.unit_vector import ONE
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import Case, length_of, once
-from blysk.sim.units.registry import RECORDS
-from blysk.sim.units.triangles import frame_of
 
 DESIGN = {"method": "quadratic", "model": "cosquad", "gate": False, "seed": 1, "part": 0, "baseline": None}
 
@@ -70,14 +70,14 @@ def test_beats_are_counted_and_a_wrong_one_stops_the_run(monkeypatch):
     found = measure(pixels=3000, **DESIGN)
     assert 3000 <= found["pixels"] < 3000 + 4096
     assert found["cycles"] >= found["pixels"]
-    compute = Design.compute
+    compute = ShadingPipeline.compute
 
     def wrong(design, spans, constants):
         pixels = compute(design, spans, constants)
         pixels.color[77, 2] ^= 1
         return pixels
 
-    monkeypatch.setattr(Design, "compute", wrong)
+    monkeypatch.setattr(ShadingPipeline, "compute", wrong)
     with pytest.raises(
         SimulationError, match=r"^cxxrtl: quadratic, cosquad, part 0 of seed 1, .*: beat 77: b is"
     ):

@@ -9,7 +9,7 @@ import pytest
 
 from blysk.bench import accuracy
 from blysk.bench.quality import sweep
-from blysk.bench.quality.sweep import EXPONENTS, FEW_EXPONENTS, LARGEST, Frame, Point, main, summarise
+from blysk.bench.quality.sweep import EXPONENTS, FEW_EXPONENTS, LARGEST, Point, SweptMesh, main, summarise
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.number.unit_vector import quantise
@@ -36,8 +36,8 @@ def test_exponents():
 )
 def test_reference_is_the_renderer(model, exponent):
     """Worked out once a mesh, the exact frame is that which the golden renderer draws."""
-    frame = Frame(teapot(1000), 96, 72)
-    image = render(frame.scene_of(exponent), model=UNITS[model].model).image.reshape(-1, 3)
+    frame = SweptMesh(teapot(1000), 96, 72)
+    image = render(frame.scene_of(exponent), model=UNITS[model].reflection).image.reshape(-1, 3)
     shown = frame.raster.pixel[frame.raster.visible]
     assert len(shown) == frame.pixels > 1500
     np.testing.assert_allclose(frame.golden(model, exponent), 255 * image[shown], rtol=0, atol=1e-9)
@@ -46,7 +46,7 @@ def test_reference_is_the_renderer(model, exponent):
 @pytest.mark.parametrize("method", ["quotient", "renormalise", "chord-local", "quadratic"])
 def test_spans_are_those_of_a_frame(method):
     """The raster is kept; the rest is as for a frame by itself."""
-    frame, design = Frame(load_mesh(STRESS).mesh, 64, 48), preset(method, accuracy.model_of(method))
+    frame, design = SweptMesh(load_mesh(STRESS).mesh, 64, 48), preset(method, accuracy.model_of(method))
     for exponent in (3, 700):
         cut, spans = frame.spans_of(design, exponent)
         expected = prepare(frame.scene_of(exponent), design)
@@ -64,7 +64,7 @@ def test_spans_are_those_of_a_frame(method):
 @pytest.mark.parametrize("design", [("quotient", "phong"), ("renormalise", "cosquad")])
 def test_errors_are_those_of_the_simulated_frame(design):
     mesh, (method, model) = teapot(500), design
-    frame = Frame(mesh, 64, 48)
+    frame = SweptMesh(mesh, 64, 48)
     for exponent, _, result in accuracy.measure(mesh, preset(*design), (2, 300), 64, 48):
         (point,) = frame.points(exponent, [model], method)
         assert point.max_lsb == pytest.approx(result.method_error.max_lsb, abs=1e-9)
@@ -81,7 +81,7 @@ def flat(normal):
 @pytest.mark.parametrize("side", [1, -1])
 def test_switched_pixels_are_told_apart(side):
     """A normal a billionth off a right angle to the light, which as a code lies on the other side of it."""
-    scene = Frame(flat([0, 0, 1]), 16, 12).scene
+    scene = SweptMesh(flat([0, 0, 1]), 16, 12).scene
     light, viewer = np.array(scene.lights[0].direction), scene.camera.viewer
     across = normalise(viewer - (viewer @ light) * light)
     turn = np.linspace(-1, 1, 200)[:, np.newaxis]
@@ -90,7 +90,7 @@ def test_switched_pixels_are_told_apart(side):
     product = quantise(normals) @ quantise(light)
     # The model's N·L is cut to 25 of these 34 fraction bits.
     (normal, *_) = normals[side * product < -(2**10)]
-    (point,) = Frame(flat(normal), 16, 12).points(1, ["blinn_product"], "quadratic")
+    (point,) = SweptMesh(flat(normal), 16, 12).points(1, ["blinn_product"], "quadratic")
     assert point.over == point.switched == point.pixels > 20
     assert point.switched_cosine == pytest.approx(1e-9, rel=0.01)
     assert point.max_lsb > 5
@@ -99,10 +99,10 @@ def test_switched_pixels_are_told_apart(side):
 
 def test_a_wrong_sign_is_no_excuse(monkeypatch):
     """Where N·L is not about 0, a light that is off is an error as any."""
-    scene = Frame(flat([0, 0, 1]), 16, 12).scene
+    scene = SweptMesh(flat([0, 0, 1]), 16, 12).scene
     light, viewer = np.array(scene.lights[0].direction), scene.camera.viewer
     across = normalise(viewer - (viewer @ light) * light)
-    frame = Frame(flat(normalise(across + 0.002 * light)), 16, 12)
+    frame = SweptMesh(flat(normalise(across + 0.002 * light)), 16, 12)
     constants = FrameConstants.of(frame.scene, 1)
     behind = replace(constants, direction=-constants.direction)
     monkeypatch.setattr(sweep, "constants_of", lambda *_: [behind])
@@ -114,7 +114,7 @@ def test_a_wrong_sign_is_no_excuse(monkeypatch):
 
 def test_other_errors_are_not_switched():
     """Straight lines between normals are far off, and not at N·L = 0 only."""
-    frame = Frame(teapot(1000), 96, 72)
+    frame = SweptMesh(teapot(1000), 96, 72)
     (point,) = frame.points(100, ["cosquad"], method="linear")
     assert point.over > 20
     assert point.switched < point.over / 10
@@ -122,7 +122,7 @@ def test_other_errors_are_not_switched():
 
 
 def test_other_scenes():
-    frame = Frame(teapot(100), 16, 12, (0, 0, 1), (0, 1, 0.5), (1, 0, 0))
+    frame = SweptMesh(teapot(100), 16, 12, (0, 0, 1), (0, 1, 0.5), (1, 0, 0))
     assert frame.scene_of(7).material == Material((0,) * 3, (0,) * 3, (1,) * 3, 7)
     assert frame.scene.lights == (Light((1, 0, 0)),)
     np.testing.assert_allclose(frame.scene.camera.viewer, normalise([0, 1, 0.5]), atol=1e-12)

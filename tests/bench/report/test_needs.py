@@ -10,7 +10,7 @@ from blysk.bench.report import needs
 from blysk.bench.report.needs import QUICK_SCENES, SCENES, measure, section, simulate_both, tasks
 from blysk.bench.ring import ring
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.faces import face_normals
 from blysk.hdl.emit.cost import Cost
 from blysk.sim.api.scene_file import read_scene_file
@@ -61,7 +61,7 @@ def test_scenes(name, costs):
 
 
 def test_a_frame_that_differs_is_told(monkeypatch, costs):
-    compute = Design.compute
+    compute = ShadingPipeline.compute
 
     def brighter(self, spans, constants):
         pixels = compute(self, spans, constants)
@@ -69,7 +69,7 @@ def test_a_frame_that_differs_is_told(monkeypatch, costs):
             pixels.color[:, 0] ^= 1
         return pixels
 
-    monkeypatch.setattr(Design, "compute", brighter)
+    monkeypatch.setattr(ShadingPipeline, "compute", brighter)
     found = measure("copper teapot", SMALL)
     assert found["different_pixels"] > 300
     assert found["largest_difference"] == 1

@@ -75,7 +75,7 @@ def test_every_pair_of_every_mesh(outcome, capsys, tmp_path):
     assert main(["teapot", STRESS, "--json", str(file)]) == 0
     # At exponent 1 these have a highlight beyond a right angle, which a table of quotient has not.
     beyond = {
-        name for name, unit in MODELS.items() if unit.model.reflect(np.array([-1e-6]), 1)[0] > 0.5 / 255
+        name for name, unit in MODELS.items() if unit.reflection.reflect(np.array([-1e-6]), 1)[0] > 0.5 / 255
     }
     assert {"cosquad", "exp"} <= beyond < set(MODELS)
     assert set(outcome["asked"]) == {

@@ -35,7 +35,7 @@ from blysk.bench.store import Task
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import split_pairs
 from blysk.golden.number.unit_vector import quantise
-from blysk.golden.pipeline import Design, Spans
+from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import shade_spans
@@ -118,7 +118,7 @@ def test_a_stall_in_every_cycle():
 
 
 def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
-    compute = Design.compute
+    compute = ShadingPipeline.compute
 
     def inverted(self, spans, constants):
         pixels = compute(self, spans, constants)
@@ -126,7 +126,7 @@ def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
         color[:2] ^= 255
         return dataclasses.replace(pixels, color=color)
 
-    monkeypatch.setattr(Design, "compute", inverted)
+    monkeypatch.setattr(ShadingPipeline, "compute", inverted)
     monkeypatch.setattr(stability_streams, "stream_patterns", lambda unit: [("back to back", {})])
     assert [case["wrong"] for case in measure_stream("linear", quick=True)] == [2, 2]
 
@@ -135,7 +135,7 @@ def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
 def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
     """One step more than the worst of a frame may be, in one pixel or in all."""
     [case] = [case for case in cases(1) if case.name == "exponent 10"]
-    compute = Design.compute
+    compute = ShadingPipeline.compute
     right = measure_case(case, "renormalise")
     assert right["prepared"]["grade"] == "good"
 
@@ -145,7 +145,7 @@ def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
         color[places] += np.where(color[places] < 128, 2, -2)
         return dataclasses.replace(pixels, color=color)
 
-    monkeypatch.setattr(Design, "compute", brighter)
+    monkeypatch.setattr(ShadingPipeline, "compute", brighter)
     found = measure_case(case, "renormalise")
     for way in ("given", "prepared"):
         assert found[way]["grade"] == "bad"

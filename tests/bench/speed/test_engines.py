@@ -139,8 +139,8 @@ class Baseline:
         self.ports = Ports(component)
         self.component, self.beat, self.clock = component, beat, clock
 
-    def run(self, stimulus):
-        run = simulate(self.component, stimulus.input[:, 0].astype(np.int64), count=stimulus.count)
+    def run(self, drive):
+        run = simulate(self.component, drive.input[:, 0].astype(np.int64), count=drive.count)
         output, cycles = pack(self.ports.o, run.beats), run.cycles.copy()
         output[3] ^= self.beat
         cycles[5] += self.clock

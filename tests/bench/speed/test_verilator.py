@@ -15,7 +15,7 @@ from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.compilers import find_compilers
-from blysk.sim.engines.engine import SimulationError, Stimulus
+from blysk.sim.engines.engine import Drive, SimulationError
 from blysk.sim.engines.simulate import simulate, stimulus_of
 
 needed = pytest.mark.skipif(
@@ -68,10 +68,10 @@ def _quick(monkeypatch):
     monkeypatch.setattr(blysk.bench.speed.verilator, "find_compilers", lambda: iter(quick))
 
 
-def stimulus(ports, beats, write, count, **others):
+def drive(ports, beats, write, count, **others):
     free = np.zeros(1, dtype=bool)
     given = {"input_stalls": free, "output_stalls": free, "idle_timeout": 100, "settle": 0} | others
-    return Stimulus(
+    return Drive(
         pack(ports.i, beats),
         pack(ports.write, write),
         np.zeros((0, 0), dtype=np.uint32),
@@ -94,21 +94,21 @@ def test_equal_to_the_engine(tmp_path):
     run = simulate(component, beats, count=300, write=write)
     model = Verilated(component, tmp_path)
     assert model.compiler
-    output, cycles = model.run(stimulus(model.ports, beats, write, 300))
+    output, cycles = model.run(drive(model.ports, beats, write, 300))
     assert np.array_equal(output, pack(model.ports.o, run.beats))
     assert np.array_equal(cycles, run.cycles)
     # Writes between beats.
     late = np.array([0, 0, 7, 7, 200])
     run = simulate(component, beats, count=300, write=write, write_after=late)
-    between, cycles = model.run(stimulus(model.ports, beats, write, 300, write_after=late))
+    between, cycles = model.run(drive(model.ports, beats, write, 300, write_after=late))
     assert np.array_equal(between, pack(model.ports.o, run.beats))
     assert np.array_equal(cycles, run.cycles)
     # From power-up every time; a beat that never comes ends the run.
-    assert np.array_equal(model.run(stimulus(model.ports, beats, write, 300))[0], output)
+    assert np.array_equal(model.run(drive(model.ports, beats, write, 300))[0], output)
     with pytest.raises(SimulationError, match=r"^Verilator's model gave nothing for 100 cycles$"):
-        model.run(stimulus(model.ports, beats, write, 301))
+        model.run(drive(model.ports, beats, write, 301))
     with pytest.raises(ValueError, match=r"^a stimulus with a count and without stalls is needed$"):
-        model.run(stimulus(model.ports, beats, write, 300, output_stalls=np.array([True, False])))
+        model.run(drive(model.ports, beats, write, 300, output_stalls=np.array([True, False])))
 
 
 class Constant(Component):

@@ -10,15 +10,15 @@ import pytest
 
 from blysk.bench.tools import blocks
 from blysk.bench.tools.blocks import ENTRIES, Entry, entry_of, rows, sample_of, table
+from blysk.bench.units.lighting import specular
+from blysk.bench.units.record import Decisions, Record, Sample, Variant
+from blysk.bench.units.registry import RECORDS
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.sim.cli.main import main
-from blysk.sim.units.lighting import specular
-from blysk.sim.units.record import Decisions, Record, Sample, Variant
-from blysk.sim.units.registry import RECORDS
 
 from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 

@@ -148,9 +148,9 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
         assert capsys.readouterr().out == "module\n"
     assert len(made) == 1
     unit = made.pop()
-    assert unit.parameters.interpolator == candidate.design.interpolator
-    assert (unit.parameters.model, unit.parameters.lights) == (candidate.model, candidate.lights)
-    assert unit.parameters.build.style == candidate.style
+    assert unit.model.interpolator == candidate.design.interpolator
+    assert (unit.model.model, unit.model.lights) == (candidate.model, candidate.lights)
+    assert unit.model.build.style == candidate.style
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnusedElaboratable)
         del unit

@@ -16,7 +16,7 @@ from blysk.bench.tools.place_and_route import Layout, lay_out
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS
 from blysk.hdl.geometry.geometry import GeometryUnit
-from blysk.hdl.render import RenderUnit
+from blysk.hdl.render import RendererUnit
 from blysk.sim.cli.main import main
 from blysk.sim.installation import install_extra
 
@@ -57,7 +57,7 @@ def test_cores_that_take_triangles(calls, cache, capsys, monkeypatch):
     for top in ("geometry", "render"):
         assert main(["fpga", "--top", top, "--method", "linear", "--seeds", "1"]) == 0
         assert capsys.readouterr().out.splitlines()[2].startswith(f"{top} linear, blinn, 1 light ")
-    assert placed == [GeometryUnit, RenderUnit]
+    assert placed == [GeometryUnit, RendererUnit]
 
 
 def test_table():

@@ -14,9 +14,9 @@ from blysk.bench.tools.documents import PROJECT
 from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, Node, likeness
 from blysk.bench.tools.pages import write_pages
+from blysk.bench.units.record import Decisions, Record, Sample, Variant
+from blysk.bench.units.registry import RECORDS
 from blysk.sim.errors import InputError
-from blysk.sim.units.record import Decisions, Record, Sample, Variant
-from blysk.sim.units.registry import RECORDS
 
 # Docstrings.
 
@@ -192,7 +192,7 @@ def test_a_page_has_all_of_its_record_and_the_same_bytes_each_time(tmp_path):
         assert stimulus.covers in text
     assert all(reason in text for reason in (*record.waivers.values(), *record.still))
     assert all(
-        f"[`{path}`]" in text for path in ("golden/lighting/diffuse.py", "sim/units/lighting/diffuse.py")
+        f"[`{path}`]" in text for path in ("golden/lighting/diffuse.py", "bench/units/lighting/diffuse.py")
     )
     assert pages.test_command("diffuse") in text
     # Files of the project, wherever the pages are.

@@ -185,7 +185,7 @@ def test_what_is_cached_runs_no_tool(calls, cache):
 
 
 @pytest.mark.parametrize(
-    ("luts", "placer"), [(place_and_route._MANY - 1, ()), (place_and_route._MANY, ECP5.large)]
+    ("luts", "placer"), [(place_and_route._LARGE - 1, ()), (place_and_route._LARGE, ECP5.large)]
 )
 def test_placer_by_size(luts, placer, calls, cache):
     """Hardly any logic would never end in the static placer."""
@@ -225,7 +225,7 @@ def test_a_router_that_does_not_end_is_asked_for_less(slack, is_stuck, calls, ca
         run(self, name, code, arguments, folder, text)
 
     monkeypatch.setattr(place_and_route.ToolRunner, "run", talks)
-    monkeypatch.setattr(place_and_route, "_MANY", 0)
+    monkeypatch.setattr(place_and_route, "_LARGE", 0)
     layout = lay_out("counter", Counter(), 1)
     assert layout.fmax == (101, 101, 101)
     assert layout.places[0].rerouted == is_stuck

@@ -298,7 +298,9 @@ def test_every_curve_and_model_in_float64(open_page):
     for name, unit in MODELS.items():
         for exponent in (1, 7, 100, 1000):
             found = page.evaluate(script, [web_data.model_table(name), cosine.tolist(), exponent])
-            np.testing.assert_allclose(found, unit.model.reflect(cosine, exponent), atol=1e-9, err_msg=name)
+            np.testing.assert_allclose(
+                found, unit.reflection.reflect(cosine, exponent), atol=1e-9, err_msg=name
+            )
 
 
 def test_error_figures_of_few_and_equal_values(open_page):

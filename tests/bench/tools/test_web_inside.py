@@ -16,9 +16,9 @@ from blysk.bench.tools import web_data
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import constants_of
 from blysk.sim.engines.beats import pack, unpack
-from blysk.sim.engines.engine import Stimulus
+from blysk.sim.engines.engine import Drive
 from blysk.sim.engines.probes import ObservedPipeline
-from blysk.sim.engines.pysim import Model
+from blysk.sim.engines.pysim import Interpreted
 from blysk.sim.frames.frame import beats_of
 
 from .live_page import (
@@ -50,7 +50,7 @@ def traced(page, component):
     scene, _, frame = prepared(state_of(page))
     spans = frame.spans[inside["from"] : inside["to"]]
     none = np.zeros(1, dtype=bool)
-    stimulus = Stimulus(
+    drive = Drive(
         input=pack(component.i.payload.shape(), beats_of(component.unit, spans)),
         write=pack(component.write.payload.shape(), writes_of(constants_of(scene, component.design))),
         constants=np.zeros((0, 0), dtype=np.uint32),
@@ -62,10 +62,10 @@ def traced(page, component):
     )
 
     def status(clock):
-        trace = Model(component).run(dataclasses.replace(stimulus, limit=clock))
+        trace = Interpreted(component).run(dataclasses.replace(drive, limit=clock))
         return unpack(component.status.shape(), trace.status)[0]
 
-    return inside, stimulus, status
+    return inside, drive, status
 
 
 WATCHED = {
@@ -83,8 +83,8 @@ def test_waveform_is_that_of_pysim(open_page, design):
     use(page, *design)
     x, y = looked_at(page)
     component = ObservedPipeline(web_data.design_of(*design))
-    inside, stimulus, status = traced(page, component)
-    run = Model(component).run(stimulus)
+    inside, drive, status = traced(page, component)
+    run = Interpreted(component).run(drive)
     own = slice(inside["start"], inside["start"] + inside["length"])
     assert inside["lastClock"] == run.cycles[own][-1]
     assert inside["firstClock"] == run.input_cycles[inside["span"] - inside["from"]]

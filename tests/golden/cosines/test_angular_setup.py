@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.cosines.angular_setup import half_angles
+from blysk.bench.units.operands import component_words, dot, pairs_at, pairs_of_length, sphere
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.arccos import ARCCOS_TABLES, Arccos
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
@@ -10,8 +12,6 @@ from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.geometry import normalise
-from blysk.sim.units.cosines.angular_setup import half_angles
-from blysk.sim.units.operands import component_words, dot, pairs_at, pairs_of_length, sphere
 
 UNIT = AngularSetup()
 BY_ARCCOS = {table: AngularSetup("arccos", Arccos(table)) for table in ARCCOS_TABLES}

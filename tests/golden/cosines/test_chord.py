@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import code_pairs_at, component_words, pairs_at, word_ends
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
-from blysk.sim.units.operands import code_pairs_at, component_words, pairs_at, word_ends
 
 
 def compute(a, b):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.cosines.chord_setup import any_values, value_at
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.reciprocal import step_words
 from blysk.golden.number.unit_vector import ONE
-from blysk.sim.units.cosines.chord_setup import any_values, value_at
 
 P = ChordSetup()
 FORMATS = P.DIFFUSE_FORMAT, P.HIGHLIGHT_FORMAT

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.cosines.half_chord import chord_of
+from blysk.bench.units.operands import code_pairs_at, component_words, degrees_between
 from blysk.golden.cosines.arccos import Arccos
 from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.unit_vector import ONE_SQUARED
-from blysk.sim.units.cosines.half_chord import chord_of
-from blysk.sim.units.operands import code_pairs_at, component_words, degrees_between
 
 UNIT = HalfChord()
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import component_words, dot, pairs_at, sphere, word_ends
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.reciprocal import reciprocal_address
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise, values
 from blysk.golden.reference.curves import interpolate
-from blysk.sim.units.operands import component_words, dot, pairs_at, sphere, word_ends
 
 SETUP = RecurrenceSetup()
 LENGTHS = [1, 2, 3, 4, 5, 8, 9, 16, 257, 4095]

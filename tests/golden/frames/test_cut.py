@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cut_by_angle
 from blysk.golden.frames.prepare import quantise_spans, sort_by_material
@@ -13,7 +14,6 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
-from blysk.sim.units.operands import pairs_at
 
 from .cuts import angles, line_at, origins, raster_of
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.frames.cut import cut_by_angle, cut_by_ends, cut_by_error, cut_spans
 from blysk.golden.frames.local import local_values
 from blysk.golden.presets import METHODS, preset
@@ -13,7 +14,6 @@ from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
-from blysk.sim.units.operands import pairs_at
 
 from .cuts import METHOD, ONE_VALUE, angles, exact_operands, material, origins, raster_of
 

@@ -48,7 +48,7 @@ def test_no_warning_at_the_ends_of_a_model(name):
         mesh = ball()
         design = preset("renormalise", CURVES.get(name, name), 1)
         camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", 4 / 3)
-        parameter = design.specular.model.PARAMETER
+        parameter = design.specular.reflection.PARAMETER
         for value in ENDS[parameter]:
             given = {} if parameter is None else {parameter: value}
             material = Material(GREY, GREY, GREY, **{"exponent": 10, **given})

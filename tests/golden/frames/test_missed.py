@@ -53,7 +53,7 @@ def errors(scene, design, image):
     raster = rasterise(scene)
     which = np.flatnonzero(raster.visible)
     lit = np.abs(fragment_normals(scene, raster, which) @ LIGHT) > 0.002
-    exact = render(scene, "phong", design.specular.model, raster).image * 255
+    exact = render(scene, "phong", design.specular.reflection, raster).image * 255
     error = np.abs(image - exact).max(axis=-1).reshape(-1)[raster.pixel[which]] * lit
     largest = np.zeros(len(scene.mesh.faces))
     np.maximum.at(largest, raster.triangle[raster.span[which]], error)

@@ -187,7 +187,7 @@ def shading_error(scene, model):
     steady = np.abs(normals @ light) > BORDER
     if model == "ggx":
         steady &= np.abs(normals @ normalise(light + scene.camera.viewer)) > BORDER
-    exact = 255 * render(scene, "phong", design.specular.model, raster).image.reshape(-1, 3)[pixel, 0]
+    exact = 255 * render(scene, "phong", design.specular.reflection, raster).image.reshape(-1, 3)[pixel, 0]
     result = np.zeros((2, len(scene.mesh.faces)))
     for row, values in zip(result, (frame.image.reshape(-1, 3)[:, 0], found), strict=True):
         np.maximum.at(row, triangle, np.abs(values[pixel] - exact) * steady)

@@ -71,8 +71,8 @@ def test_no_frame_by_triangles_exceeds_its_bound(model):
         owner = np.full(scene.width * scene.height, -1)
         owner[raster.pixel[raster.visible]] = raster.triangle[raster.span[raster.visible]]
         same = (owner == drawn.owner.reshape(-1)) & (owner >= 0)
-        same &= ~border_mask(scene, raster, renderer.design.specular.model).reshape(-1)
-        exact = render(scene, "phong", renderer.design.specular.model, raster).image.reshape(-1, 3) * 255
+        same &= ~border_mask(scene, raster, renderer.design.specular.reflection).reshape(-1)
+        exact = render(scene, "phong", renderer.design.specular.reflection, raster).image.reshape(-1, 3) * 255
         error = np.abs(drawn.image.reshape(-1, 3) - exact)[same].max()
         assert error <= compared.bound_lsb
         ratios.append(error / compared.bound_lsb)

@@ -26,7 +26,7 @@ def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
     drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent)
     renderer = Renderer(preset(method, "cosquad", operand="one_minus_cosine"))
     frame = triangle_frame(drawn, renderer)
-    exact = render(drawn, "phong", renderer.design.specular.model)
+    exact = render(drawn, "phong", renderer.design.specular.reflection)
     np.testing.assert_array_equal(frame.owner >= 0, exact.mask)
     error = np.abs(frame.image - exact.image * 255)[exact.mask]
     assert 0.4 < error.max() < 0.6

@@ -6,7 +6,7 @@ import pytest
 import blysk
 from blysk.golden.frames.triangle_frame import triangle_frame
 from blysk.golden.geometry.coarse_depth import BLOCKS, CoarseDepth
-from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
@@ -29,7 +29,7 @@ def hidden_of_pixels(spans):
     """Spans of which the depth test draws no pixel, and the pixels that each has."""
     length = spans["length"]
     span, k = pixels_of(length)
-    test = DepthTest()
+    test = DepthTester()
     depth = test.depths(length, spans["depth"], spans["depth_step"])
     drawn = test.drawn((spans["y"][span] << 12) + spans["x"][span] + k, depth)
     return np.bincount(span, weights=drawn, minlength=len(length)) == 0

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.triangles import Stages, random_triangles
 from blysk.golden.geometry.edge_normals import EdgeNormals
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
-from blysk.golden.geometry.triangles import GRID, Frame
+from blysk.golden.geometry.triangles import GRID, FrameSettings
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.number.unit_vector import ONE
-from blysk.sim.units.triangles import Stages, random_triangles
 
 from .exact import attribute_at
 
-FRAME = Frame(-200, -200, 200, 200)
+FRAME = FrameSettings(-200, -200, 200, 200)
 
 
 def test_normals_within_the_bound():
@@ -47,7 +47,7 @@ def assert_normals(found, line, bound, flip, chosen):
 @pytest.mark.parametrize("limit", [20, 100, 267])
 def test_no_piece_turns_more_than_the_limit(limit):
     """Chords between the unit normals of a piece's ends, but for the errors of the normals themselves."""
-    frame = Frame(-200, -200, 200, 200, limit=limit)
+    frame = FrameSettings(-200, -200, 200, 200, limit=limit)
     stages = Stages(random_triangles(np.random.default_rng(limit), 800, size=40.0, spread=0.2), frame)
     spans, _ = EdgeNormals().compute(stages.pieces)
     chord = np.linalg.norm(spans.normal_left - spans.normal_right, axis=1) / ONE
@@ -76,4 +76,4 @@ def test_opposite_normals_are_repaired():
 def test_angle_of_a_limit():
     """No span is wider than the angle that a limit is made for."""
     for angle in (1.0, 6.3, 15.0, 22.5):
-        assert 2 * np.degrees(np.arcsin(Frame.limit_of(angle) / 2048)) <= angle
+        assert 2 * np.degrees(np.arcsin(FrameSettings.limit_of(angle) / 2048)) <= angle

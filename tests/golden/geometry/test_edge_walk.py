@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from blysk.bench.units.triangles import WHOLE, random_triangles, small_frame
 from blysk.golden.geometry.geometry import Geometry
-from blysk.golden.geometry.triangles import Frame, Grid, Triangles
-from blysk.sim.units.triangles import WHOLE, random_triangles, small_frame
+from blysk.golden.geometry.triangles import FrameSettings, Grid, Triangles
 
 from .exact import covered
 
@@ -41,7 +41,7 @@ def assert_covers(triangles, frame, grid):
 def test_random_triangles(bits):
     """Slivers, needles, corners on pixel centres, the guard band's ends, pictures of all sizes."""
     rng, grid = np.random.default_rng(bits), Grid(bits)
-    for frame in (small_frame(rng), small_frame(rng), Frame(-300, -200, 340, 280)):
+    for frame in (small_frame(rng), small_frame(rng), FrameSettings(-300, -200, 340, 280)):
         assert assert_covers(random_triangles(rng, 20_000, grid), frame, grid) > 5000
     assert assert_covers(random_triangles(rng, 1000, grid), WHOLE, grid) > 30_000
 
@@ -51,7 +51,7 @@ def test_random_triangles(bits):
 def test_many_random_triangles(size):
     """Ten million triangles in all."""
     rng, grid = np.random.default_rng(7), Grid()
-    frame = Frame(-40, -30, 50, 40)
+    frame = FrameSettings(-40, -30, 50, 40)
     for _ in range(34):
         assert_covers(random_triangles(rng, 100_000, grid, size), frame, grid)
 
@@ -61,13 +61,13 @@ def test_every_triangle_of_a_small_grid():
     grid = Grid(4)
     place = np.array(list(product(range(-2, 30, 4), repeat=2)))
     index = np.stack(np.meshgrid(*[np.arange(len(place))] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    assert assert_covers(triangles_of(place[index]), Frame(-4, -4, 4, 4), grid) > 60_000
+    assert assert_covers(triangles_of(place[index]), FrameSettings(-4, -4, 4, 4), grid) > 60_000
 
 
 @pytest.mark.parametrize("step", [16, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 128))])
 def test_every_sample_of_a_shared_edge_is_drawn_once(step):
     """Triangulations of random points, on the grid, on sixteenths of a pixel, on its centres and borders."""
-    rng, grid, frame = np.random.default_rng(step), Grid(), Frame(-20, -20, 20, 20)
+    rng, grid, frame = np.random.default_rng(step), Grid(), FrameSettings(-20, -20, 20, 20)
     for _ in range(12):
         points = np.unique(rng.integers(-12 * 256 // step, 12 * 256 // step, (60, 2)), axis=0) * step
         mesh = Delaunay(points)

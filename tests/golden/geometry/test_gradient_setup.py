@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.triangles import Stages, random_triangles
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
-from blysk.golden.geometry.triangles import GRID, Frame, Grid
-from blysk.sim.units.triangles import Stages, random_triangles
+from blysk.golden.geometry.triangles import GRID, FrameSettings, Grid
 
 from .exact import attribute_at
 
@@ -36,7 +36,7 @@ def test_bound(bits, size, count):
     """Every covered triangle but slivers, of every size."""
     rng = np.random.default_rng(bits)
     triangles = random_triangles(rng, count, Grid(bits), size, spread=0.3)
-    stages = Stages(triangles, Frame(-200, -200, 200, 200), Grid(bits))
+    stages = Stages(triangles, FrameSettings(-200, -200, 200, 200), Grid(bits))
     error, triangle = errors(stages)
     error = error[~stages.scales.sliver[triangle]]
     assert len(error) > 2000
@@ -52,7 +52,7 @@ def test_slivers_are_off_by_no_more_than_their_width():
     triangles = random_triangles(rng, len(points))
     object.__setattr__(triangles, "x", points[..., 0])
     object.__setattr__(triangles, "y", points[..., 1])
-    stages = Stages(triangles, Frame(-20, -20, 20, 20))
+    stages = Stages(triangles, FrameSettings(-20, -20, 20, 20))
     pieces = stages.pieces
     chosen = np.flatnonzero(stages.scales.sliver[pieces.triangle])
     assert len(chosen) > 100
@@ -74,6 +74,6 @@ def test_slivers_are_off_by_no_more_than_their_width():
 
 def test_refusal():
     """Operands of another format."""
-    stages = Stages(random_triangles(np.random.default_rng(1), 20), Frame(-20, -20, 20, 20), GRID)
+    stages = Stages(random_triangles(np.random.default_rng(1), 20), FrameSettings(-20, -20, 20, 20), GRID)
     with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 23\)$"):
         GradientSetup().compute(*[stages.scales.knee] * 3, stages.scales)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from blysk.bench.units.operands import component_words, sphere, turned
 from blysk.golden.geometry.halfway_vector import HalfwayVector
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.number.unit_vector import ONE, quantise
 from blysk.golden.reference.lighting import halfway_vector
-from blysk.sim.units.operands import component_words, sphere, turned
 
 
 def test_bounds():

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import sphere
+from blysk.bench.units.triangles import random_triangles
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.span_halver import SpanHalver
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.number.fixed import Fixed
-from blysk.sim.units.operands import sphere
-from blysk.sim.units.triangles import random_triangles
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def pieces():
     triangles = random_triangles(np.random.default_rng(3), 600, size=30.0, spread=0.6)
     longest = np.linalg.norm(triangles.normal, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
     triangles.normal[:] = triangles.normal * ((2.0**23 - 1) / longest)
-    return Geometry(vectors=True, rotates=True).pieces(triangles, Frame(-100, -100, 100, 100))[1]
+    return Geometry(vectors=True, rotates=True).pieces(triangles, FrameSettings(-100, -100, 100, 100))[1]
 
 
 def test_components(pieces):

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.triangles import random_triangles
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.mirror_adapter import MirrorAdapter
-from blysk.golden.geometry.triangles import Frame
-from blysk.sim.units.triangles import random_triangles
+from blysk.golden.geometry.triangles import FrameSettings
 
 
 @pytest.mark.parametrize("degrees", [0, 20, 45, 80, 90])
 def test_components(degrees):
     """Each product within half a step, and what the codes of sin a and cos a are off; in range."""
     triangles = random_triangles(np.random.default_rng(5), 60, size=20.0, spread=0.5)
-    spans, _ = Geometry(vectors=True).compute(triangles, Frame(-100, -100, 100, 100))
+    spans, _ = Geometry(vectors=True).compute(triangles, FrameSettings(-100, -100, 100, 100))
     angle = np.radians(degrees)
     sine, cosine = QuotientSpans().codes_of(np.sin(angle), np.cos(angle))
     made = MirrorAdapter().compute(spans, sine, cosine)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.triangles import Stages, random_triangles
 from blysk.golden.geometry.edge_normals import EdgeNormals
 from blysk.golden.geometry.span_adapter import LineAdapter, shading_spans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.number.fixed import SQ, Fixed
-from blysk.sim.units.triangles import Stages, random_triangles
 
-FRAME = Frame(-200, -200, 200, 200)
+FRAME = FrameSettings(-200, -200, 200, 200)
 
 
 @pytest.fixture(scope="module")

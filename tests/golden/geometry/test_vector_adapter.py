@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from blysk.bench.units.triangles import random_triangles
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL, SPAN_STEP, Pieces
 from blysk.golden.geometry.span_halver import SpanHalver
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.golden.number.fixed import SQ, Fixed
-from blysk.sim.units.triangles import random_triangles
 
-FRAME = Frame(-200, -200, 200, 200)
+FRAME = FrameSettings(-200, -200, 200, 200)
 
 
 @pytest.fixture(scope="module")

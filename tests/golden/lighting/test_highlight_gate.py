@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.lighting.highlight_gate import spans_about
+from blysk.bench.units.operands import code_pairs_at, component_words, pairs_at, sphere, unit_codes
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
@@ -12,8 +14,6 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.sim.units.lighting.highlight_gate import spans_about
-from blysk.sim.units.operands import code_pairs_at, component_words, pairs_at, sphere, unit_codes
 
 from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.lighting.highlight_gate import spans_about
+from blysk.bench.units.operands import component_words, pairs_at, sphere, unit_codes
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
@@ -15,8 +17,6 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.sim.units.lighting.highlight_gate import spans_about
-from blysk.sim.units.operands import component_words, pairs_at, sphere, unit_codes
 
 LIMITS = QuadraticInterpolator().gate_limits
 

@@ -109,7 +109,7 @@ def test_falls_at_every_address(octaves, steps):
 )
 def test_every_argument(model, parameter):
     """Falls with u over all 2^25 of them, and is off by at most a step of 2^-17 more than samples are."""
-    lobe = replace(LOBE, model=model)
+    lobe = replace(LOBE, reflection=model)
     table, before, worst = lobe.table(parameter), 1 << 17, 0.0
     for codes in pieces():
         terms = shade(lobe, codes, table)
@@ -173,19 +173,19 @@ BOUNDS = {
 def test_errors_by_size_and_lobe(size):
     for case, bounds in zip(CASES, BOUNDS[size], strict=True):
         for value, bound in zip(case.values, bounds, strict=False):
-            error = largest_error(Lobe(case.model, CHORD, *size), case.parameter(value))
-            assert bound is None or error <= bound, f"{case.model.name} {value}"
+            error = largest_error(Lobe(case.reflection, CHORD, *size), case.parameter(value))
+            assert bound is None or error <= bound, f"{case.reflection.name} {value}"
             assert error > 0.001
 
 
 def test_moved_entries_halve_the_error():
     """Against entries on the curve, for which the error is that of lines: C / (8 M^2)."""
     for case, largest in zip(CASES[::2], (4 * np.exp(-2), 3 / 8), strict=True):
-        for value in (100, 1000) if case.model is BLINN else (0.01, 0.1):
-            lobe, parameter = replace(LOBE, model=case.model), case.parameter(value)
-            plain = lobe.model.reflect(1 - lobe.knots, parameter)
+        for value in (100, 1000) if case.reflection is BLINN else (0.01, 0.1):
+            lobe, parameter = replace(LOBE, reflection=case.reflection), case.parameter(value)
+            plain = lobe.reflection.reflect(1 - lobe.knots, parameter)
             u = np.linspace(lobe.knots[:-1], lobe.knots[1:], 65)
-            off = np.interp(u, lobe.knots, plain) - lobe.model.reflect(1 - u, parameter)
+            off = np.interp(u, lobe.knots, plain) - lobe.reflection.reflect(1 - u, parameter)
             assert off.max() <= largest / (8 * 16**2)
             assert off.max() > 0.8 * largest / (8 * 16**2)
             assert largest_error(lobe, parameter) / 255 <= 0.55 * off.max() + Lobe.ERROR
@@ -206,7 +206,7 @@ def test_error_of_coplanar_phong_at_every_exponent():
 
 
 def test_error_of_ggx_at_every_roughness():
-    lobe = replace(LOBE, model=GGX)
+    lobe = replace(LOBE, reflection=GGX)
     assert max(largest_error(lobe, roughness, 16) for roughness in np.linspace(0.05, 1, 191)) <= 0.036
 
 
@@ -217,7 +217,7 @@ def test_cosine_operand():
         table = lobe.table(parameter)
         u = np.r_[np.linspace(0, 1, 50_001), np.geomspace(2.0**-30, 1, 50_001)]
         codes = np.floor(ONE_SQUARED.codes * (1 - u)).astype(np.int64)
-        exact = lobe.model.reflect(codes / ONE_SQUARED.codes, parameter)
+        exact = lobe.reflection.reflect(codes / ONE_SQUARED.codes, parameter)
         terms = shade(lobe, codes, table)
         chord = 255 * Lobe.ERROR + largest_error(replace(lobe, operand=CHORD), parameter)
         bound = chord / 255 + slope * 2.0**-25 + 0.4 * 2.0**-16
@@ -250,17 +250,17 @@ def test_out_of_range(operand, model):
 
 def test_entry_of_one():
     """A curve that is 1 everywhere is ``1 - 2^-17``, up to the end, and 0 from there on."""
-    table = replace(LOBE, model=FULL).table()
+    table = replace(LOBE, reflection=FULL).table()
     assert (shade(LOBE, [0, 1, 1 << 24, (1 << 25) - 1], table).codes == 2**17 - 1).all()
     assert shade(LOBE, 1 << 25, table).codes == 0
 
 
 def test_rises_where_the_curve_rises():
-    lobe = replace(LOBE, model=RISING)
+    lobe = replace(LOBE, reflection=RISING)
     terms = shade(lobe, some_codes(lobe, np.random.default_rng(2)), lobe.table()).codes
     assert (np.diff(terms) >= 0).all()
     # Of a curve of both kinds: no term of a word is outside of its two entries.
-    lobe = replace(LOBE, model=TENT)
+    lobe = replace(LOBE, reflection=TENT)
     table, codes = lobe.table(), some_codes(lobe, np.random.default_rng(3))
     entry, _ = lobe.address(Fixed(UQ(1, 25), codes))
     ends = table.values.codes[entry], table.values.codes[entry + 1]
@@ -272,7 +272,7 @@ def test_rises_where_the_curve_rises():
 def test_steps_and_kinks_do_not_move_their_neighbours():
     """Of a curve that jumps, or bends, at one place, the rest of the table is the curve."""
     for model in (STEP, TENT):
-        lobe = replace(LOBE, model=model)
+        lobe = replace(LOBE, reflection=model)
         off = np.abs(lobe.table().values.values - model.reflect(1 - np.minimum(lobe.knots, 1 - 2.0**-40)))
         assert (off > 2.0**-17).sum() <= 4
 
@@ -286,7 +286,7 @@ def test_steps_and_kinks_do_not_move_their_neighbours():
 )
 def test_last_lit_argument(model, parameter, cutoff, lobe):
     """Exact: its term is over 0, and that of every larger argument 0."""
-    lobe = replace(lobe, model=model, cutoff=cutoff)
+    lobe = replace(lobe, reflection=model, cutoff=cutoff)
     table = lobe.table(parameter)
     last = table.last_lit_argument
     assert -1 <= last < 1 << 25
@@ -325,14 +325,14 @@ def test_last_lit_arguments_by_exponent():
     with pytest.raises(
         ValueError, match=r"^ggx has no exponent, by which a gate could look up its threshold$"
     ):
-        _ = replace(LOBE, model=GGX).last_lit_arguments
+        _ = replace(LOBE, reflection=GGX).last_lit_arguments
 
 
 def test_long_tails_end_where_they_are_cut():
     """From alpha = 0.044 on ggx is over 0 up to a right angle; a cutoff of half an LSB ends it before."""
     right_angle = (1 << 25) - 1
     for alpha, reaches in ((0.04, False), (0.045, True), (0.3, True)):
-        lobe = replace(LOBE, model=GGX)
+        lobe = replace(LOBE, reflection=GGX)
         table = lobe.table(alpha**0.5)
         assert (table.last_lit_argument == right_angle) == reaches
     for intensity in (1, 8):
@@ -349,7 +349,7 @@ def test_long_tails_end_where_they_are_cut():
 def test_words_and_writes():
     lobe = replace(LOBE, banks=5)
     for model in (BLINN, TENT):
-        table = replace(lobe, model=model).table(20)
+        table = replace(lobe, reflection=model).table(20)
         value, difference = table.words & 0x1FFFF, table.words >> 17
         difference -= (difference >> 17) << 18
         np.testing.assert_array_equal(value, table.values.codes[:-1])
@@ -366,7 +366,10 @@ def test_words_and_writes():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"model": PHONG}, r"^a table holds a lobe of N·H, and phong is one of R·V; take phong_coplanar$"),
+        (
+            {"reflection": PHONG},
+            r"^a table holds a lobe of N·H, and phong is one of R·V; take phong_coplanar$",
+        ),
         ({"operand": "angle"}, r"^operand must be 'cosine' or 'one_minus_cosine', not 'angle'$"),
         ({"octaves": 0}, r"^octaves must be 1 to 21 with 16 steps and 25 fraction bits, not 0$"),
         ({"octaves": 22}, r"^octaves must be 1 to 21 with 16 steps and 25 fraction bits, not 22$"),
@@ -395,9 +398,9 @@ def test_bad_arguments_are_refused():
     with pytest.raises(ValueError, match=r"^a table of blinn needs its exponent$"):
         LOBE.table()
     with pytest.raises(ValueError, match=r"^a table of ggx needs its roughness$"):
-        replace(LOBE, model=GGX).table()
+        replace(LOBE, reflection=GGX).table()
     with pytest.raises(ValueError, match=r"^roughness must be greater than 0 and at most 1, not 20"):
-        replace(LOBE, model=GGX).table(20)
+        replace(LOBE, reflection=GGX).table(20)
     with pytest.raises(ValueError, match=r"^a lobe needs a table; constants_of gives"):
         shade(LOBE, 0, 20)
     with pytest.raises(ValueError, match=r"^bank must be 0 to 0, not 1$"):

@@ -17,7 +17,7 @@ def places(lobe):
     inside = (lobe.octaves * lobe.steps) << 12
     codes = np.r_[np.arange(0, inside, SPACING), inside - 1]
     s = np.interp((codes + 0.5) / 4096, np.arange(len(lobe.knots)), lobe.knots)
-    if lobe.model.MIRROR:
+    if lobe.reflection.MIRROR:
         return codes, 1 - 2 * s
     part = (lobe.octaves + 1) * lobe.steps << 12
     return np.r_[codes, codes + part], np.r_[np.sqrt(1 - s), np.sqrt(s)]

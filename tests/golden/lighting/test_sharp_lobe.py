@@ -39,7 +39,7 @@ def test_scale_of_lobes():
     assert replace(LOBES["blinn"], operand="one_minus_cosine").scale_of([1, 1000]) == 0
     for roughness in (0.05, 0.08, 0.1):
         scale = GGX.scale_of([roughness])
-        assert GGX.model.reflect(1 - 2.0**-scale, roughness) < 2.0**-18
+        assert GGX.reflection.reflect(1 - 2.0**-scale, roughness) < 2.0**-18
 
 
 def test_scaled_table():
@@ -49,7 +49,7 @@ def test_scaled_table():
     format = lobe.argument_format
     argument = Fixed(format, (u / format.step).astype(np.int64))
     found = lobe.compute(argument, np.zeros(len(u), dtype=bool), lobe.table(0.05))
-    exact = lobe.model.reflect(1 - argument.values / 64, 0.05)
+    exact = lobe.reflection.reflect(1 - argument.values / 64, 0.05)
     assert 255 * np.abs(found.values - exact).max() < 0.05
 
 

@@ -43,7 +43,7 @@ def zero(unit, exponent):
     if unit.is_coscos:
         half = np.pi / 2 / coscos_scale(exponent, *COSCOS_MODELS[unit.name])
         return 1 - np.cos(min(half, np.pi))
-    return (1 - unit.cutoff.values.item()) / unit.model.slope(exponent)
+    return (1 - unit.cutoff.values.item()) / unit.reflection.slope(exponent)
 
 
 def cell_ends(unit, exponent):
@@ -63,7 +63,7 @@ def cell_ends(unit, exponent):
 def check(unit, exponent, codes):
     """Largest error, and largest error of what is not cut off."""
     result = shade(unit, codes, exponent).values
-    ideal = exact(unit.model, exponent, codes * 2.0**-25)
+    ideal = exact(unit.reflection, exponent, codes * 2.0**-25)
     error = np.abs(result - ideal)
     assert error.max() <= Specular.ERROR
     dropped = result == 0

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.lighting.value_gate import parabolas_near
+from blysk.bench.units.operands import any_codes
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
@@ -10,8 +12,6 @@ from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.sim.units.lighting.value_gate import parabolas_near
-from blysk.sim.units.operands import any_codes
 
 METHOD = LocalChordInterpolator()
 FORMAT = ChordSetup.HIGHLIGHT_FORMAT

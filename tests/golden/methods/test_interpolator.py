@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.lighting.specular import Specular
@@ -17,7 +18,6 @@ from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import CURVES, interpolate
-from blysk.sim.units.operands import pairs_at
 
 STEP = 2.0**-17
 ONE_VALUE = float(ONE_SQUARED.values)

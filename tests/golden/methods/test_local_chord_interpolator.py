@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.methods.local_chord_interpolator import mixed_lengths
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
@@ -12,7 +13,6 @@ from blysk.golden.number.unit_vector import ONE, ONE_SQUARED
 from blysk.golden.presets import MODELS
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
-from blysk.sim.units.methods.local_chord_interpolator import mixed_lengths
 
 ONE_VALUE = float(ONE_SQUARED.values)
 METHOD = LocalChordInterpolator()
@@ -156,7 +156,7 @@ def test_highlight_tolerance(model):
         worst = 0.0
         for end in (2.0, min(2.0, 12 / n)):
             u = np.linspace(0, end, 20_001)
-            slope = np.abs(np.diff(MODELS[model].model.reflect(1 - u, n)) / np.diff(u))
+            slope = np.abs(np.diff(MODELS[model].reflection.reflect(1 - u, n)) / np.diff(u))
             worst = max(worst, (255 * slope * METHOD.highlight_tolerance(n, u[:-1])).max())
         assert worst <= METHOD.HIGHLIGHT_BUDGET * (1.6 if n == 1 else 1.25)
         assert worst >= METHOD.HIGHLIGHT_BUDGET * 0.75
@@ -181,7 +181,7 @@ def test_is_lit(model):
         u = np.linspace(0, 2, 20_001)
         dark = ~METHOD.is_lit(n, u)
         assert dark.any() == (n > 4)
-        assert (255 * MODELS[model].model.reflect(1 - u[dark], n)).max(initial=0) <= 0.25
+        assert (255 * MODELS[model].reflection.reflect(1 - u[dark], n)).max(initial=0) <= 0.25
 
 
 @pytest.mark.parametrize("opposite", [False, True])

@@ -119,7 +119,7 @@ def test_bound_of_a_further_light(mirror):
             off[np.abs(height) < 1e-5] = 0
             worst = slice(span[off.argmax()], span[off.argmax()] + 1)
             errors = QuotientErrors.of(vectors[worst], lengths[worst], mirror, further=True)
-            assert off.max() <= errors.highlight(lobe.model, n) + TABLE
+            assert off.max() <= errors.highlight(lobe.reflection, n) + TABLE
             largest = max(largest, 255 * off.max())
     assert mirror or largest > 0.8
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.methods.angular_interpolator import AngularInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, quantise, values
-from blysk.sim.units.operands import pairs_at
 
 
 def operands_of(interpolator, left, right, length, direction, halfway):

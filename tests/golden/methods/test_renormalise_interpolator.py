@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import any_lengths, code_pairs_at, pairs_at
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
@@ -18,7 +19,6 @@ from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import fragment_normals
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
-from blysk.sim.units.operands import any_lengths, code_pairs_at, pairs_at
 
 METHOD = RenormaliseInterpolator()
 STEP = METHOD.END_FORMAT.step
@@ -132,7 +132,7 @@ def test_frame_in_strong_perspective(exponent):
     assert (ends.max(axis=0) / ends.min(axis=0)).max() > 1.5
     visible = np.flatnonzero(raster.visible)
     cosine = fragment_normals(scene.mesh, raster, visible) @ scene.lights[0].direction
-    exact = render(scene, "phong", design.specular.model, raster=raster).image.reshape(-1, 3)
+    exact = render(scene, "phong", design.specular.reflection, raster=raster).image.reshape(-1, 3)
     shown = frame.image.reshape(-1, 3)
     pixel = raster.pixel[visible]
     error = np.abs(shown[pixel] - 255 * exact[pixel]).max(axis=1)

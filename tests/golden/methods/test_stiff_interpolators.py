@@ -10,6 +10,7 @@ import itertools
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import pairs_at
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.line_setup import LineSetup
@@ -19,7 +20,6 @@ from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.curves import interpolate
-from blysk.sim.units.operands import pairs_at
 
 STEP = COMPONENT.step
 ONE_VALUE = float(ONE_SQUARED.values)

@@ -13,7 +13,7 @@ from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.spans import pixels_of
-from blysk.golden.pipeline import Design
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import COSQUAD
 
@@ -74,7 +74,7 @@ class Toy(Interpolator):
 def test_a_toy_method_renders_a_frame(gate):
     """Nothing asks for its type: the frame is exact but for rounding, by the steps that the toy chose."""
     scene = facing([[-0.7, 0.1, 1], [0.8, 0.2, 1], [0.1, 0.9, 0.7]], exponent=20)
-    design = Design(Toy(), Specular(COSQUAD), gate=gate).for_materials(scene.materials)
+    design = ShadingPipeline(Toy(), Specular(COSQUAD), gate=gate).for_materials(scene.materials)
     frame = model_frame(scene, design)
     found = compare(scene, design, frame)
     assert found.visible_pixels > 1000

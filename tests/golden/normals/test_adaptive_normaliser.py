@@ -5,14 +5,14 @@ import re
 import numpy as np
 import pytest
 
+from blysk.bench.units.normals.adaptive_normaliser import straight_lines
+from blysk.bench.units.operands import code_pairs_at, component_words, pairs_of_length, word_ends
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.curves import interpolate
-from blysk.sim.units.normals.adaptive_normaliser import straight_lines
-from blysk.sim.units.operands import code_pairs_at, component_words, pairs_of_length, word_ends
 
 VARIANTS = [
     AdaptiveNormaliser(t, b) for t in (1 / 8, 2.0**-10, 2.0**-14) for b in (Bisection(), Bisection(1, 45))

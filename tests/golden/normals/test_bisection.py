@@ -5,11 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from blysk.golden.normals.bisection import Bisection
-from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.sim.units.normals.bisection import factor_of
-from blysk.sim.units.operands import (
+from blysk.bench.units.normals.bisection import factor_of
+from blysk.bench.units.operands import (
     code_pairs_at,
     component_words,
     dot,
@@ -18,6 +15,9 @@ from blysk.sim.units.operands import (
     unit_codes,
     word_corners,
 )
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE
 
 VARIANTS = [
     Bisection(degree, max_angle, as_published)

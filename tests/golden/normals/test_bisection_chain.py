@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from blysk.golden.normals.bisection import Bisection
-from blysk.golden.normals.bisection_chain import BisectionChain
-from blysk.golden.number.fixed import Fixed
-from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.reference.curves import interpolate
-from blysk.sim.units.operands import (
+from blysk.bench.units.operands import (
     code_pairs_at,
     component_words,
     degrees_between,
@@ -18,6 +13,11 @@ from blysk.sim.units.operands import (
     unit_codes,
     word_corners,
 )
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.bisection_chain import BisectionChain
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.golden.reference.curves import interpolate
 
 
 def weights(psi, level):

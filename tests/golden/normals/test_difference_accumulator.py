@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import any_codes, component_words, pairs_at, pairs_of_length
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
@@ -11,7 +12,6 @@ from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.curves import interpolate
-from blysk.sim.units.operands import any_codes, component_words, pairs_at, pairs_of_length
 
 UNIT = DifferenceAccumulator()
 FORMAT = UNIT.format

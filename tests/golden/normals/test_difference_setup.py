@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import code_pairs_at, component_words, curves_of
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.number.fixed import SQ, Fixed
-from blysk.sim.units.operands import code_pairs_at, component_words, curves_of
 
 UNIT, PUBLISHED = DifferenceSetup(), DifferenceSetup(as_published=True)
 LENGTHS = np.arange(1, 4096)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import component_words, word_corners
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.sim.units.operands import component_words, word_corners
 
 
 def exact(a, b):

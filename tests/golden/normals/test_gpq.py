@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import code_pairs_at, component_words, pairs_of_length
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.sim.units.operands import code_pairs_at, component_words, pairs_of_length
 
 
 def middle_of(left, right):

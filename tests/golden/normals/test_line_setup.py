@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.normals.line_setup import any_lines
+from blysk.bench.units.operands import sphere
 from blysk.golden.normals.line_setup import LineSetup, quantise_line
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.sim.units.normals.line_setup import any_lines
-from blysk.sim.units.operands import sphere
 
 UNIT = LineSetup()
 MAX_LENGTH = (1 << LENGTH_BITS) - 1

@@ -5,11 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
-from blysk.golden.number.polynomials import half_angle_factor, minimax
-from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
-from blysk.golden.reference.geometry import normalise
-from blysk.sim.units.operands import (
+from blysk.bench.units.operands import (
     code_pairs_at,
     component_words,
     dot,
@@ -18,6 +14,10 @@ from blysk.sim.units.operands import (
     unit_codes,
     word_corners,
 )
+from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
+from blysk.golden.number.polynomials import half_angle_factor, minimax
+from blysk.golden.number.unit_vector import ONE, ONE_SQUARED, quantise
+from blysk.golden.reference.geometry import normalise
 
 UNIT = MiddleNormal()
 ONE_VALUE = float(ONE_SQUARED.values)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import component_words, curves_of, pairs_at
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
@@ -12,7 +13,6 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.reference.curves import interpolate
-from blysk.sim.units.operands import component_words, curves_of, pairs_at
 
 STEP = COMPONENT.step
 LENGTHS = np.array([1, 2, 3, 16, 4095])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import sphere
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.sim.units.operands import sphere
 
 UNIT = Renormaliser()
 FORMAT = UNIT.VECTOR_FORMAT

@@ -62,7 +62,7 @@ def test_error_is_that_of_shading_and_of_rounded_coordinates(angle, monkeypatch)
 def errors_with_exact_coordinates(drawing, shown, angle, monkeypatch, preset=0):
     """Errors in LSB of the drawn pixels, those of the float64 frame, by its coordinates."""
     exact = turned(shown, angle)
-    frame = render(exact, "phong", drawing.renderer.design.specular.model)
+    frame = render(exact, "phong", drawing.renderer.design.specular.reflection)
     vertices = rounded_coordinates(drawing, exact, drawing.vertices(angle, preset))
     monkeypatch.setattr(Drawing, "vertices", lambda self, angle, preset: vertices)
     whole = drawing.whole(angle, preset)
@@ -117,7 +117,7 @@ def test_error_against_exact_normals_of_every_pixel(angle):
     whole = drawing.whole(angle)
     drawn = np.zeros(SIZE[::-1], dtype=bool)
     drawn[whole.y, whole.x] = True
-    exact = render(turned(shown, angle), "phong", drawing.renderer.design.specular.model)
+    exact = render(turned(shown, angle), "phong", drawing.renderer.design.specular.reflection)
     assert (drawn ^ exact.mask).sum() <= 3
     both = drawn & exact.mask
     error = np.abs(drawing.picture(angle)[both] - 255 * exact.image[both]).max(axis=1)

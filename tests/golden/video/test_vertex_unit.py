@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import unit_codes
+from blysk.bench.units.video.vertex_unit import any_matrix
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET, VertexTransform
-from blysk.sim.units.operands import unit_codes
-from blysk.sim.units.video.vertex_unit import any_matrix
 
 
 def _exact(position, normal, matrix, unit):

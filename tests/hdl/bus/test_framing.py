@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.operands import unit_codes
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.geometry.coarse_depth import CoarseDepth
-from blysk.golden.geometry.triangles import Frame, Triangles
+from blysk.golden.geometry.triangles import FrameSettings, Triangles
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.bus.framing import FramingUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.operands import unit_codes
 
 SIZE = 16, 8
 STEPS = 256
@@ -53,8 +53,8 @@ def constants():
 
 def run(unit, frames, keep, expected):
     """What comes out of the unit for frames of triangles; ``expected`` are triangles by frame, as drawn."""
-    frame, codes = Frame.centred(*SIZE), constants()
-    layouts = unit.parameters
+    frame, codes = FrameSettings.centred(*SIZE), constants()
+    layouts = unit.model
     data, ends = [], []
     for each in frames:
         columns = each.beats

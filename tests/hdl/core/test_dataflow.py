@@ -8,13 +8,13 @@ import pytest
 from amaranth.hdl import Cat, Const, Module, Mux, Value, signed, unsigned
 from amaranth.lib import data
 
+from blysk.bench.units.record import STALLS, Case, UnitRun
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow, checked_interval, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.emit.cost import cost_of
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.record import STALLS, Case, UnitRun
 
 from ...checks import assert_equals_model
 

@@ -21,7 +21,7 @@ def test_earliest_stages_by_hand():
     a, b = operation("a", latency=0, since=1), operation("b", latency=0, since=1)
     once = operation("once", a)
     both = operation("both", b, once)
-    product = operation("product", once, both, latency=3, unit="multiplier")
+    product = operation("product", once, both, latency=3, resource="multiplier")
     wire = operation("wire", product, latency=0)
     late = operation("late", wire, since=12)
     with_late = operation("with_late", a, since=late)
@@ -32,7 +32,7 @@ def test_earliest_stages_by_hand():
 def test_slots_by_hand():
     """Three uses of one instance: the second and the third wait for a slot. Two instances have four slots."""
     a = operation("a", latency=0, lifetime=3, since=1)
-    uses = [operation(f"use_{k}", a, latency=3, unit="multiplier") for k in range(3)]
+    uses = [operation(f"use_{k}", a, latency=3, resource="multiplier") for k in range(3)]
     assert stages([a, *uses], 3) == [1, 4, 5, 6]
     assert place([a, *uses], 3).counts == {"multiplier": 1}
     assert stages([a, *uses], 2) == [1, 4, 4, 5]
@@ -42,11 +42,11 @@ def test_slots_by_hand():
 def test_uses_wait_for_each_other_where_beats_come_at_any_distance():
     """The first of four uses waits until the second comes, so that two instances serve all."""
     a = operation("a", latency=0, since=1)
-    first = operation("first", a, latency=3, unit="shifter")
+    first = operation("first", a, latency=3, resource="shifter")
     chain = [operation("wait", a)]
     for k in range(5):
         chain.append(operation(f"wait_{k}", chain[-1]))
-    uses = [operation(f"use_{k}", chain[k + 1], latency=3, unit="shifter") for k in (1, 3, 4)]
+    uses = [operation(f"use_{k}", chain[k + 1], latency=3, resource="shifter") for k in (1, 3, 4)]
     words = [a, first, *chain, *uses]
     schedule = place(words, 2, spaced=True)
     assert schedule.counts == {"shifter": 2}
@@ -77,7 +77,9 @@ def random_operations(rng, interval):
             words.append(operation(f"{kind}_{k}", *operands, lifetime=interval, since=since))
         else:
             latency = {"use": 3, "other": 4}[kind]
-            words.append(operation(f"{kind}_{k}", *operands, latency=latency, unit=str(kind), since=since))
+            words.append(
+                operation(f"{kind}_{k}", *operands, latency=latency, resource=str(kind), since=since)
+            )
     return words
 
 
@@ -90,8 +92,8 @@ def check(words, schedule, interval, spaced):
         assert schedule.stage(word) >= (word.since if isinstance(word.since, int) else 0)
     span = schedule.length + interval
     distances = range(interval, span) if spaced else range(interval, span, interval)
-    for unit, count in schedule.counts.items():
-        uses = [schedule.placements[o] for o in words if o.unit == unit]
+    for resource, count in schedule.counts.items():
+        uses = [schedule.placements[o] for o in words if o.resource == resource]
         assert {p.instance for p in uses} <= set(range(count))
         for instance in range(count):
             taken = [p.read for p in uses if p.instance == instance]
@@ -109,5 +111,5 @@ def test_guarantees_hold_of_random_graphs(interval, spaced):
         check(words, schedule, interval, spaced)
         assert schedule.placements == place(words, interval, spaced).placements
         if not spaced:
-            for unit, count in schedule.counts.items():
-                assert count == -(-sum(o.unit == unit for o in words) // interval)
+            for resource, count in schedule.counts.items():
+                assert count == -(-sum(o.resource == resource for o in words) // interval)

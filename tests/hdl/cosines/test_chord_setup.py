@@ -4,11 +4,11 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.cosines.chord_setup import RECORD
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
 from blysk.hdl.emit.cost import cost_of
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.cosines.chord_setup import RECORD
 
 
 def test_options():

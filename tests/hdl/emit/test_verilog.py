@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from amaranth.hdl import Fragment
 
+from blysk.bench.units.registry import RECORDS
 from blysk.hdl.emit.verilog import LINT_EXCEPTIONS, emit
-from blysk.sim.units.registry import RECORDS
 
 from ...lists import WHOLE
 from .components import Alike, Awkward, Combinational, Everything, Stages, TwoClocks

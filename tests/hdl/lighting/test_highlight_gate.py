@@ -4,11 +4,11 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.lighting.highlight_gate import RECORD
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
-from blysk.sim.units.lighting.highlight_gate import RECORD
 
-GATE = RECORD.variants[RECORD.default].unit().parameters
+GATE = RECORD.variants[RECORD.default].unit().model
 
 
 @pytest.mark.parametrize("variant", RECORD.variants)

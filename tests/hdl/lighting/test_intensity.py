@@ -4,12 +4,12 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.lighting.intensity import RECORD
+from blysk.bench.units.record import Case, first
 from blysk.golden.lighting.intensity import Intensity
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.lighting.intensity import RECORD
-from blysk.sim.units.record import Case, first
 
 from ...checks import resets
 

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.lighting.light import RECORD
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.lighting.light import RECORD
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
+from blysk.bench.units.lighting.lobe import RECORD
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.reference.lobes import BECKMANN, GGX
@@ -20,7 +21,6 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.lobe import LobeMemory, LobeUnit, lobe_write_shape
 from blysk.hdl.lighting.specular import highlight_shape
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.lighting.lobe import RECORD
 
 OPERANDS = ("cosine", "one_minus_cosine")
 CHORD = "one_minus_cosine"
@@ -31,8 +31,8 @@ CASES = ((BLINN, 1), (BLINN, 20), (BLINN, 1000), (BECKMANN, 0.3), (BECKMANN, 1),
 def beats_of(unit, table, seed=0):
     """Beats of the record, at the ends of every step, a tenth of them dark; and the model's terms."""
     beats = RECORD.stimuli["highlights"].make(unit, np.random.default_rng(seed), 1300).beats
-    operand = Fixed(unit.parameters.operand_format, beats["operand"])
-    return beats, unit.parameters.compute(operand, beats["dark"], table).codes
+    operand = Fixed(unit.model.operand_format, beats["operand"])
+    return beats, unit.model.compute(operand, beats["dark"], table).codes
 
 
 def writes_of(*writes):
@@ -50,9 +50,9 @@ def check(unit, beats, expected, **options):
 @pytest.mark.parametrize("fixed", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_banks(fixed, interval):
     """Each bank has its own table, whatever order they are written in, and one may be written again."""
-    parameters = replace(LOBE, banks=5)
-    tables = [replace(parameters, model=model).table(parameter) for model, parameter in CASES[:5]]
-    unit = LobeUnit(parameters, interval, tables=tables if fixed else None)
+    model = replace(LOBE, banks=5)
+    tables = [replace(model, reflection=reflection).table(parameter) for reflection, parameter in CASES[:5]]
+    unit = LobeUnit(model, interval, tables=tables if fixed else None)
     write = None
     if not fixed:
         order = [3, 0, 4, 2, 1]
@@ -64,11 +64,11 @@ def test_banks(fixed, interval):
 
 def test_writes_that_are_lost():
     """Values past a table's end or of no bank change nothing; a table not completed keeps the rest."""
-    parameters = replace(LOBE, banks=3)
-    old, new, other = (parameters.table(exponent) for exponent in (7, 100, 1000))
+    model = replace(LOBE, banks=3)
+    old, new, other = (model.table(exponent) for exponent in (7, 100, 1000))
     beyond = {"value": np.arange(1000) * 131 % 2**17, "begins": np.zeros(1000, dtype=np.int64)}
     no_bank = other.writes()
-    unit = LobeUnit(parameters)
+    unit = LobeUnit(model)
     for bank in (3, 4, 7, 64, 2**16, 2**17 - 1):
         no_bank["value"][0] = bank
         part = {name: column[:50] for name, column in new.writes(1).items()}
@@ -80,7 +80,7 @@ def test_writes_that_are_lost():
             beats, expected = beats_of(unit, half if k == 1 else old, k)
             if k == 1:
                 # The last word written leads to the new table's value; that of the old one is behind it.
-                entry, _ = parameters.address(Fixed(LOBE.argument_format, beats["operand"] & (2**25 - 1)))
+                entry, _ = model.address(Fixed(LOBE.argument_format, beats["operand"] & (2**25 - 1)))
                 keep = entry != 48
                 beats = {name: column[keep] for name, column in beats.items()}
                 expected = expected[keep]
@@ -89,9 +89,9 @@ def test_writes_that_are_lost():
 
 def test_writes_go_on_while_the_unit_stands_still():
     """Beats wait inside while the other bank is written: their terms are of their own bank."""
-    parameters = replace(LOBE, banks=2)
-    first, second = parameters.table(20), replace(parameters, model=GGX).table(0.2)
-    unit = LobeUnit(parameters)
+    model = replace(LOBE, banks=2)
+    first, second = model.table(20), replace(model, reflection=GGX).table(0.2)
+    unit = LobeUnit(model)
     codes = beats_of(unit, first)[0]["operand"][:40]
     writes = second.writes(1)
     found = []
@@ -144,7 +144,7 @@ def test_writes_go_on_while_the_unit_stands_still():
     assert len(writes["value"]) == 338
     lit = np.zeros(len(codes), dtype=bool)
     expected = [
-        parameters.compute(Fixed(LOBE.operand_format, codes), lit, table).codes for table in (first, second)
+        model.compute(Fixed(LOBE.operand_format, codes), lit, table).codes for table in (first, second)
     ]
     np.testing.assert_array_equal(found, np.concatenate(expected))
 
@@ -152,11 +152,11 @@ def test_writes_go_on_while_the_unit_stands_still():
 class TwoLights(wiring.Component):
     """Two units at one memory; the second's terms wait in a FIFO: it need not stand still with the first."""
 
-    def __init__(self, parameters, tables, intervals):
-        self.memory = LobeMemory(parameters, tables, 2)
-        self.units = [LobeUnit(parameters, interval, shares_memory=True) for interval in intervals]
-        operands = {name: highlight_shape(parameters) for name in ("first", "second")}
-        terms = dict.fromkeys(operands, FixedShape(parameters.RESULT_FORMAT))
+    def __init__(self, model, tables, intervals):
+        self.memory = LobeMemory(model, tables, 2)
+        self.units = [LobeUnit(model, interval, shares_memory=True) for interval in intervals]
+        operands = {name: highlight_shape(model) for name in ("first", "second")}
+        terms = dict.fromkeys(operands, FixedShape(model.RESULT_FORMAT))
         members = {
             "i": In(stream.Signature(data.StructLayout(operands))),
             "o": Out(stream.Signature(data.StructLayout(terms))),
@@ -197,7 +197,7 @@ class TwoLights(wiring.Component):
 @pytest.mark.parametrize("fixed", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.parametrize("intervals", [(3, 1), pytest.param((1, 1), marks=pytest.mark.long)])
 def test_two_units_share_a_memory(intervals, fixed):
-    table = replace(LOBE, model=GGX).table(0.4)
+    table = replace(LOBE, reflection=GGX).table(0.4)
     tables = [table] if fixed else None
     both = TwoLights(LOBE, tables, intervals)
     rng = np.random.default_rng(8)
@@ -220,9 +220,9 @@ def test_two_units_share_a_memory(intervals, fixed):
 @pytest.mark.parametrize("operand", OPERANDS)
 def test_dark_beats_do_not_toggle(operand):
     """Of beats that are dark or behind, only the input's and the first registers change."""
-    parameters = Lobe(operand=operand)
-    table = parameters.table(20)
-    unit = LobeUnit(parameters, tables=[table])
+    model = Lobe(operand=operand)
+    table = model.table(20)
+    unit = LobeUnit(model, tables=[table])
     fragment = Fragment.get(unit, None)
     ((path, _, _),) = [part for part in fragment.subfragments if part[1] == "datapath"]
     registers = {

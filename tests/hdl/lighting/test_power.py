@@ -1,9 +1,9 @@
 # amaranth: UnusedElaboratable=no
 """Exact power unit: times, resets; `tests.test_units` holds it against its model."""
 
+from blysk.bench.units.lighting.power import RECORD
+from blysk.bench.units.record import Case, first
 from blysk.hdl.lighting.power import PowerUnit
-from blysk.sim.units.lighting.power import RECORD
-from blysk.sim.units.record import Case, first
 
 from ...checks import resets
 

@@ -6,6 +6,7 @@ import pytest
 from amaranth.hdl import Value
 from amaranth.sim import Simulator
 
+from blysk.bench.units.lighting.specular import expect, highlights
 from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.reference.reflection import REFLECTION_MODELS, AngleCosine, Exponential, PolynomialModel
@@ -13,7 +14,6 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.lighting.specular import expect, highlights
 
 from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 from ..variants import mostly_long
@@ -38,13 +38,13 @@ TIMING = {
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("model", TIMING)
-def test_times_and_multipliers_at_every_interval(model):
-    products, *latencies = TIMING[model]
-    as_published = model == "as_published"
-    parameters = Specular(REFLECTION_MODELS["cosquad" if as_published else model], as_published=as_published)
+@pytest.mark.parametrize("reflection", TIMING)
+def test_times_and_multipliers_at_every_interval(reflection):
+    products, *latencies = TIMING[reflection]
+    as_published = reflection == "as_published"
+    model = Specular(REFLECTION_MODELS["cosquad" if as_published else reflection], as_published=as_published)
     for interval, latency in zip((1, 2, 3, 4, 6), latencies, strict=True):
-        unit = SpecularUnit(parameters, initiation_interval=interval)
+        unit = SpecularUnit(model, initiation_interval=interval)
         assert (unit.latency, unit.initiation_interval) == (latency, interval)
         if interval > 2:
             continue
@@ -59,7 +59,7 @@ def test_times_and_multipliers_at_every_interval(model):
 def test_latency_of_every_model():
     for model in MODELS:
         p = Specular(REFLECTION_MODELS[model])
-        assert SpecularUnit(p).latency == LATENCY[type(p.model), p.squarings]
+        assert SpecularUnit(p).latency == LATENCY[type(p.reflection), p.squarings]
 
 
 @pytest.mark.long
@@ -71,14 +71,14 @@ def test_cost_of_coscos():
         assert cost.rom_bits == 1024 * (17 + 27 * slopes) + 128 * 36 + 64 * 33
 
 
-@pytest.mark.parametrize("model", mostly_long(MODELS, "cosquad_lin", "cosquad_q", "exp"))
-def test_slopes_of_every_exponent(model):
-    """Every word that a unit needs of an exponent against the model's tables, two cycles after it.
+@pytest.mark.parametrize("reflection", mostly_long(MODELS, "cosquad_lin", "cosquad_q", "exp"))
+def test_slopes_of_every_exponent(reflection):
+    """Every word that a unit needs of an exponent against the reflection's tables, two cycles after it.
 
     The boundary comes from a memory and its register, a cycle later.
     """
-    parameters = Specular(REFLECTION_MODELS[model])
-    unit = SlopeUnit(parameters)
+    model = Specular(REFLECTION_MODELS[reflection])
+    unit = SlopeUnit(model)
     simulator = Simulator(unit)
     simulator.add_clock(1e-6)
     seen = []
@@ -93,38 +93,40 @@ def test_slopes_of_every_exponent(model):
 
     simulator.add_testbench(bench)
     simulator.run()
-    scale, shift = parameters.scale(np.arange(1, 1001))
-    expected = np.stack([scale.codes, shift + 1, parameters.boundaries.codes[1:1001]], axis=1)
+    scale, shift = model.scale(np.arange(1, 1001))
+    expected = np.stack([scale.codes, shift + 1, model.boundaries.codes[1:1001]], axis=1)
     seen = np.array(seen)
     np.testing.assert_array_equal(seen[:-1, :2], expected[:, :2])
     np.testing.assert_array_equal(seen[1:, 2], expected[:, 2])
 
 
 @pytest.mark.parametrize(
-    ("model", "tables", "interval"), [("cosquad", 0, 1), ("coscos4", 128 * 36 + 64 * 33, 3)]
+    ("reflection", "tables", "interval"), [("cosquad", 0, 1), ("coscos4", 128 * 36 + 64 * 33, 3)]
 )
-def test_shared_slope_saves_the_prom(model, tables, interval):
+def test_shared_slope_saves_the_prom(reflection, tables, interval):
     """The slope from outside: at the same cycles, and no PROM in the unit."""
-    parameters = Specular(REFLECTION_MODELS[model])
-    unit = SpecularUnit(parameters, initiation_interval=interval, shares_slope=True)
-    assert unit.latency == SpecularUnit(parameters, initiation_interval=interval).latency
+    model = Specular(REFLECTION_MODELS[reflection])
+    unit = SpecularUnit(model, initiation_interval=interval, shares_slope=True)
+    assert unit.latency == SpecularUnit(model, initiation_interval=interval).latency
     assert cost_of(unit).rom_bits == tables
-    assert cost_of(SlopeUnit(parameters)).rom_bits == 1024 * 17
+    assert cost_of(SlopeUnit(model)).rom_bits == 1024 * 17
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("model", ["cosquad", "cosquad_q", "lyon3", "exp"])
-def test_fixed_exponent_costs_less(model):
+@pytest.mark.parametrize("reflection", ["cosquad", "cosquad_q", "lyon3", "exp"])
+def test_fixed_exponent_costs_less(reflection):
     """No PROM, and one multiplier less: that of the slope is by a constant. No cycle more."""
-    parameters = Specular(REFLECTION_MODELS[model])
-    unit, fixed = SpecularUnit(parameters), SpecularUnit(parameters, exponent=37)
+    model = Specular(REFLECTION_MODELS[reflection])
+    unit, fixed = SpecularUnit(model), SpecularUnit(model, exponent=37)
     assert fixed.latency == unit.latency
     assert not hasattr(fixed, "constants")
     cost, full = cost_of(fixed), cost_of(unit)
     assert cost.multiplier_count == full.multiplier_count - 1
-    assert (cost.constant_multipliers, cost.rom_bits) == (1, 64 * 32 if model == "exp" else 0)
+    assert (cost.constant_multipliers, cost.rom_bits) == (1, 64 * 32 if reflection == "exp" else 0)
     # What the PROM gives, twice; the slope's normal form, and the boundary.
-    assert full.register_bits - cost.register_bits == 2 * 17 + 4 + 17 + (0 if model == "cosquad_q" else 27)
+    assert full.register_bits - cost.register_bits == 2 * 17 + 4 + 17 + (
+        0 if reflection == "cosquad_q" else 27
+    )
 
 
 def test_bad_options_are_refused():

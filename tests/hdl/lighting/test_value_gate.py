@@ -13,7 +13,7 @@ def test_parts(lights):
     """No multiplier; for all lights a PROM of 1024 words of 18 bits, none without a port for the exponent."""
     unit = ValueGateUnit(None, lights)
     assert (unit.latency, unit.initiation_interval) == (3, 1)
-    assert unit.parameters.LEVEL_FORMAT.width == 30
+    assert unit.model.LEVEL_FORMAT.width == 30
     cost = cost_of(unit)
     assert (cost.multiplier_count, cost.constant_multipliers, cost.rom_bits) == (0, 0, 18 << 10)
     fixed = ValueGateUnit(None, lights, exponent=60)

@@ -4,12 +4,12 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.methods.light_products import RECORD
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.light_products import LightProductsUnit
-from blysk.sim.units.methods.light_products import RECORD
 
 TIMES = {"cosine": 5, "one_minus_cosine": 8}
 

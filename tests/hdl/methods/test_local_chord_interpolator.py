@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from blysk.bench.units.methods.local_chord_interpolator import RECORD, gated
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.methods.local_chord_interpolator import RECORD, gated
 
 from ...checks import assert_beats_equal, resets, words_of
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.normals.adaptive_normaliser import RECORD, spans_of
+from blysk.bench.units.operands import code_pairs_at, component_words
 from blysk.golden.number.spans import pixels_of
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.normals.adaptive_normaliser import RECORD, spans_of
-from blysk.sim.units.operands import code_pairs_at, component_words
 
 from ...checks import assert_beats_equal, resets
 
@@ -18,7 +18,7 @@ def run_of(unit, angles, lengths, **stalls):
     run = simulate(unit, case.beats, count=lengths.sum(), engine="auto", **stalls)
     assert_beats_equal(run.beats, RECORD.expect(unit, case))
     ends = component_words(case.beats["normal_left"], case.beats["normal_right"])
-    return run, unit.parameters.compute(*ends, lengths)[2]
+    return run, unit.model.compute(*ends, lengths)[2]
 
 
 @pytest.mark.long
@@ -28,7 +28,7 @@ def test_one_normal_in_every_cycle_of_a_span(variant):
     rng = np.random.default_rng(2)
     lengths = np.r_[1, 2, 3, 16, 4095, 0, 1, 1, 2, 2, 5, 17, 33, 64, 0, 0, 129, rng.integers(1, 80, 60)]
     run, levels = run_of(unit, rng.uniform(0, 95, len(lengths)), lengths)
-    assert (levels.min(), levels.max()) == (0, unit.parameters.depth)
+    assert (levels.min(), levels.max()) == (0, unit.model.depth)
     span, index = pixels_of(lengths)
     starts = (np.cumsum(lengths) - lengths)[span]
     np.testing.assert_array_equal(run.cycles, run.cycles[starts] + index)
@@ -72,7 +72,7 @@ def test_front_runs_ahead_until_the_fifo_is_full():
     stalls = np.arange(2 * wait) < wait
     run, _ = run_of(unit, np.linspace(0, 3, 100), np.ones(100, dtype=np.int64), output_stalls=stalls)
     # One span more is in each of the three parts.
-    assert (run.input_cycles < wait).sum() == (2 << unit.parameters.depth) + 3
+    assert (run.input_cycles < wait).sum() == (2 << unit.model.depth) + 3
 
 
 @pytest.mark.long

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.normals.bisection_chain import RECORD
+from blysk.bench.units.operands import code_pairs_at
+from blysk.bench.units.record import Case
 from blysk.hdl.normals.bisection_chain import BisectionChainUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.normals.bisection_chain import RECORD
-from blysk.sim.units.operands import code_pairs_at
-from blysk.sim.units.record import Case
 
 from ...checks import resets
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from blysk.bench.units.normals.quadratic_evaluator import RECORD, spans_of
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from blysk.golden.number.spans import pixels_of
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.units.normals.quadratic_evaluator import RECORD, spans_of
 
 SHORTEST = {"direct": 7, "horner": 4}
 """Pixels of spans between which there is no gap."""
@@ -27,7 +27,7 @@ def run_of(unit, lengths, seed):
 
 @pytest.mark.long
 def test_no_gap_between_spans(unit):
-    shortest = SHORTEST[unit.parameters.form]
+    shortest = SHORTEST[unit.model.form]
     rng = np.random.default_rng(1)
     lengths = np.r_[np.full(6, shortest), 4095, shortest, 16, rng.integers(shortest, 40, 300)]
     run = run_of(unit, lengths, 2)

@@ -16,15 +16,15 @@ class PatternTop(wiring.Component):
     Without ``moves`` every frame is the first.
     """
 
-    def __init__(self, parameters, pause=0, moves=True):
-        self.display, self.pause, self.moves = DisplayUnit(parameters), pause, moves
+    def __init__(self, model, pause=0, moves=True):
+        self.display, self.pause, self.moves = DisplayUnit(model), pause, moves
         members = self.display.signature.members
         super().__init__({name: Out(members[name].shape) for name in ("pairs", "status")})
 
     def elaborate(self, platform):
         m = Module()
         m.submodules.display = display = self.display
-        given = display.parameters
+        given = display.model
         width = given.mode.horizontal.visible
         m.d.comb += [self.pairs.eq(display.pairs), self.status.eq(display.status)]
         pixel, request, done = display.pixels.payload, display.request, display.done
@@ -65,10 +65,10 @@ class PatternTop(wiring.Component):
         return m
 
 
-def picture(parameters, frame):
+def picture(model, frame):
     """The pattern of a frame."""
-    width, height = parameters.mode.size
+    width, height = model.mode.size
     y, x = np.mgrid[:height, :width]
     result = np.stack([x, y, x ^ y ^ frame], axis=-1) & 255
-    result[x % 8 == 7] = parameters.background
+    result[x % 8 == 7] = model.background
     return result

@@ -19,14 +19,14 @@ FRAMES = 3
 class Drawing:
     """Pixels of any band of any frame, some drawn twice, some beside it; what a band was drawn as last."""
 
-    def __init__(self, parameters):
-        self.parameters, self.frame, self.asked = parameters, -1, []
-        width, height = parameters.mode.size
+    def __init__(self, model):
+        self.model, self.frame, self.asked = model, -1, []
+        width, height = model.mode.size
         self.picture = np.empty((height, width, 3), dtype=np.int64)
 
     def band(self, band):
         """Pixels of a band: x, y, r, g, b."""
-        given = self.parameters
+        given = self.model
         self.frame += band == 0
         self.asked.append(band)
         rng = np.random.default_rng([self.frame + 1, band])
@@ -41,16 +41,16 @@ class Drawing:
         return np.c_[x, y, colour].tolist()
 
 
-def show(parameters, wait, periods=(1.0, 1.37), frames=FRAMES):
+def show(model, wait, periods=(1.0, 1.37), frames=FRAMES):
     """Frames that are shown, those that should be, late bands, the buffer's counts, and the bands asked for.
 
     ``wait`` gives the cycles that a band takes beside its pixels.
     """
-    unit, timing, drawing = BandBufferUnit(parameters), DisplayTiming(parameters.mode), Drawing(parameters)
+    unit, timing, drawing = BandBufferUnit(model), DisplayTiming(model.mode), Drawing(model)
     simulator = Simulator(unit)
     simulator.add_clock(periods[0] * 1e-6, domain="sync")
     simulator.add_clock(periods[1] * 1e-6, domain="pixel", phase=0.3e-6)
-    cycles = timing.compute((frames + 1) * parameters.mode.cycles)
+    cycles = timing.compute((frames + 1) * model.mode.cycles)
     found, status, stop = [], {}, Signal()
 
     async def draw(ctx):
@@ -91,51 +91,51 @@ def show(parameters, wait, periods=(1.0, 1.37), frames=FRAMES):
     for name, values in cycles.items():
         np.testing.assert_array_equal(found[name], values)
     colours = np.stack([found[channel] for channel in "rgb"], axis=-1)[cycles["active"]]
-    width, height = parameters.mode.size
+    width, height = model.mode.size
     return colours.reshape(-1, height, width, 3), status, drawing
 
 
-def pictures(parameters, frames):
+def pictures(model, frames):
     """The frames of a drawing that is fast enough."""
-    drawing, result = Drawing(parameters), []
+    drawing, result = Drawing(model), []
     for _ in range(frames):
-        for band in range(parameters.bands):
+        for band in range(model.bands):
             drawing.band(band)
-        result.append(parameters.compute(drawing.picture))
+        result.append(model.compute(drawing.picture))
     return np.array(result)
 
 
 @pytest.mark.parametrize(
-    ("parameters", "periods"),
+    ("model", "periods"),
     [
         pytest.param(BandBuffer(MODE, 4), (1.0, 3.3), marks=pytest.mark.long),
         (BandBuffer(MODE, 2, RGB565, (10, 200, 77)), (1.0, 2.9)),
         pytest.param(BandBuffer(MODE, 4, RGB888, (255, 1, 128)), (0.37, 1.0), marks=pytest.mark.long),
     ],
 )
-def test_every_frame_in_time(parameters, periods):
+def test_every_frame_in_time(model, periods):
     """At several clocks, formats and backgrounds."""
-    frames, status, _ = show(parameters, lambda count: count % 7, periods)
-    np.testing.assert_array_equal(frames[:FRAMES], pictures(parameters, FRAMES))
+    frames, status, _ = show(model, lambda count: count % 7, periods)
+    np.testing.assert_array_equal(frames[:FRAMES], pictures(model, FRAMES))
     assert status == {"late_bands": 0, "frames": FRAMES + 1}
 
 
 def test_what_a_reset_finds_is_never_shown(monkeypatch):
     """Both buffers are cleared before their first bands, whatever they hold."""
-    parameters = BandBuffer(MODE, 4)
-    full = [0x5A5A5A] * (2 * parameters.pixels)
+    model = BandBuffer(MODE, 4)
+    full = [0x5A5A5A] * (2 * model.pixels)
     monkeypatch.setattr(
         band_buffer, "Memory", lambda shape, depth, init: Memory(shape=shape, depth=depth, init=full)
     )
-    frames, status, _ = show(parameters, lambda count: 0, (1.0, 4.0), frames=1)
-    np.testing.assert_array_equal(frames[:1], pictures(parameters, 1))
+    frames, status, _ = show(model, lambda count: 0, (1.0, 4.0), frames=1)
+    np.testing.assert_array_equal(frames[:1], pictures(model, 1))
     assert status["late_bands"] == 0
 
 
-def is_background(parameters, frames):
+def is_background(model, frames):
     """Which bands of frames are all background; shape (frames, bands)."""
-    empty = parameters.shown(parameters.kept(parameters.background))
-    lines = (frames == empty).all((-1, -2)).reshape(len(frames), parameters.bands, parameters.lines)
+    empty = model.shown(model.kept(model.background))
+    lines = (frames == empty).all((-1, -2)).reshape(len(frames), model.bands, model.lines)
     return lines.all(-1)
 
 
@@ -145,14 +145,14 @@ def test_late_bands_are_background_and_counted(wait, left_out):
 
     After a late one the band of the next slot is asked for: some are left out, or none if all take that long.
     """
-    parameters = BandBuffer(MODE, 4, RGB888, (3, 2, 1))
-    frames, status, drawing = show(parameters, lambda count: wait, (1.0, 1.4))
-    late = is_background(parameters, frames)
+    model = BandBuffer(MODE, 4, RGB888, (3, 2, 1))
+    frames, status, drawing = show(model, lambda count: wait, (1.0, 1.4))
+    late = is_background(model, frames)
     assert late.any()
     assert late.sum() == status["late_bands"]
-    assert (np.diff(drawing.asked) % parameters.bands > 1).any() == left_out
+    assert (np.diff(drawing.asked) % model.bands > 1).any() == left_out
     # Everything that was drawn, by band.
-    again, drawn = Drawing(parameters), {}
+    again, drawn = Drawing(model), {}
     for band in drawing.asked:
         again.band(band)
         lines = slice(band * 4, band * 4 + 4)
@@ -165,8 +165,8 @@ def test_late_bands_are_background_and_counted(wait, left_out):
 
 def test_it_recovers():
     """After one heavy band the frames are whole again."""
-    parameters = BandBuffer(MODE, 4)
-    frames, status, _ = show(parameters, lambda count: 700 * (count == 3), (1.0, 2.4))
-    late = is_background(parameters, frames)
+    model = BandBuffer(MODE, 4)
+    frames, status, _ = show(model, lambda count: 700 * (count == 3), (1.0, 2.4))
+    late = is_background(model, frames)
     assert late.sum() == status["late_bands"] > 0
     assert not late[2:].any()

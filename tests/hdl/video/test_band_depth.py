@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from amaranth.sim import Simulator
 
-from blysk.golden.geometry.depth_test import DepthTest
+from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.video.band_depth import BandDepth
 from blysk.hdl.video.band_depth import BandDepthUnit
 
@@ -28,9 +28,9 @@ def test_reads_are_those_of_the_band(tag_bits):
     x = rng.integers(0, np.where(anywhere, 8, SIZE[0]))
     y = rng.integers(0, np.where(anywhere, 4, SIZE[1]))
     inside = (x < SIZE[0]) & (y < SIZE[1])
-    depth = rng.integers(0, DepthTest.FARTHEST, count)
+    depth = rng.integers(0, DepthTester.FARTHEST, count)
     expected = model.compute(begins, writes & inside, np.where(inside, y * SIZE[0] + x, 0), depth)
-    expected[~inside] = DepthTest.CLEARED
+    expected[~inside] = DepthTester.CLEARED
     dut, found = BandDepthUnit(model, 3, 2), []
 
     async def bench(ctx):
@@ -64,7 +64,7 @@ def test_reads_are_those_of_the_band(tag_bits):
     simulator.add_testbench(bench)
     simulator.run()
     np.testing.assert_array_equal(found, expected[~begins])
-    assert 0.05 < np.mean(np.array(found) != DepthTest.CLEARED) < 0.9
+    assert 0.05 < np.mean(np.array(found) != DepthTester.CLEARED) < 0.9
 
 
 def test_words_that_there_are_not():

@@ -16,20 +16,20 @@ MODE = DisplayMode(Axis(24, 2, 3, 11), Axis(16, 1, 2, 3))
 PARAMETERS = BandBuffer(MODE, 4, background=(9, 99, 199))
 
 
-def shown(pause, rate, frames=4, parameters=PARAMETERS, **options):
+def shown(pause, rate, frames=4, model=PARAMETERS, **options):
     """Frames of a display in a small mode."""
-    return show(OneClock(PatternTop(parameters, pause), Fraction(rate)), MODE, frames, **options)
+    return show(OneClock(PatternTop(model, pause), Fraction(rate)), MODE, frames, **options)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("rate", "parameters"),
+    ("rate", "model"),
     [pytest.param("5/7", PARAMETERS, marks=pytest.mark.ci), ("1/2", BandBuffer(MODE, 2, RGB565))],
 )
-def test_lanes_decode_to_the_frames(rate, parameters):
+def test_lanes_decode_to_the_frames(rate, model):
     """Every frame, through the lanes."""
-    found = shown(3, rate, parameters=parameters)
-    expected = [parameters.compute(picture(parameters, frame)) for frame in range(4)]
+    found = shown(3, rate, model=model)
+    expected = [model.compute(picture(model, frame)) for frame in range(4)]
     np.testing.assert_array_equal(found.frames, expected)
     assert found.status["late_bands"] == 0
 

@@ -65,7 +65,7 @@ def test_documents_state_the_frame_of_vectors(unit):
 def test_header_is_c(unit, tmp_path):
     """A compiler agrees about every size and offset."""
     (tmp_path / "core.h").write_text(documents_of(unit, "core")[".h"])
-    layouts = unit.framing.parameters
+    layouts = unit.framing.model
     lines = ['#include "core.h"', "#include <cstddef>"]
     for kind, layout in (("input", layouts.given), ("output", layouts.made)):
         lines.append(f'static_assert(sizeof(core_{kind}) == {layout.size}, "");')

@@ -44,7 +44,7 @@ def test_lobes_that_are_too_sharp_are_counted(roughness, sharp):
 def test_render_by_roughness():
     frame = blysk.render("teapot", model="ggx", roughness=0.3, engine="pysim", **SMALL)
     assert frame.figures["counts"]["sharp_lobes"] == 0
-    assert frame.design.specular.model is GGX
+    assert frame.design.specular.reflection is GGX
     assert frame.scene.materials[0].roughness == 0.3
     assert frame.error.max_lsb < 0.8
 

@@ -266,7 +266,7 @@ def test_auto_falls_back_to_pysim(monkeypatch):
     def broken(component, origin):
         raise CompilerMissing("no compiler")
 
-    monkeypatch.setattr("blysk.sim.engines.cxxrtl.Model", broken)
+    monkeypatch.setattr("blysk.sim.engines.cxxrtl.Compiled", broken)
     with pytest.warns(RuntimeWarning, match="^no compiler; using pysim, some hundred times slower$"):
         run = simulate(Register(), pairs(3), count=3, engine="auto")
     assert run.engine == "pysim"

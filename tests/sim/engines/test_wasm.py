@@ -18,8 +18,8 @@ from blysk.hdl.core.fixed import SQ, UQ
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines import wasm
 from blysk.sim.engines.beats import pack, unpack
-from blysk.sim.engines.engine import CompilerMissing, SimulationError, Stimulus, StopReason
-from blysk.sim.engines.pysim import Model
+from blysk.sim.engines.engine import CompilerMissing, Drive, SimulationError, StopReason
+from blysk.sim.engines.pysim import Interpreted
 from blysk.sim.frames.frame import beats_of
 from blysk.sim.installation import install_extra
 
@@ -39,7 +39,7 @@ def spans_of(length):
 def stimulus_of(component, spans, exponent=5):
     nothing = np.zeros((0, 3), dtype=np.int64)
     constants = FrameConstants(exponent, np.array([64 * 40, 64 * 50 + 32, 7]), *[nothing] * 4)
-    return Stimulus(
+    return Drive(
         input=pack(component.i.payload.shape(), beats_of(component, spans)),
         write=pack(component.write.payload.shape(), writes_of([constants])),
         constants=np.zeros((0, 0), dtype=np.uint32),
@@ -75,16 +75,16 @@ class Browser:
         self.exports["memory"].write(self.store, bytearray(raw), at)
         return at
 
-    def prepare(self, stimulus, words):
+    def prepare(self, drive, words):
         self.call("release")
-        self.count, self.inputs, self.words = stimulus.count, len(stimulus.input), words
-        written, given = self.write(stimulus.write), self.write(stimulus.input)
-        self.output = self.call("reserve", 4 * words * stimulus.count + 4)
-        self.cycles = self.call("reserve", 8 * stimulus.count + 8)
+        self.count, self.inputs, self.words = drive.count, len(drive.input), words
+        written, given = self.write(drive.write), self.write(drive.input)
+        self.output = self.call("reserve", 4 * words * drive.count + 4)
+        self.cycles = self.call("reserve", 8 * drive.count + 8)
         self.input_cycles = self.call("reserve", 8 * self.inputs + 8)
         self.arguments = (
-            *(written, len(stimulus.write), given, self.inputs),
-            *(self.output, stimulus.count, self.cycles, self.input_cycles),
+            *(written, len(drive.write), given, self.inputs),
+            *(self.output, drive.count, self.cycles, self.input_cycles),
         )
         self.call("prepare", *self.arguments)
 
@@ -121,9 +121,9 @@ def test_same_beats_on_the_same_cycles(component, browser):
     ports = wasm.ports_of(component)
     rng = np.random.default_rng(1)
     for spans in (spans_of([3, 1, 0, 2, 4095]), spans_of(rng.integers(0, 6, 40))):
-        stimulus = stimulus_of(component, spans)
-        expected = Model(component).run(stimulus)
-        browser.prepare(stimulus, ports["o"]["words"])
+        drive = stimulus_of(component, spans)
+        expected = Interpreted(component).run(drive)
+        browser.prepare(drive, ports["o"]["words"])
         # Again from power-up, in the same memory.
         for _ in range(3):
             browser.call("prepare", *browser.arguments)
@@ -134,8 +134,8 @@ def test_same_beats_on_the_same_cycles(component, browser):
 
 
 def test_memory_does_not_grow_from_run_to_run(component, browser):
-    stimulus = stimulus_of(component, spans_of([9] * 50))
-    browser.prepare(stimulus, wasm.ports_of(component)["o"]["words"])
+    drive = stimulus_of(component, spans_of([9] * 50))
+    browser.prepare(drive, wasm.ports_of(component)["o"]["words"])
     sizes = []
     for _ in range(4):
         browser.call("prepare", *browser.arguments)
@@ -147,18 +147,18 @@ def test_memory_does_not_grow_from_run_to_run(component, browser):
 def test_trace_is_the_status_of_every_clock(component, browser):
     ports = wasm.ports_of(component)
     spans = spans_of([2, 0, 3, 0])
-    stimulus = stimulus_of(component, spans)
-    expected = Model(component).run(stimulus)
-    browser.prepare(stimulus, ports["o"]["words"])
+    drive = stimulus_of(component, spans)
+    expected = Interpreted(component).run(drive)
+    browser.prepare(drive, ports["o"]["words"])
     words = ports["status"]["words"]
     rows, ended = browser.call("reserve", 4 * words * 400), browser.call("reserve", 4)
     count = browser.call("trace", rows, 400, ended)
     assert browser.read(ended, 1, "<i4")[0] == StopReason.DONE
-    assert count == expected.total_cycles + stimulus.settle
+    assert count == expected.total_cycles + drive.settle
     browser.assert_gave(expected)
     trace = browser.read(rows, count * words, "<u4").reshape(count, words)
     for clock in (1, 5, *expected.input_cycles[:2] + 2, expected.total_cycles):
-        status = Model(component).run(replace(stimulus, limit=int(clock))).status
+        status = Interpreted(component).run(replace(drive, limit=int(clock))).status
         np.testing.assert_array_equal(trace[clock - 1 : clock], status)
     browser.call("prepare", *browser.arguments)
     assert browser.call("trace", rows, 7, ended) == 7

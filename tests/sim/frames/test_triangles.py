@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blysk.golden.frames.triangle_frame import triangle_frame
-from blysk.golden.geometry.triangles import Frame
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.render import Renderer
@@ -76,7 +76,7 @@ def test_sizes_at_their_ends(size):
     """The triangles that check a new model lie in the grid and show pixels; scenes cover what they should."""
     renderer = Renderer(design())
     checks = renderer.compute(
-        sample_triangles(renderer, size), Frame.centred(*size), sample_constants(renderer.design)
+        sample_triangles(renderer, size), FrameSettings.centred(*size), sample_constants(renderer.design)
     )
     assert len(checks.x) > 0
     if min(size) <= 3:

@@ -1,0 +1,144 @@
+"""Record of the framing of streams."""
+
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from blysk.bench.units.geometry.geometry import RECORD as GEOMETRY
+from blysk.bench.units.pipeline import RECORD as SHADER
+from blysk.bench.units.record import PAUSED, Case, Record, Stimulus, Variant, first, length_of, together
+from blysk.bench.units.render import RECORD as RENDER
+from blysk.golden.bus.byte_layout import ByteLayout
+from blysk.golden.presets import preset
+from blysk.hdl.bus.framing import FramingUnit
+
+__all__ = ["RECORD"]
+
+_RECORDS = {"span": SHADER, "frame": GEOMETRY, "run": RENDER}
+
+
+def _columns(layout: ByteLayout, beats) -> dict:
+    """Beats of a core as columns with the names of a layout; members of nested structures join names."""
+    found = {}
+
+    def add(name, value):
+        if getattr(value, "dtype", None) is not None and value.dtype.names:
+            for key in value.dtype.names:
+                part = value[key]
+                for k in range(value.shape[1]) if value.ndim > 1 else [None]:
+                    add(
+                        f"{name}_{key}" if k is None else f"{name}_{k}_{key}",
+                        part if k is None else part[:, k],
+                    )
+        else:
+            found[name] = value
+
+    for name, value in beats.items():
+        add(name, value)
+    return {field.name: found[field.name] for field in layout.fields}
+
+
+def _core_cases(unit, case) -> list[Case]:
+    """Input of the core inside a unit, frame by frame: nothing of a frame is left in the next."""
+    data = np.asarray(case.beats["data"], dtype=np.uint8)
+    beats = unit.model.given.unpack(data)
+    ends = [*np.flatnonzero(case.beats["last"][:-1]) + 1, len(data)]
+    constants = case.constants and {name: code for name, code in case.constants.items() if name != "keep"}
+    return [
+        replace(case, beats={name: codes[begin:end] for name, codes in beats.items()}, constants=constants)
+        for begin, end in pairwise([0, *ends])
+    ]
+
+
+def _expect(unit, case):
+    record = _RECORDS[unit.packets]
+    frames = [record.expect(unit.core, each) for each in _core_cases(unit, case)]
+    frame = np.repeat(np.arange(len(frames)), [length_of(each) for each in frames])
+    made = unit.model.compute(together(frames), frame)
+    # The last beat of a frame that has not ended is held back.
+    begun = np.count_nonzero(case.beats["last"]) if not case.beats["last"][-1] else -1
+    return first(made, len(frame) - int(len(frame) > 0 and frame[-1] == begun))
+
+
+def _status(unit, case):
+    record = _RECORDS[unit.packets]
+    ended = int(np.count_nonzero(case.beats["last"]))
+    misfits = int(np.count_nonzero(~unit.model.given.fits(np.asarray(case.beats["data"], np.uint8))))
+    mine = {"frames": ended, "misfits": misfits, "busy": int(not case.beats["last"][-1])}
+    counts = [record.status(unit.core, each) for each in _core_cases(unit, case)]
+    # A flag, where the others are counters.
+    flags = {"overrun": max}
+    return {name: flags.get(name, sum)([each[name] for each in counts]) for name in counts[0]} | mine
+
+
+def _case(unit, rng, count, length):
+    record = _RECORDS[unit.packets]
+    # For spans the stimulus counts pixels.
+    count *= 10 if unit.packets == "span" else 1
+    inner = next(iter(record.stimuli.values())).make(unit.core, rng, count)
+    if unit.packets == "run":
+        constants = {name: code for name, code in inner.constants.items() if name != "picture"}
+        inner = replace(inner, constants=constants | {"keep": 0})
+    data = unit.model.given.pack(_columns(unit.model.given, inner.beats))
+    ends = np.cumsum(rng.integers(1, 2 * length, len(data) + 1)) - 1
+    last = np.isin(np.arange(len(data)), ends)
+    # Also the beats that end the run, and the run with pauses.
+    last[[-1, min(PAUSED, len(last)) - 1]] = True
+    return replace(inner, beats={"data": data, "last": last.astype(int)})
+
+
+def _frames(unit, rng, count):
+    """Frames of some beats each, some frames without output."""
+    return _case(unit, rng, count, 24)
+
+
+def _short(unit, rng, count):
+    """Frames of a beat or two."""
+    return _case(unit, rng, count, 2)
+
+
+def _misfits(unit, rng, count):
+    """Frames with beats in which a bit of any byte is inverted."""
+    case = _frames(unit, rng, count)
+    # Not of the last ones, so that every run ends with a beat.
+    data = case.beats["data"]
+    chosen = rng.random(len(data)) < 0.3
+    chosen[[-1, min(PAUSED, len(data)) - 1]] = False
+    byte, bit = rng.integers(0, data.shape[1], len(data)), rng.integers(0, 8, len(data))
+    data[chosen, byte[chosen]] ^= (1 << bit[chosen]).astype(np.uint8)
+    return case
+
+
+def _variants():
+    yield "shader", Variant(partial(FramingUnit, preset(model="cosquad", lights=0)))
+    design = preset("linear", "cosquad", x_bits=5, y_bits=5)
+    yield "render", Variant(partial(FramingUnit, design.built(top="render"), size=(32, 24)), long=True)
+    yield "geometry", Variant(partial(FramingUnit, design.built(top="geometry")), long=True)
+
+
+RECORD = Record(
+    name="framing",
+    title="A core between streams of bytes, with the borders of frames",
+    source="docs/theory/bus.md#streams",
+    variants=dict(_variants()),
+    expect=_expect,
+    status=_status,
+    stimuli={
+        "frames": Stimulus(_frames, 200),
+        "short": Stimulus(_short, 60, repeats=2),
+        "misfits": Stimulus(_misfits, 100),
+    },
+    axis="",
+    remembers=True,
+    still={
+        "bytes hold 12 bits of a coordinate, and no more than colours": (
+            "top.{spare,word}[12-15] top.{spare,word}[28-31] top.{spare,word}[56-63]"
+        ),
+        "without lights a colour is a constant of the run, written once": (
+            "top.{spare,word}[32-55] held_back[24-47]"
+        ),
+        "a counter counts more events than a run has": "count_frames[5-31] count_misfits[3-31]",
+    },
+)

@@ -1,0 +1,53 @@
+"""Record of the attribute serialiser."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.triangles import random_triangles, triangles_with
+from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
+from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit
+
+__all__ = ["RECORD"]
+
+
+def _expect(unit, case):
+    return AttributeSerialiser().compute(triangles_with(**case.beats))
+
+
+def _case(rng, count, spread):
+    triangles = random_triangles(rng, count, spread=spread)
+    return Case({"depth": triangles.depth, "normal": triangles.normal})
+
+
+def _near(unit, rng, count):
+    """Normals of all lengths, those of a triangle's corners near to each other."""
+    return _case(rng, count, 0.3)
+
+
+def _far(unit, rng, count):
+    """Normals of any direction, some with components near 0 and at the ends of the word."""
+    case = _case(rng, count, 2.0)
+    low, high = -(1 << 23) + 1, (1 << 23) - 1
+    words = [low, high, 0, -1, 1, 4095, 4096, -4096, -4097]
+    case.beats["normal"][::3] = rng.choice(words, case.beats["normal"][::3].shape)
+    case.beats["normal"][::6, 1:] = np.sign(case.beats["normal"][::6, :1]) * np.abs(
+        case.beats["normal"][::6, 1:]
+    )
+    return case
+
+
+RECORD = Record(
+    name="attribute_serialiser",
+    title="A triangle's attributes one by one, and a bound on its normals' length",
+    source="docs/theory/geometry.md#normals",
+    variants={
+        "": Variant(AttributeSerialiserUnit, note="exact"),
+        "without skid buffer": Variant(partial(AttributeSerialiserUnit, skid=False), note="exact"),
+    },
+    expect=_expect,
+    stimuli={"near": Stimulus(_near, 500), "far": Stimulus(_far, 500)},
+    axis="",
+    still={"the signs of the first corner are turned to positive": "total_0[13]"},
+)

@@ -1,0 +1,145 @@
+"""Record of the coarse depth test."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.golden.geometry.coarse_depth import CoarseDepth
+from blysk.golden.geometry.span_attributes import SPAN_DEPTH
+from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
+
+__all__ = ["RECORD"]
+
+
+def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
+    """Overlapping spans of a small picture, with depths below ``most``, or the largest, at the ends."""
+    given = unit.model
+    longest = min(longest, given.width)
+    length = rng.integers(1, longest + 1, count)
+    # Every fourth span goes on where the one before ended, as triangles side by side do.
+    x = rng.integers(0, given.width - length + 1)
+    y = rng.integers(0, lines or given.height, count)
+    x[1::4] = np.minimum(x[0::4] + length[0::4], given.width - length[1::4])[: len(x[1::4])]
+    y[1::4] = y[0::4][: len(y[1::4])]
+    # Later spans are farther in most cases.
+    base = np.sort(rng.integers(0, most, count)) // 2
+    left, right = (base[:, np.newaxis] + rng.integers(0, most // 3, (count, 2))).T.clip(0, most - 1) << 9
+    left[::5], right[::7] = rng.choice([0, (1 << 33) - 1], len(left[::5])), 0
+    step = (right - left) // np.maximum(length - 1, 1)
+    step[length == 1] = rng.integers(-(1 << 33), 1 << 33, (length == 1).sum())
+    picture = np.cumsum(rng.random(count) < 0.015) % 2
+    return Case({"x": x, "y": y, "length": length, "depth": left, "depth_step": step, "picture": picture})
+
+
+def _short(unit, rng, count):
+    """Spans of one to six pixels in few blocks, whose words are needed before the memory has them."""
+    return _spans(unit, rng, count, 6, lines=1)
+
+
+def _outside(unit, rng, count):
+    """Spans of a small picture, of which every fourth or so goes out of it, on the right or below."""
+    case = _spans(unit, rng, count, 20, lines=2)
+    beats, given = case.beats, unit.model
+    far, low = rng.random((2, count)) < 0.15
+    most = 1 << unit.x_bits
+    beats["x"] = np.where(far, rng.integers(given.width - 3, most, count), beats["x"])
+    beats["length"] = np.where(far, rng.integers(4, most, count), beats["length"])
+    below = 1 << unit.y_bits
+    if given.height < below:
+        beats["y"] = np.where(low, rng.integers(given.height, below, count), beats["y"])
+    return case
+
+
+def _near(unit, rng, count):
+    """Depths of 15 bits, which differ in few of the upper bits that are compared."""
+    return _spans(unit, rng, count, 12, 1 << 15, lines=1)
+
+
+def _edges(unit, rng, count):
+    """Three spans a picture, of which the last is hidden, or is not, by the last bit of a depth.
+
+    The first span marks pixels of a block; the second fills the block, and may go on to blocks where it is
+    nearer. In that block the deepest depths of both are the first code of a step of the bound, or the code
+    before it, and near each other. The nearest depth of the third span is in that block; it is the first code
+    of the step behind both, or the code before it.
+    """
+    given, groups = unit.model, -(-count // 3)
+    shift, size, columns = SPAN_DEPTH.width - given.depth_bits, given.block, given.blocks_per_line
+    block, falls = rng.integers(0, columns, groups), rng.random(groups) < 0.5
+    first, end = block * size, np.minimum(block * size + size, given.width) - 1
+
+    def line(edge, at, other, falls):
+        """Step of a line of any slope that is ``edge`` at pixel ``at`` and in range at pixel ``other``."""
+        room = np.where(falls == (at < other), edge, (1 << SPAN_DEPTH.width) - 1 - edge)
+        step = (
+            room // np.maximum(abs(at - other), 1) * rng.random(groups) * 2.0 ** rng.integers(-30, 1, groups)
+        )
+        return np.where(falls, -1, 1) * step.astype(np.int64)
+
+    def span(begin, last, edge, falls, deepest):
+        """The span from pixel ``begin`` to ``last``, whose deepest or nearest depth is ``edge``."""
+        at, other = np.where(falls == deepest, (begin, last), (last, begin))
+        step = line(edge, at, other, falls)
+        return begin, last - begin + 1, edge - step * (at - begin), step
+
+    def code(upper):
+        """The first code of a step of the bound, or the code before it."""
+        return (upper << shift) - rng.integers(0, 2, groups)
+
+    # Some groups fill the block twice, the second time less deep.
+    twice = rng.random(groups) < 0.125
+    upper = np.where(twice, 1, rng.integers(2, (1 << given.depth_bits) - 3, groups))
+    marked, filled = code(upper + np.where(twice, 2, rng.integers(-1, 2, groups))), code(upper)
+    # Some groups leave out one pixel of the block, which then gets no bound.
+    gap, hole = ~twice & (rng.random(groups) < 0.25), rng.integers(first + 1, end)
+    begin = np.where(twice | gap, first, rng.integers(first, end + 1))
+    last = np.where(gap, hole - 1, np.where(twice, end, rng.integers(begin, end + 1)))
+    marks = span(begin, last, marked, rng.random(groups) < 0.5, True)
+    # A falling line may go on to the right, where it is nearer; a rising one may come from the left.
+    limits = (
+        np.where(gap, hole + 1, np.where(falls, first, size * rng.integers(0, block + 1))),
+        np.where(falls & ~gap, np.minimum(size * rng.integers(block + 1, columns + 1), given.width) - 1, end),
+    )
+    fills = span(*limits, filled, falls, True)
+    nearest = code((np.where(twice, filled, np.maximum(marked, filled)) >> shift) + 1)
+    begin = rng.integers(np.where(falls, first, limits[0]), end + 1)
+    last = rng.integers(np.maximum(begin, first), np.where(falls, limits[1], end) + 1)
+    inside = (begin >= first) & (last <= end)
+    covered = span(begin, last, nearest, np.where(inside, rng.random(groups) < 0.5, ~falls), False)
+    names = ("x", "length", "depth", "depth_step")
+    beats = {
+        name: np.stack(values, axis=1).ravel()[:count]
+        for name, *values in zip(names, marks, fills, covered, strict=True)
+    }
+    places = {"y": rng.integers(0, given.height, groups), "picture": np.arange(groups) % 2}
+    return Case(beats | {name: np.repeat(values, 3)[:count] for name, values in places.items()})
+
+
+RECORD = Record(
+    name="coarse_depth",
+    title="Spans that are hidden for their whole length",
+    source="docs/theory/geometry.md#depth",
+    variants={
+        "": Variant(partial(CoarseDepthUnit, CoarseDepth(46, 5, tag_bits=3), 6, 3), note="exact"),
+        "16 pixels": Variant(
+            partial(CoarseDepthUnit, CoarseDepth(40, 3, 16, 24), 6, 2), note="exact", long=True
+        ),
+    },
+    expect=lambda unit, case: unit.model.compute(**case.beats).astype(np.int64),
+    stimuli={
+        "spans": Stimulus(_spans, 600),
+        "short": Stimulus(_short, 900),
+        "near": Stimulus(_near, 600),
+        "outside": Stimulus(_outside, 600),
+        "edges": Stimulus(_edges, 2000),
+    },
+    axis="",
+    waivers={"place": "Words are swept in another order, every one in its turn."},
+    still={
+        "what a reset finds is swept": "fresh[0] used[0]",
+        "only after a reset all words are swept, and 5 of 30 else": "left[3-4]",
+        "a scanline has six words, and begins with an even one": "span[12]",
+    },
+    remembers=True,
+)

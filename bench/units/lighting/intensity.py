@@ -1,0 +1,127 @@
+"""Record of the intensity unit."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
+
+__all__ = ["RECORD"]
+
+_COLOR, _TERM = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
+_FULL = 255 << _COLOR.fraction_bits
+"""Colour operand of the full channel."""
+
+
+def _measure(rng, count):
+    unit = Intensity()
+    colors = rng.random((3, 64, 3))
+    pick = rng.integers(0, 64, count)
+    terms = rng.integers(0, 1 << 17, (2, count))
+    terms[:, :2] = 0, (1 << 17) - 1
+    found = np.empty((count, 3))
+    for k, color in enumerate(colors.transpose(1, 0, 2)):
+        ambient, diffuse, specular = (Fixed(_COLOR, unit.color(c)) for c in color)
+        chosen = pick == k
+        found[chosen] = unit.compute(
+            ambient,
+            diffuse[np.newaxis],
+            specular[np.newaxis],
+            *(Fixed(_TERM, term[chosen][:, np.newaxis]) for term in terms),
+        )
+    weights = np.stack([np.ones(count), *(terms * 2.0**-17)])
+    exact = np.minimum(255 * np.einsum("wp,wpc->pc", weights, colors[:, pick]), 255)
+    return Sample(found, exact, exact, exact)
+
+
+def _expect(unit, case):
+    colors = (Fixed(_COLOR, case.constants[name]) for name in ("ambient", "diffuse", "specular"))
+    diffuse = case.beats["diffuse"]
+    terms = (Fixed(_TERM, codes) for codes in (diffuse, case.beats.get("specular", np.zeros_like(diffuse))))
+    return dict(zip("rgb", unit.model.compute(*colors, *terms).T, strict=True))
+
+
+def _case(unit, terms, ambient, colors):
+    beats = dict(zip(unit.kinds, terms, strict=False))
+    return Case(beats, {"ambient": ambient, "diffuse": colors[0], "specular": colors[1]})
+
+
+def _terms(unit, rng, count, brightness=1):
+    """Terms of which some or all are 0, or all are the largest; colours up to a full channel."""
+    lights = unit.model.lights
+    terms = rng.integers(0, _TERM.max_code, (2, count, lights), endpoint=True)
+    terms *= rng.random(terms.shape) < rng.random((1, count, 1))
+    terms[:, ::32] = _TERM.max_code
+    terms[:, 1::32] = 0
+    terms[1, 2::32] = 0
+    ambient, *colors = (rng.integers(0, _FULL * brightness, (n, 3)) for n in (1, lights, lights))
+    return _case(unit, rng.permutation(terms, axis=1), ambient[0], colors)
+
+
+def _bright(unit, rng, count):
+    """Such terms with colours up to eight full channels: saturation, and every bit of a colour."""
+    return _terms(unit, rng, count, 8)
+
+
+def _sizes(unit, rng, count):
+    """Terms and colours of every size: the last bits of products, which are rounded off."""
+    terms = rng.integers(0, _TERM.max_code, (2, count, 1), endpoint=True)
+    terms >>= rng.integers(0, 12, terms.shape)
+    ambient, *colors = rng.integers(0, _FULL * rng.choice([1, 2, 8]), (3, 1, 3))
+    return _case(unit, terms, ambient[0], colors)
+
+
+def _halves(unit, rng, count):
+    """Sums of a half LSB, and of the least step less, where every bit of a product and of the sum counts."""
+    colors = np.repeat([[[8191]], [[6003]]], 3, axis=-1)
+    ambient = np.array([3, 100, 40]) * 64 + 5
+    wanted = (1 << 22) - np.arange(2)[:, np.newaxis]
+    # For about one in 64 specular terms there is a diffuse term with the wanted sum.
+    specular = rng.integers(0, _TERM.max_code, (2, 40 * count), endpoint=True)
+    # An odd colour's term gives all bits that are wanted below those of the ambient light.
+    diffuse = (wanted - 6003 * specular) * pow(8191, -1, 1 << 17) % (1 << 17)
+    chosen = ((5 << 17) + 8191 * diffuse + 6003 * specular) % (1 << 23) == wanted
+    terms = np.stack([diffuse[chosen], specular[chosen]])[:, :, np.newaxis]
+    return _case(unit, rng.permutation(terms, axis=1)[:, :count], ambient, colors)
+
+
+def _variants():
+    styles = {"throughput": IntensityUnit, "compact": CompactIntensityUnit}
+    for style, unit in styles.items():
+        yield f"1 light, {style}", Variant(unit, _measure, "all terms", "LSB")
+    for style, unit in styles.items():
+        for lights in (2, 3, 16):
+            is_long = (lights, style) != (3, "compact")
+            yield f"{lights} lights, {style}", Variant(partial(unit, Intensity(lights)), long=is_long)
+        p = Intensity(2, channels=1)
+        yield f"1 channel, {style}", Variant(partial(unit, p), long=style != "compact")
+        p = Intensity(2, has_specular=False)
+        yield f"no highlights, {style}", Variant(partial(unit, p), long=style != "throughput")
+
+
+RECORD = Record(
+    name="intensity",
+    title="Ambient, diffuse and specular light of a pixel in three channels",
+    source="docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5",
+    variants=dict(_variants()),
+    expect=_expect,
+    stimuli={
+        "terms": Stimulus(_terms, 400),
+        "bright": Stimulus(_bright, 400, repeats=12),
+        "sizes": Stimulus(_sizes, 5000, stalled=False, repeats=40),
+        "halves": Stimulus(_halves, 1000, variants=("1 light, throughput", "1 light, compact")),
+    },
+    axis="exact sum, LSB",
+    waivers={
+        "diffuse_0_r_?": (
+            "Where the controlling bit is set, the product is 256 or more, and the channel saturates."
+        ),
+        "specular_0_b_?": (
+            "Where the controlling bit is set, the product is 1024 or more, and the channel saturates."
+        ),
+    },
+    still={"three terms of 8 times the full channel are 6120, less than 2^13": "rounded_{r,g,b}[13]"},
+)

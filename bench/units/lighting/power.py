@@ -1,0 +1,72 @@
+"""Record of the exact power unit."""
+
+from dataclasses import replace
+from functools import partial
+
+from blysk.bench.units.lighting.specular import (
+    HIGHLIGHTS,
+    expect,
+    exponent_bits,
+    highlights,
+    measure_highlights,
+)
+from blysk.bench.units.record import Record, Stimulus, Variant
+from blysk.golden.lighting.power import Power
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.lighting.power import PowerUnit
+
+__all__ = ["RECORD"]
+
+
+def _last_bits(unit, rng, count):
+    """Many operands: the last bits of products are rounded off, each decides once in thousands."""
+    return exponent_bits(unit, rng, count)
+
+
+def _ties(unit, rng, count):
+    """Of many operands those whose complement is a few of its last bits from the next step of the result."""
+    p = unit.model
+    case = highlights(unit, rng, count, int(rng.integers(1, 1001)))
+    operand = Fixed(p.operand_format, case.beats["operand"])
+    codes = p.complement(operand, case.beats["dark"], case.constants["exponent"]).codes
+    # Not those in the middle of a highlight, or out of it.
+    kept = ((codes + 4) % (1 << 17) < 8) & (codes > 8) & (codes < p.COMPLEMENT_FORMAT.max_code - 8)
+    return replace(case, beats={name: beats[kept] for name, beats in case.beats.items()})
+
+
+def _variants():
+    measure = partial(measure_highlights, model=Power())
+    for form in ("pipelined", "sequential"):
+        unit = partial(PowerUnit, form=form)
+        yield form, Variant(unit, measure, HIGHLIGHTS, long=form == "sequential")
+    for form in ("pipelined", "sequential"):
+        unit = partial(PowerUnit, Power("one_minus_cosine"), form=form)
+        yield f"{form}, of a chord", Variant(unit, long=form == "pipelined")
+
+
+_VARIANTS = dict(_variants())
+
+RECORD = Record(
+    name="power",
+    title="Exact power of N·H by square and multiply",
+    source="docs/theory/units.md#exact-power; [B] 3",
+    variants=_VARIANTS,
+    expect=expect,
+    stimuli={
+        "highlights": Stimulus(highlights, 500),
+        "exponents": Stimulus(exponent_bits, 200, stalled=False, repeats=20, variants=tuple(_VARIANTS)),
+        "last bits": Stimulus(_last_bits, 100_000, stalled=False, repeats=4, variants=("pipelined",)),
+        "ties": Stimulus(_ties, 1_000_000, stalled=False, repeats=4, variants=("pipelined",)),
+    },
+    axis="n (1 - cos γ)",
+    logarithmic=True,
+    waivers=dict.fromkeys(
+        ("s_*", "x_?_sum", "x_?_difference"),
+        "The lowest of 17 bits that are cut off in the end: it carries past them once in 2^17 terms.",
+    )
+    | {"x_9": "It is for the saturation, and p + q - pq never does."},
+    still={
+        "the second bit of a square is 0": "x_{0-8}_product[1]",
+        "twice a number is even": "x_{0-8}_sum[0]",
+    },
+)

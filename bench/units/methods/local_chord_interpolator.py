@@ -1,0 +1,220 @@
+"""Record of the local chord interpolator."""
+
+from functools import partial
+
+import numpy as np
+from amaranth.lib.wiring import Component
+
+from blysk.bench.units.cosines.chord_setup import (
+    FORMATS,
+    LOCAL,
+    any_values,
+    factors_of,
+    local_curves,
+    parabola,
+    three_values,
+    value_beats,
+    values_of,
+)
+from blysk.bench.units.cosines.chord_setup import RECORD as SETUP
+from blysk.bench.units.lighting.specular import any_exponent
+from blysk.bench.units.lighting.value_gate import parabolas_near
+from blysk.bench.units.methods.interpolator import long_lengths, of_setup, operand_beats, options
+from blysk.bench.units.operands import any_codes, short_lengths, span_lengths
+from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.golden.cosines.chord_setup import SpanValues
+from blysk.golden.lighting.value_gate import ValueGate
+from blysk.golden.methods.interpolator import Operands
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.spans import pixels_of
+from blysk.golden.number.unit_vector import ONE_SQUARED
+from blysk.hdl.lighting.value_gate import ValueGateUnit
+from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
+
+__all__ = ["RECORD", "gated", "mixed_lengths"]
+
+EXPONENT = 60
+"""Exponent of a run that needs only one."""
+
+_STILL = {
+    "twice a number is even": "{diffuse,highlight}_0_second_difference[0]",
+    "spans come while under 28 are counted inside, under 12 long ones, and three more before they count": (
+        "spans_inside[5] lengths.inner_level[5] long_inside[4] behind[4]"
+    ),
+}
+"""Register bits that cannot toggle."""
+
+_METHOD = LocalChordInterpolator()
+
+
+def _measure(rng, count):
+    """N·L and 1 - N·H along spans; 1 is the product of two unit vectors."""
+    length = span_lengths(rng, count)
+    curves = local_curves(rng, len(length))
+    values, codes = three_values(curves, len(length))
+    operands = _METHOD.compute_values(codes, length)
+    span, pixel = pixels_of(length)
+    t = pixel / np.maximum(length - 1, 1)[span]
+    found = np.stack([operands.cosine.values[:, 0], operands.highlight.values[:, 0]]) / ONE_SQUARED.values
+    kept = ~operands.out_of_range[span]
+    exact, formula = curves(span, t), parabola(values[:, span], t)
+    # Between its three values a parabola may be less than 0, the least value of the word.
+    formula[1] = np.maximum(formula[1], 0)
+    return Sample(found[:, kept], exact[:, kept], formula[:, kept], pixel[kept])
+
+
+def gated(lights: int, exponent: int | None = None, *, takes_threshold: bool = False) -> ValueGateUnit:
+    """Gate of an interpolator.
+
+    Parameters
+    ----------
+    lights : int
+        Number of lights.
+    exponent, takes_threshold
+        As for `ValueGateUnit`.
+    """
+    return ValueGateUnit(ValueGate(), lights, exponent=exponent, takes_threshold=takes_threshold)
+
+
+def _gated_beats(
+    unit: Component,
+    operands: Operands,
+    values: SpanValues,
+    length: np.ndarray,
+    exponent: int,
+    threshold: int | None = None,
+) -> np.ndarray:
+    """Output beats of a unit with these operands, and the decisions of its gate, if it has one.
+
+    The gate decides a pixel of a span of one or two pixels by its own u, the pixels of a longer span
+    together. It uses the threshold's code, if there is one, in place of the exponent.
+    """
+    if unit.gate is None:
+        return operand_beats(unit, operands)
+    span, pixel = pixels_of(length)
+    u = values.highlight[span].astype(np.int64)
+    own = np.where(pixel[:, np.newaxis] == 0, u[..., 0], u[..., 2])
+    u = np.where((length[span] < 3)[:, np.newaxis, np.newaxis], own[..., np.newaxis], u)
+    gate = unit.gate.model
+    if threshold is None:
+        lit = gate.compute(u, unit.gate.exponent or exponent)
+    else:
+        lit = gate.compute_by(u, Fixed(gate.THRESHOLD_FORMAT, np.int64(threshold)))
+    return operand_beats(unit, operands, gated=~lit)
+
+
+def _expect(unit, case):
+    values, length = values_of(case.beats), case.beats["length"]
+    operands = unit.model.compute_values(values, length, factors_of(case.beats))
+    constant = {"threshold" if unit.takes_threshold else "exponent": case.constants}
+    return _gated_beats(unit, operands, values, length, **{"exponent": 1} | constant)
+
+
+def _status(unit, case):
+    values, length = values_of(case.beats), case.beats["length"]
+    operands = unit.model.compute_values(values, length, factors_of(case.beats))
+    return {"out_of_range": int(np.count_nonzero(operands.out_of_range))}
+
+
+def _case(unit, rng, length, values=None, exponent=EXPONENT):
+    length = np.maximum(length % (1 << unit.length_bits), 1)
+    values = values or any_values(rng, len(length), unit.lights)
+    constants = exponent if "constants" in unit.signature.members else None
+    if unit.takes_threshold:
+        constants = int(unit.gate.model.thresholds.codes[exponent])
+    return Case(value_beats(unit, values, length), constants)
+
+
+def mixed_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Lengths of 1 to 4 pixels in runs and mixed, and every tenth up to 40."""
+    length = rng.integers(1, 5, count)
+    runs = rng.integers(1, 5, count // 12 + 1).repeat(12)[:count]
+    length[: count // 2] = runs[: count // 2]
+    length[::10] = rng.integers(1, 41, len(length[::10]))
+    return length
+
+
+def _spans(unit, rng, count):
+    """Curves of every size, every eighth span of arbitrary codes; most spans are short."""
+    return _case(unit, rng, short_lengths(rng, count, 1))
+
+
+def _short_spans(unit, rng, count):
+    """Spans of 1 to 4 pixels in runs and mixed; u fits in every second span, and is arbitrary in others."""
+    values = any_values(rng, count, unit.lights)
+    values.highlight[::2] = any_codes(rng, FORMATS["highlight"], *values.highlight[::2].shape)
+    return _case(unit, rng, mixed_lengths(rng, count), values)
+
+
+def _gate(unit, rng, count):
+    """The least u about the threshold of the gate, spans of 1 to 40 pixels; any exponent."""
+    exponent = unit.gate.exponent or any_exponent(rng)
+    nearest = min(unit.gate.model.thresholds.values[exponent] / 2, 2.0)
+    least = nearest + 1e-3 * rng.normal(size=count * unit.lights)
+    u = parabolas_near(rng, least).reshape(count, unit.lights, 3)
+    diffuse = any_values(rng, count, unit.lights).diffuse
+    return _case(unit, rng, mixed_lengths(rng, count), SpanValues(diffuse, u), exponent)
+
+
+def _long_spans(unit, rng, count):
+    """Spans of 3000 to 4095 pixels, where the last bits of the differences count; shorter ones."""
+    return _case(unit, rng, long_lengths(rng, count))
+
+
+def _last_bits(unit, rng, count):
+    """Many short spans: a bit that is rounded off decides a result once in thousands."""
+    return _case(unit, rng, rng.integers(1, 8, count))
+
+
+class _Gated:
+    """Makes the unit with a gate; a gate belongs to one unit."""
+
+    def __init__(self, lights, exponent=None, **build):
+        self.arguments = lights, exponent, build
+
+    def __call__(self):
+        lights, exponent, build = self.arguments
+        gate = gated(lights, exponent, takes_threshold=build.get("takes_threshold", False))
+        return LocalChordInterpolatorUnit(_METHOD, lights, gate=gate, **build)
+
+
+_GATED = {
+    "gated": Variant(_Gated(1)),
+    "2 lights, gated, exponent 60": Variant(_Gated(2, 60, setup_interval=6)),
+    "gated, threshold": Variant(_Gated(1, takes_threshold=True)),
+}
+
+
+RECORD = Record(
+    name="local_chord_interpolator",
+    title="N·L and half the squared chord from N to H, from three values of each",
+    source="docs/theory/chord.md#local-lights",
+    variants={
+        "chord-local": Variant(
+            partial(LocalChordInterpolatorUnit, _METHOD, 1),
+            _measure,
+            f"{LOCAL}, 1 to 4095 pixels",
+            beat={"length": 64},
+            note="of N.L and 1 - N.H; exact: normalised interpolation, L and H of the pixel",
+        ),
+        "2 lights, interval 1": options(_METHOD, 2, setup_interval=1),
+        "3 lights, interval 6": options(_METHOD, 3, setup_interval=6),
+        "no highlights": options(_METHOD, 2, setup_interval=2, highlights=False, length_bits=5),
+        "2 lights, the second fades": options(_METHOD, 2, setup_interval=3, factors=(1,)),
+        **_GATED,
+    },
+    expect=_expect,
+    status=_status,
+    stimuli={
+        "spans": Stimulus(_spans, 2000),
+        "short spans": Stimulus(_short_spans, 800),
+        "gate": Stimulus(_gate, 500, repeats=4, variants=tuple(_GATED)),
+        "long spans": Stimulus(_long_spans, 60_000, stalled=False),
+        "last bits": Stimulus(_last_bits, 8000, stalled=False),
+        "corners": of_setup(SETUP),
+    },
+    axis="pixel of the span",
+    logarithmic=True,
+    still=_STILL,
+)

@@ -1,0 +1,66 @@
+"""Record of the recurrence interpolator."""
+
+import numpy as np
+
+from blysk.bench.units.cosines.recurrence_setup import RECORD as SETUP
+from blysk.bench.units.methods.interpolator import (
+    STIMULI,
+    case_of,
+    expect,
+    measured,
+    of_setup,
+    options,
+    status,
+)
+from blysk.bench.units.operands import code_pairs_at, unit_codes, word_ends
+from blysk.bench.units.record import Record, Stimulus
+from blysk.golden.methods.recurrence_interpolator import PUBLISHED, RecurrenceInterpolator
+
+__all__ = ["RECORD"]
+
+_RECURRENCE = RecurrenceInterpolator()
+
+
+def _words(unit, rng, count):
+    """Vectors L and H that are no unit vectors: results saturate, and no span after them changes."""
+    ends = word_ends(rng, 2, count, 3)
+    ends[:, ::2] = unit_codes(rng, 2 * len(ends[0, ::2])).reshape(2, -1, 3)
+    case = case_of(unit, rng, *ends, rng.integers(1, 20, count))
+    case.constants["direction"], case.constants["halfway"] = (
+        word_ends(rng, unit.lights, 3) for _ in range(2)
+    )
+    return case
+
+
+def _radian(unit, rng, count):
+    """Spans of a radian: half its square is 1/2 but for rounding, which brings some words to 1."""
+    return case_of(unit, rng, *code_pairs_at(rng, count, np.degrees(1)), rng.integers(1, 20, count))
+
+
+RECORD = Record(
+    name="recurrence_interpolator",
+    title="Cosines of equal steps on the great circle, one product each",
+    source="docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5",
+    variants={
+        "recurrence": measured(_RECURRENCE),
+        "recurrence, interval 1": options(_RECURRENCE, 2, setup_interval=1),
+        "recurrence, interval 46, no highlights": options(_RECURRENCE, setup_interval=46, highlights=False),
+        **{method.name: options(method, as_published=True) for method in PUBLISHED},
+    },
+    expect=expect,
+    status=status,
+    stimuli=STIMULI
+    | {
+        "corners": of_setup(SETUP),
+        "words": Stimulus(_words, 200, repeats=2),
+        "radian": Stimulus(_radian, 300, stalled=False),
+    },
+    waivers=SETUP.waivers
+    | {
+        "phase_entry": "While the output is stalled, all but the value in the register has been read.",
+        "recurrence_0.*": "It tells the last pixel of a span, which nothing reads.",
+    },
+    still={
+        "a cosine has ten bits less than x": "top.{spare,payload}[0-9] top.{spare,payload}[368-377]",
+    },
+)

@@ -1,0 +1,33 @@
+"""Names of the units that have a record, without the records: to import these takes a second.
+
+A unit has the name of its record's file. A file without a record holds parts that records share.
+"""
+
+import pkgutil
+import re
+from importlib import import_module
+from pathlib import Path
+
+__all__ = ["ROOMS", "UNITS"]
+
+ROOMS = ("geometry", "normals", "cosines", "methods", "lighting", "video", "bus", "")
+"""Rooms in the order in which data pass them; the last is for records outside a room."""
+
+_RECORD = re.compile(r"^RECORD = ", re.MULTILINE)
+
+
+def _found() -> dict[str, str]:
+    units = {}
+    for room in ROOMS:
+        package = import_module(".".join(part for part in ("blysk.bench.units", room) if part))
+        (folder,) = package.__path__
+        for module in pkgutil.iter_modules(package.__path__):
+            path = Path(folder, f"{module.name}.py")
+            if not module.ispkg and _RECORD.search(path.read_text(encoding="utf-8")):
+                units[module.name] = f"{package.__name__}.{module.name}"
+    return units
+
+
+UNITS: dict[str, str] = _found()
+"""The file of each record by the unit's name, as it is imported: in the order of the rooms, within a room by
+name."""

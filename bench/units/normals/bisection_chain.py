@@ -1,0 +1,160 @@
+"""Record of the chain of bisections."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.normals.bisection import factor_of
+from blysk.bench.units.operands import (
+    AXIS,
+    any_pairs,
+    code_pairs_at,
+    component_words,
+    degrees_between,
+    dot,
+    pairs_chosen,
+    span_ends,
+    word_ends,
+)
+from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.golden.normals.bisection import Bisection
+from blysk.golden.normals.bisection_chain import BisectionChain
+from blysk.golden.normals.dot_product import DotProduct
+from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED
+from blysk.hdl.normals.bisection_chain import BisectionChainUnit
+
+__all__ = ["RECORD"]
+
+_LEVELS = (1 << BisectionChain.LEVEL_BITS) - 1
+_LENGTH = ONE * COMPONENT.step
+"""Length of a unit vector as a fixed-point number."""
+
+
+def _weights(chain, cosine, level, limit):
+    """Weights ``l`` and ``m`` by the polynomials in float64; where u exceeds the limit, of the first step."""
+    model, u = chain.bisection, 1 - cosine
+    weight_l, weight_m = np.zeros(len(u)), np.ones(len(u))
+    for k in range(1, _LEVELS + 1):
+        e = factor_of(model, 1 - u, (u * _LENGTH**2 > limit) & (model.max_angle == 90))
+        weight_l = np.where(k <= level, (weight_l + 1) * (0.5 + e), weight_l)
+        weight_m = np.where(k <= level, weight_m * (0.5 + e), weight_m)
+        u = u / 2 - (2 - u) * e
+    return weight_l, weight_m
+
+
+def _measure(rng, count, chain):
+    model = chain.bisection
+    left, right = span_ends(rng, count, model.max_angle)
+    level = rng.integers(1, _LEVELS + 1, count)
+    found, _ = chain.compute(*component_words(left, right), level)
+    a, b = left / ONE, right / ONE
+
+    def vectors(of_left, of_right):
+        return _LENGTH * (of_left[:, np.newaxis] * a + of_right[:, np.newaxis] * b)
+
+    # The great circle by weights of its own, as the two vectors of codes are not of the same length.
+    psi = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), dot(a, b))
+    part = psi * 2.0**-level
+    apart = psi > 0
+    sine = np.where(apart, np.sin(psi), 1)
+    exact = vectors(
+        np.where(apart, np.sin(psi - part) / sine, 1 - 2.0**-level),
+        np.where(apart, np.sin(part) / sine, 2.0**-level),
+    )
+    # At the limit between the polynomials rounding decides: the one that the unit took counts.
+    limits = model.widest_narrow.values + np.array([-8, 8]) * model.ANGLE_FORMAT.step
+    early, late = (
+        np.clip(vectors(*_weights(chain, dot(a, b), level, limit)), -1, _LENGTH) for limit in limits
+    )
+    of_early, of_late = (np.abs(found.values - formula).max(axis=1) for formula in (early, late))
+    formula = np.where((of_early < of_late)[:, np.newaxis], early, late)
+    return Sample(found.values, exact, formula, degrees_between(left, right))
+
+
+def _expect(unit, case):
+    words = component_words(case.beats["normal_left"], case.beats["normal_right"])
+    normal, out_of_range = unit.model.compute(*words, case.beats["level"])
+    return {"normal": normal.codes, "out_of_range": out_of_range}
+
+
+def _case(ends, level):
+    left, right = ends
+    return Case({"normal_left": left, "normal_right": right, "level": level})
+
+
+def _spans(unit, rng, count):
+    """Pairs of normals at angles of every size, and of arbitrary codes; most chains are short."""
+    # A level takes 17 cycles.
+    return _case(any_pairs(rng, count), 1 + (rng.zipf(2, count) - 1) % _LEVELS)
+
+
+def _corners(unit, rng, count):
+    """Angles 0, 45, 90 and 180, small ones, to 100 degrees; ends of words; every level as often."""
+    angles = np.r_[0, 45, 90, 180, 10.0 ** rng.uniform(-4, 0, count // 4), rng.uniform(0, 100, count)]
+    ends = (
+        np.vstack([end, word_ends(rng, count // 4, 3)]) for end in code_pairs_at(rng, len(angles), angles)
+    )
+    left, right = ends
+    order = rng.permutation(len(left))
+    return _case((left[order], right[order]), rng.integers(1, _LEVELS + 1, len(left)))
+
+
+def _last_bits(unit, rng, count):
+    """Spans of one level at the borders of roundings, where a single step of a product decides."""
+
+    def at_border(u):
+        # At the borders of both roundings of u, to 20 and to 17 fraction bits.
+        return (abs((u - (7 << 13) + 20) % (1 << 17) - 20) < 20) & (u < ONE_SQUARED.codes)
+
+    first = pairs_chosen(*code_pairs_at(rng, 2000, 90), at_border)
+    # The result of level 1 is the sum of the ends times f: components at the border of their rounding.
+    ends = code_pairs_at(rng, count, rng.uniform(0, 90, count))
+    model = unit.model.bisection
+    u = (ONE_SQUARED - DotProduct().compute(*component_words(*ends))).round_half_up(20)
+    e, _ = model.factor(u.round_half_up(17).wrap(Bisection.ANGLE_FORMAT))
+    f = (e.codes + (1 << 18) + 2) >> 2
+    border = abs(f[:, np.newaxis] * (ends[0] + ends[1]) % (1 << 17) - (1 << 16)) < 20
+    left, right = (np.vstack([a, end[border.any(axis=1)]]) for a, end in zip(first, ends, strict=True))
+    return _case((left, right), np.ones(len(left), dtype=np.int64))
+
+
+def _variants():
+    for name, model in (("", Bisection()), ("as published", Bisection(as_published=True))):
+        chain = BisectionChain(model)
+        yield (
+            name,
+            Variant(
+                partial(BisectionChainUnit, chain),
+                partial(_measure, chain=chain),
+                "spans to 90 degrees, levels 1 to 15",
+                beat={"normal_left": AXIS, "normal_right": AXIS, "level": 1},
+                note="times of level 1",
+                as_published=model.as_published,
+            ),
+        )
+    yield "1, 45", Variant(partial(BisectionChainUnit, BisectionChain(Bisection(1, 45))))
+
+
+RECORD = Record(
+    name="bisection_chain",
+    title="Normal at a power of two of a span, by repeated bisection",
+    source="docs/theory/interpolation.md#bisection; [T] 2.1",
+    variants=dict(_variants()),
+    expect=_expect,
+    stimuli={
+        "spans": Stimulus(_spans, 300),
+        "corners": Stimulus(_corners, 400),
+        "many spans": Stimulus(_corners, 2000, stalled=False),
+        "last bits": Stimulus(_last_bits, 50_000, stalled=False),
+    },
+    waivers={
+        "weight_l": (
+            "From 0 on, l becomes l/2 + 1 at most, so that it is not negative, less than 2, and never "
+            "saturates."
+        ),
+        "factor": "Operands are read on the cycle after they come; m, a product of factors, is not negative.",
+    },
+    still={
+        "weights are not negative": "top.weight_{l,m}[21]",
+    },
+)

@@ -1,0 +1,101 @@
+"""Record of the line setup."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.operands import LONG, any_codes, any_lengths, log_lengths, pixel_of, sphere
+from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.golden.normals.line_setup import LineSetup, quantise_line
+from blysk.golden.number.fixed import Fixed
+from blysk.hdl.normals.line_setup import LineSetupUnit
+
+__all__ = ["RECORD", "any_lines"]
+
+_FORMAT = LineSetup.VECTOR_FORMAT
+
+
+def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Codes of the ends of lines: lengths to 1:100, any angle; every eighth of arbitrary codes."""
+    ends = [sphere(rng, count) * 10.0 ** -rng.uniform(0, 2, (count, 1)) for _ in range(2)]
+    left, right = quantise_line(*ends)
+    left[::8], right[::8] = any_codes(rng, _FORMAT, 2, *left[::8].shape)
+    return left, right
+
+
+def _measure(rng, count):
+    """Component of a point of the line at any pixel."""
+    left, right = quantise_line(*(sphere(rng, count) * rng.uniform(0.1, 1, (count, 1)) for _ in range(2)))
+    length = log_lengths(rng, count, 2)
+    pixel = pixel_of(rng, length)[:, np.newaxis]
+    step = LineSetup().compute(Fixed(_FORMAT, left), Fixed(_FORMAT, right), length)
+    exact = (left + (right - left) * (pixel / (length - 1)[:, np.newaxis])) * _FORMAT.step
+    found = left * _FORMAT.step + pixel * step.values
+    return Sample(found, exact, exact, pixel)
+
+
+def _expect(unit, case):
+    beats = case.beats
+    left, right = (Fixed(_FORMAT, beats[f"normal_{side}"]) for side in ("left", "right"))
+    step = unit.model.compute(left, right, beats["length"])
+    return {"start": left.codes, "step": step.codes, "length": beats["length"]}
+
+
+def _lengths(unit, rng, count):
+    return np.maximum(any_lengths(rng, count) % (1 << unit.length_bits), 1)
+
+
+def _lines(unit, rng, count):
+    """Ends in any proportion, at any angle, every eighth of arbitrary codes; lengths by their logarithm."""
+    left, right = any_lines(rng, count)
+    return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
+
+
+def _corners(unit, rng, count):
+    """Ends of the words, and differences next to a border of their lower word."""
+    left, right = any_lines(rng, count)
+    words = np.array([_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code])
+    left[: count // 2] = rng.choice(words, (count // 2, 3))
+    right[: count // 4] = rng.choice(words, (count // 4, 3))
+    near = slice(count // 2, count)
+    right[near] = np.clip(
+        left[near] + (rng.integers(-64, 65, left[near].shape) << 7) + rng.integers(-1, 2, left[near].shape),
+        _FORMAT.min_code,
+        _FORMAT.max_code,
+    )
+    return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
+
+
+RECORD = Record(
+    name="line_setup",
+    title="Step from pixel to pixel of a straight line between two vectors",
+    source="docs/theory/interpolation.md#renormaliser",
+    variants={
+        "interval 4": Variant(LineSetupUnit, _measure, f"lengths of 0.1 to 1 at any angle, {LONG}"),
+        **{
+            f"interval {interval}": Variant(partial(LineSetupUnit, initiation_interval=interval), long=True)
+            for interval in (1, 2, 3, 5, 9)
+        },
+        "9 bits of length": Variant(partial(LineSetupUnit, length_bits=9), long=True),
+    },
+    expect=_expect,
+    stimuli={
+        "lines": Stimulus(_lines, 500),
+        "corners": Stimulus(_corners, 500),
+        "last bits": Stimulus(_lines, 20_000, stalled=False),
+    },
+    axis="pixel of the span",
+    logarithmic=True,
+    still={
+        "a reciprocal is normalised, so that its first bit is 1": (
+            "reciprocals_word[23] reciprocals.port__data[23]"
+        ),
+        "a length of 12 bits takes shifts up to 12": "shift[4]",
+        "a reciprocal's upper word, of 17 bits, is not negative": "multiplier_{0,2}_{1,b}[17]",
+        "a lower word, of P or of the reciprocal, has 7 bits": (
+            "multiplier_1_{1,b}[7-17] multiplier_2_{0,a}[7-17]"
+        ),
+        "a product of 7 by 17 bits has 24": "multiplier_2_product[24-35]",
+        "twice P r has three fraction bits less than what is shifted": "shifter_0_0[0-2]",
+    },
+)

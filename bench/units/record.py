@@ -1,0 +1,471 @@
+"""What a record of a unit holds, and the runs that tests and tools make of it.
+
+A record stands in the file of the unit's name in `blysk.bench.units`. Tables, pages, tests of the RTL,
+mutants, toggle coverage, other simulators and baselines iterate over `registry.RECORDS`; no other list of
+units exists. To add a unit: its model in `golden`, its component in `hdl`, its record, and a test of what is
+special about it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, wraps
+from typing import Any
+from weakref import ref
+
+import numpy as np
+from amaranth.lib.wiring import Component
+
+__all__ = [
+    "OFFERED",
+    "PAUSED",
+    "STALLS",
+    "TAKEN",
+    "Beats",
+    "Case",
+    "Decisions",
+    "Record",
+    "Sample",
+    "Stimulus",
+    "UnitRun",
+    "Variant",
+    "first",
+    "length_of",
+    "once",
+    "together",
+]
+
+Beats = np.ndarray | Mapping[str, Any]
+"""Beats of a stream: a structured array, or (nested) mappings of field names to arrays of codes."""
+
+PAUSE, PAUSED = 61, 40
+"""Cycles from a beat to the next, and number of beats, in the run with pauses that ends each stimulus."""
+
+STALLS = ((0.0, 0.0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9))
+"""Shares of the cycles on which the input and the output are stalled, a pair for each run."""
+
+OFFERED, TAKEN = 2.0, 0.6
+"""Rates at which beats are offered and taken in the run whose stalls end, over those without stalls.
+
+The sink holds up a unit at its full rate, and not at half of that: a unit that falls into half its rate stays
+there.
+"""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Results of a unit, and what they should have been.
+
+    Parameters
+    ----------
+    found : array
+        Values of the bit-accurate model.
+    exact : array, same shape
+        The exact function of the same operands in float64.
+    formula : array, same shape, optional
+        The unit's approximate formula in float64; ``None`` where its tables cannot be separated from its
+        arithmetic.
+    at : array, broadcast to the same shape, optional
+        The operand that an error is drawn against, named by the variant's ``axis``.
+    """
+
+    found: np.ndarray
+    exact: np.ndarray
+    formula: np.ndarray | None = None
+    at: np.ndarray | None = None
+
+    @property
+    def errors(self) -> tuple[float | None, float | None, float]:
+        """Largest model, arithmetic and total error."""
+        total = self._size(self.found, self.exact)
+        if self.formula is None:
+            return None, None, total
+        return self._size(self.formula, self.exact), self._size(self.found, self.formula), total
+
+    @staticmethod
+    def _size(a, b) -> float:
+        return float(np.abs(np.subtract(a, b)).max())
+
+    @property
+    def extremes(self) -> "Sample":
+        """The three results or fewer that `errors` come from."""
+        pairs = [(self.found, self.exact)]
+        if self.formula is not None:
+            pairs += [(self.formula, self.exact), (self.found, self.formula)]
+        worst = [int(np.abs(np.subtract(a, b)).argmax()) for a, b in pairs]
+        parts = (self.found, self.exact, self.formula)
+        return Sample(*(None if part is None else np.ravel(part)[worst] for part in parts))
+
+    @classmethod
+    def joined(cls, samples: "Iterator[Sample]") -> "Sample":
+        """Several samples as one; each may have a shape of its own."""
+        samples = [
+            s if s.at is None else replace(s, at=np.broadcast_to(s.at, np.shape(s.found))) for s in samples
+        ]
+        parts = [
+            None
+            if any(getattr(s, name) is None for s in samples)
+            else np.concatenate([np.ravel(getattr(s, name)) for s in samples])
+            for name in ("found", "exact", "formula", "at")
+        ]
+        return type(samples[0])(*parts)
+
+
+class Decisions(Sample):
+    """Decisions, 1 for yes and 0 for no, and what they should have been. Errors are their share of all.
+
+    The formula is yes where ``found`` or ``exact`` is: a model error is a yes that was not needed, an
+    arithmetic error a wrong no.
+    """
+
+    @classmethod
+    def of(cls, found: np.ndarray, exact: np.ndarray, at: np.ndarray | None = None) -> "Decisions":
+        """Decisions and what they should have been, as booleans."""
+        found, exact = (np.asarray(decision, dtype=np.int8) for decision in (found, exact))
+        return cls(found, exact, np.maximum(found, exact), at)
+
+    @staticmethod
+    def _size(a, b):
+        return float(np.abs(np.subtract(a, b)).mean())
+
+    @property
+    def extremes(self) -> "Decisions":
+        """All of them."""
+        return replace(self, at=None)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A structure of a unit: how it is made, and how its errors are measured.
+
+    Parameters
+    ----------
+    unit : callable
+        Makes the component; its ``model`` are the bit-accurate model.
+    measure : callable, optional
+        Takes a random generator and a number of samples, gives a `Sample`. For units of whole spans a sample
+        is a pixel. ``None``: the variant is in no table of errors.
+    domain : str
+        Operands over which errors are measured.
+    scale : str
+        Unit of the errors: nothing (1 is a full term or the length of a vector), ``rad``, ``turn``, ``LSB``
+        or ``rate``, a share of the decisions.
+    exhaustive : bool
+        Every operand of the domain is measured, whatever the number of samples.
+    beat : dict
+        Fields of the input beats of the simulation that finds the times, where the unit does not state
+        them; others are 0.
+    note : str
+        Further remark.
+    source : str
+        Document and figure, if they differ from the record's.
+    as_published : bool
+        With the constants or in the form that a document prints.
+    long : bool
+        Its RTL is simulated in the long run only.
+    """
+
+    unit: Callable[[], Component]
+    measure: Callable[[np.random.Generator, int], Sample] | None = None
+    domain: str = ""
+    scale: str = ""
+    exhaustive: bool = False
+    beat: dict[str, Any] = field(default_factory=dict)
+    note: str = ""
+    source: str = ""
+    as_published: bool = False
+    long: bool = False
+
+
+@dataclass(frozen=True)
+class Case:
+    """Input of a unit for one run.
+
+    Parameters
+    ----------
+    beats : Beats
+        Input beats.
+    constants : Beats, optional
+        Driven for the whole run, where the unit has a port ``constants``.
+    write : Beats, optional
+        Beats of the stream ``write``.
+    write_after : array, shape (writes,), optional
+        Number of input beats before each write, never decreasing; ``None``: all come before the first.
+    """
+
+    beats: Beats
+    constants: Beats | None = None
+    write: Beats | None = None
+    write_after: np.ndarray | None = None
+
+    @property
+    def sent(self) -> dict[str, Any]:
+        """Arguments of `simulate` for what is sent beside the beats."""
+        return {name: getattr(self, name) for name in ("constants", "write", "write_after")}
+
+    def first(self, count: int) -> "Case":
+        """The first input beats, and the writes up to the last of them."""
+        few = replace(self, beats=first(self.beats, count))
+        if self.write_after is None:
+            return few
+        writes = int(np.count_nonzero(self.write_after < count))
+        return replace(few, write=first(self.write, writes), write_after=self.write_after[:writes])
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """A kind of input for a unit. Its docstring in the record says what it covers.
+
+    Parameters
+    ----------
+    make : callable
+        Takes the component, a random generator and a number of beats or pixels, gives a `Case`. Its
+        docstring is one sentence: what is covered.
+    count : int
+        Beats or pixels of a test.
+    stalled : bool
+        Whether it is also sent under the patterns of `STALLS`; else without stalls alone.
+    pace : callable, optional
+        Takes the component, gives the cycles from an output beat to the next without stalls, as the unit's
+        documentation has them for this input. ``None`` where the data decide: then no documented rate is
+        asserted but that of a `PipelinedUnit`, and after stalls the rate of the same beats from reset.
+    long : bool
+        Whether it belongs to the long run.
+    repeats : int
+        How often it is made, each time by another seed.
+    variants : tuple of str
+        Names of the variants for which it is made; empty for all.
+    """
+
+    make: Callable[[Component, np.random.Generator, int], Case]
+    count: int = 1000
+    stalled: bool = True
+    pace: Callable[[Component], float] | None = None
+    long: bool = False
+    repeats: int = 1
+    variants: tuple[str, ...] = ()
+
+    @property
+    def covers(self) -> str:
+        """One sentence: what is covered."""
+        make = getattr(self.make, "func", self.make)
+        return (make.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
+
+
+@dataclass(frozen=True)
+class UnitRun:
+    """A run of a unit: its input, what is to come of it, and the stalls.
+
+    Parameters
+    ----------
+    case : Case
+        Input.
+    expected : Beats
+        Output beats of the bit-accurate model.
+    status : dict or None
+        Expected members of the status after the run, see `Record.status`.
+    stalls : dict
+        Arguments ``input_stalls`` and ``output_stalls`` of `simulate`; empty for none.
+    settles : bool
+        Whether a test that knows the times without stalls ends the stalls half-way, by `settled`.
+    """
+
+    case: Case
+    expected: Beats
+    status: Mapping[str, int] | None
+    stalls: dict[str, np.ndarray]
+    settles: bool = False
+
+    @property
+    def count(self) -> int:
+        """Number of output beats."""
+        return length_of(self.expected)
+
+    def settled(self, cycles: np.ndarray, input_cycles: np.ndarray) -> tuple["UnitRun", int]:
+        """The run with stalls of the unit's own rate on both sides for half of the beats, then without any.
+
+        Parameters
+        ----------
+        cycles, input_cycles : arrays
+            Clocks of the output and of the input beats in the run without stalls.
+
+        Returns
+        -------
+        run : UnitRun
+            The run, see `OFFERED` and `TAKEN`.
+        end : int
+            Clock from which on nothing is stalled.
+        """
+        rng, start = np.random.default_rng([2026, len(cycles)]), int(input_cycles[0])
+        span = int(max(cycles.max(initial=0), input_cycles[-1])) + 1 - start
+        end = start + round(span / 2 / TAKEN)
+        # Until no run that keeps its rate is still under way.
+        free = np.zeros(end + 2 * span + 1000, dtype=bool)
+        offered = min(OFFERED * len(input_cycles) / span, 0.9)
+        taken = TAKEN * min(len(cycles) / span, 1)
+        stalls = {
+            name: np.concatenate([rng.random(end) >= share, free])
+            for name, share in (("input_stalls", offered), ("output_stalls", taken))
+        }
+        return replace(self, stalls=stalls), end
+
+
+@dataclass(frozen=True)
+class Record:
+    """Facts of a unit that tools and tests need.
+
+    Parameters
+    ----------
+    name : str
+        Name of its files in `golden` and `hdl`.
+    title : str
+        What the unit computes, in some words.
+    source : str
+        Document and figure.
+    variants : dict
+        Structures by name; the first is the default, which mutants and toggle coverage take.
+    expect : callable
+        Takes the component and a `Case`; gives the output beats by the bit-accurate model.
+    stimuli : dict
+        Stimuli by name; the first serves for any number of beats, in other simulators too.
+    status : callable, optional
+        Takes the component and a `Case`; gives expected members of the port ``status`` after a run, by name.
+        For a component without that port: the number of cycles on which each of the ports ``out_of_range``
+        and ``wide`` is high.
+    axis : str
+        Quantity that errors are drawn against; empty for no drawing.
+    logarithmic : bool
+        That axis is logarithmic.
+    waivers : dict
+        Signals of the default variant; by name why a fault there may survive, or which test finds it.
+    still : dict
+        Register bits of the default variant that cannot toggle: signals with their bits by reason.
+    remembers : bool
+        It has a memory of earlier beats, which a reset does not clear.
+    """
+
+    name: str
+    title: str
+    source: str
+    variants: Mapping[str, Variant]
+    expect: Callable[[Component, Case], Beats]
+    stimuli: Mapping[str, Stimulus]
+    status: Callable[[Component, Case], Mapping[str, int]] | None = None
+    axis: str = "angle of the span, degrees"
+    logarithmic: bool = False
+    waivers: Mapping[str, str] = field(default_factory=dict)
+    still: Mapping[str, str] = field(default_factory=dict)
+    remembers: bool = False
+
+    @property
+    def default(self) -> str:
+        """Name of the default variant."""
+        return next(iter(self.variants))
+
+    @cached_property
+    def kind(self) -> type[Component]:
+        """Class of the component."""
+        unit = self.variants[self.default].unit
+        return getattr(unit, "func", unit)
+
+    def source_of(self, variant: str) -> str:
+        """Document and figure of a variant."""
+        return self.variants[variant].source or self.source
+
+    def stimuli_of(self, variant: str) -> dict[str, Stimulus]:
+        """Stimuli that are made for a variant."""
+        return {
+            name: stimulus
+            for name, stimulus in self.stimuli.items()
+            if not stimulus.variants or variant in stimulus.variants
+        }
+
+    def example(self, variant: str, unit: Component, results: int = 3) -> UnitRun:
+        """Run of the first few beats of a variant's first stimulus, which shows the unit's times.
+
+        Parameters
+        ----------
+        variant : str
+            Its name.
+        unit : Component
+            Component of that variant.
+        results : int
+            Output beats at least, if `PAUSED` input beats give as many.
+        """
+        make = next(iter(self.stimuli_of(variant).values())).make
+        case = make(unit, np.random.default_rng(2026), 200)
+        for count in (results, 2 * results, 4 * results, 8 * results, PAUSED):
+            few = case.first(count)
+            expected = self.expect(unit, few)
+            if length_of(expected) >= results:
+                break
+        return UnitRun(few, expected, None, {})
+
+    def runs(self, unit: Component, stimulus: str, seed: int = 2026) -> Iterator[UnitRun]:
+        """The runs of a stimulus, always the same ones: without stalls, with them, and with pauses.
+
+        The second one is to settle, see `UnitRun`.
+
+        Parameters
+        ----------
+        unit : Component
+            Component of one of the variants.
+        stimulus : str
+            Its name.
+        seed : int
+            Of the random generator.
+        """
+        given = self.stimuli[stimulus]
+        for repeat in range(given.repeats):
+            rng = np.random.default_rng([seed, *stimulus.encode(), repeat])
+            case = given.make(unit, rng, given.count)
+            expected, status = self.expect(unit, case), self._status(unit, case)
+            for shares in STALLS if given.stalled else STALLS[:1]:
+                names = ("input_stalls", "output_stalls")
+                periods = (997, 1009)
+                stalls = {
+                    name: rng.random(period) < share
+                    for name, period, share in zip(names, periods, shares, strict=True)
+                    if share
+                }
+                yield UnitRun(case, expected, status, stalls, shares == STALLS[1])
+            if given.stalled:
+                few = case.first(PAUSED)
+                pauses = np.arange(PAUSE * PAUSED) % PAUSE != 0
+                stalls = {"input_stalls": pauses}
+                yield UnitRun(few, self.expect(unit, few), self._status(unit, few), stalls)
+
+    def _status(self, unit: Component, case: Case) -> Mapping[str, int] | None:
+        return None if self.status is None else self.status(unit, case)
+
+
+def first(beats: Beats, count: int) -> Beats:
+    """The first beats of a (nested) mapping of arrays."""
+    if isinstance(beats, Mapping):
+        return {name: first(value, count) for name, value in beats.items()}
+    return beats[:count]
+
+
+def length_of(beats: Beats) -> int:
+    """Number of beats."""
+    return length_of(next(iter(beats.values()))) if isinstance(beats, Mapping) else len(beats)
+
+
+def together(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Beats of several mappings with the same fields, in a row."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def once(compute: Callable[[Component, Case], Any]) -> Callable[[Component, Case], Any]:
+    """A function of a unit and a case that keeps its last result, as long as the case is there.
+
+    What comes of a case and its status are often asked for one after the other, and made by the same model.
+    """
+    kept: dict[str, Any] = {}
+
+    @wraps(compute)
+    def computed(unit: Component, case: Case) -> Any:
+        if not kept or kept["case"]() is not case or kept["unit"]() is not unit:
+            kept.update(result=compute(unit, case), case=ref(case), unit=ref(unit))
+        return kept["result"]
+
+    return computed

@@ -1,0 +1,97 @@
+"""Record of the vertex unit."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.operands import unit_codes
+from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.golden.video.motion import rotation
+from blysk.golden.video.vertex_unit import ENTRY, OFFSET, Matrix, VertexTransform
+from blysk.hdl.video.vertex_unit import VertexUnit
+
+__all__ = ["RECORD", "any_matrix"]
+
+
+def any_matrix(rng: np.random.Generator, distance: float = 1.4, size: float = 0.4) -> Matrix:
+    """Matrix of any rotation before a camera; distance and size of the object are in near-plane distances."""
+    turn = rotation(rng.normal(size=3), rng.uniform(0, 6.3))
+    rows = size * np.array([[1.7], [1.7], [1.0]]) * turn
+    position, normal = (Fixed.round(ENTRY, values).codes for values in (rows, turn))
+    offset = [rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), distance]
+    return Matrix(position, Fixed.round(OFFSET, offset).codes, normal)
+
+
+def _matrix(constants) -> Matrix:
+    return Matrix(**{name: np.asarray(codes) for name, codes in constants.items()})
+
+
+def _expect(unit, case):
+    made = unit.model.compute(case.beats["position"], case.beats["normal"], _matrix(case.constants))
+    return {"index": case.beats["index"], "vertex": made.beats}
+
+
+def _case(rng, count, matrix, index_bits):
+    position = rng.integers(-ONE, ONE + 1, (count, 3))
+    ends = rng.random(count) < 0.1
+    position[ends] = rng.choice([-ONE, 0, ONE], (ends.sum(), 3))
+    beats = {"index": rng.integers(0, 1 << index_bits, count), "position": position}
+    return Case(beats | {"normal": unit_codes(rng, count)}, matrix.codes)
+
+
+def _inside(unit, rng, count):
+    """An object before the camera."""
+    return _case(rng, count, any_matrix(rng), len(unit.i.payload.index))
+
+
+def _around(unit, rng, count):
+    """An object that is mostly nearer than, farther than or beside the visible space."""
+    matrix = any_matrix(rng, distance=rng.choice([0.5, 1.5, 15.5]), size=1.1)
+    return _case(rng, count, matrix, len(unit.i.payload.index))
+
+
+def _any(unit, rng, count):
+    """Any codes of matrices."""
+    most = ENTRY.max_code
+    position, normal = rng.integers(-most - 1, most + 1, (2, 3, 3))
+    offset = rng.integers(OFFSET.min_code, OFFSET.max_code + 1, 3)
+    return _case(rng, count, Matrix(position, offset, normal), len(unit.i.payload.index))
+
+
+def _measure(rng, count):
+    """Columns in steps of the grid, of vertices inside."""
+    unit, matrix = VertexTransform(), any_matrix(rng)
+    position = rng.integers(-ONE, ONE + 1, (count, 3))
+    found = unit.compute(position, unit_codes(rng, count), matrix)
+    space = Fixed(COMPONENT, position).values @ Fixed(ENTRY, matrix.position).values.T
+    space = space + Fixed(OFFSET, matrix.offset).values
+    exact = space[:, 0] / space[:, 2] * 2.0 ** (unit.scale_bits + unit.grid.subpixel_bits)
+    kept = ~found.outside
+    return Sample(found.x[kept], exact[kept], None, space[kept, 2])
+
+
+RECORD = Record(
+    name="vertex_unit",
+    title="Vertices times a matrix, divided by W, on the screen",
+    source="docs/theory/video.md#vertices",
+    variants={
+        "one multiplier": Variant(
+            VertexUnit, _measure, "vertices inside", note="of the column, in 1/256 pixel"
+        ),
+        "two multipliers": Variant(partial(VertexUnit, None, 10, 15), long=True),
+    },
+    expect=_expect,
+    stimuli={
+        "inside": Stimulus(_inside, 2000),
+        "around": Stimulus(_around, 1000, repeats=3),
+        "any": Stimulus(_any, 1000, repeats=3),
+    },
+    axis="W, near planes",
+    still={
+        "a number from 1 on begins with 1, and its reciprocal over 1/2 does": (
+            "mantissa[25] {table_0_row,reciprocal_row,port__data}[27]"
+        )
+    },
+)

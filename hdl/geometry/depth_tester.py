@@ -1,0 +1,271 @@
+"""Depth test: the depth of every pixel of spans, and which of them are in front of what came before."""
+
+from itertools import pairwise
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.geometry.depth_tester import DepthTester
+from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
+from blysk.golden.geometry.triangles import DEPTH
+from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.geometry.triangles import count_events, counters_shape
+from blysk.hdl.pixel_assembler import pixel_shape
+
+__all__ = [
+    "DepthMemory",
+    "DepthTesterUnit",
+    "deep_pixel_shape",
+    "drawn_pixel_shape",
+    "is_inside",
+    "picture_shape",
+]
+
+
+def deep_pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
+    """Shape of a pixel with its span's depth and step, which are read with the span's first pixel."""
+    depth = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
+    return data.StructLayout({"pixel": pixel_shape(x_bits, y_bits)} | depth)
+
+
+def drawn_pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
+    """Shape of a pixel that is to be written: place, colour and depth."""
+    members = dict(pixel_shape(x_bits, y_bits).members)
+    del members["last"]
+    return data.StructLayout(members | {"depth": unsigned(DEPTH.width)})
+
+
+def picture_shape(x_bits: int, y_bits: int) -> data.StructLayout:
+    """Shape of what is told of a picture: its size, and a number that changes from one to the next."""
+    return data.StructLayout({"number": 1, "width": x_bits + 1, "height": y_bits + 1})
+
+
+def is_inside(place: data.View, size: tuple[int, int]) -> Value:
+    """Whether a place is in a picture; a side that all codes of a coordinate are in needs no comparison."""
+    sides = [
+        place[name] < side for name, side in zip("xy", size, strict=True) if side >> len(place[name]) == 0
+    ]
+    return Cat(sides).all() if sides else Const(1)
+
+
+class DepthMemory(wiring.Signature):
+    """Port to a memory of depths, one word a pixel; a word that is read is there on the next cycle.
+
+    A read and a write of the same place on the same cycle give the read the old word. ``read_data`` keeps its
+    value while ``read_enable`` is low. Before each picture every word is `DepthTester.CLEARED`:
+    `DepthTesterUnit` writes that where it clears, and else the owner of the memory.
+
+    Parameters
+    ----------
+    x_bits, y_bits : int
+        Bits of a column and of a scanline.
+    """
+
+    def __init__(self, x_bits: int = 12, y_bits: int = 12):
+        place = data.StructLayout({"x": unsigned(x_bits), "y": unsigned(y_bits)})
+        super().__init__(
+            {
+                "read_place": Out(place),
+                "read_enable": Out(1),
+                "read_data": In(DEPTH.width),
+                "write_place": Out(place),
+                "write_enable": Out(1),
+                "write_data": Out(DEPTH.width),
+            }
+        )
+
+
+class DepthTesterUnit(wiring.Component):
+    """Drops pixels behind what was drawn before: `DepthTester` is the bit-accurate model.
+
+    The initiation interval is 1, the latency, `latency`, of a pixel that is drawn 3 cycles, or 4 with a
+    memory outside, whose words go through a register first. A pixel is also compared with those of the last
+    two or three cycles at the same place, which the memory does not have yet. No multipliers.
+
+    A unit that clears writes `DepthTester.CLEARED` to each place of the picture, one a cycle, when the first
+    pixel comes after a reset, and after each change of ``picture.number``; pixels wait. A unit that does not
+    is right for one picture: clear the memory outside between pictures.
+
+    Parameters
+    ----------
+    x_bits, y_bits : int
+        Bits of a column and of a scanline.
+    size : (int, int) or None
+        Width and height of a memory inside the unit, at most 2^x_bits and 2^y_bits, which is clear at
+        power-up; ``None``: the memory is outside, at the port ``memory``. A pixel outside a memory inside the
+        unit changes no depth; it is compared with the last ones at its place alone.
+    clears : bool
+        Whether the unit clears the memory.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(deep_pixel_shape(x_bits, y_bits)))`
+        Pixels.
+    o : :py:`Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits)))`
+        Pixels that are drawn.
+    status : :py:`Out(counters_shape("pixels", "hidden"))`
+        Number of pixels, and number of those that were dropped, since the reset.
+    memory : :py:`Out(DepthMemory(x_bits, y_bits))`
+        Depths so far; only if ``size`` is ``None``.
+    picture : :py:`In(picture_shape(x_bits, y_bits))`
+        Size of the picture, constant while pixels come, and a number that changes before the first pixel of
+        each next picture; only if the unit clears.
+
+    Attributes
+    ----------
+    idle : Signal
+        No pixel is inside.
+
+    Source: docs/theory/geometry.md#depth; not in the documents.
+    """
+
+    def __init__(
+        self, x_bits: int = 12, y_bits: int = 12, size: tuple[int, int] | None = None, clears: bool = False
+    ):
+        self.x_bits, self.y_bits, self.size, self.clears = x_bits, y_bits, size, clears
+        self.latency = 3 if size else 4
+        members = {
+            "i": In(stream.Signature(deep_pixel_shape(x_bits, y_bits))),
+            "o": Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits))),
+            "status": Out(counters_shape("pixels", "hidden")),
+        }
+        port = DepthMemory(x_bits, y_bits)
+        if size is None:
+            members["memory"] = Out(port)
+        if clears:
+            members["picture"] = In(picture_shape(x_bits, y_bits))
+        super().__init__(members)
+        self._port = port.create(path=("port",)) if size else self.memory
+        self.idle = Signal(name="idle")
+
+    def elaborate(self, platform):
+        """Depth of the pixel; the memory's word; their comparison; the write."""
+        m = Module()
+        port, incoming = self._port, self.i.payload
+        if self.size:
+            self._remember(m)
+        advance, accept = Signal(name="advance"), Signal(name="accept")
+        last = self.latency - 1
+        stages = [Signal(self.o.payload.shape(), name=f"pixel_{k}") for k in range(self.latency)]
+        valid = [Signal(name=f"valid_{k}") for k in range(self.latency)]
+        m.d.comb += [
+            advance.eq(skid_buffer(m, self.o, valid[last], stages[last])),
+            self.i.ready.eq(advance & ~(held := Signal(name="held"))),
+            accept.eq(self.i.valid & self.i.ready),
+        ]
+        missed = Signal(name="missed")
+        m.d.comb += self.idle.eq(~(Cat(valid).any() | self.o.valid | missed))
+
+        # The sum has a sign, and more bits than a depth or a step has.
+        first, total = Signal(name="first", init=1), Signal(37, name="total")
+        step = Signal(FixedShape(DEPTH_STEP), name="step")
+        begin = Value.cast(incoming.depth)
+        going = (total.as_signed() + Value.cast(step))[:37]
+        with m.If(accept):
+            m.d.sync += [first.eq(incoming.pixel.last), total.eq(Mux(first, begin, going))]
+            with m.If(first):
+                m.d.sync += step.eq(incoming.depth_step)
+
+        code = total.as_signed() >> SPAN_DEPTH.fraction_bits
+        depth = Mux(code < 0, 0, Mux(code > DepthTester.FARTHEST, DepthTester.FARTHEST, code))
+        nearer, drawn = Signal(name="nearer"), Signal(name="drawn")
+        # Written after the read, or on the clock of the read.
+        late = [(valid[last], stages[last])] + [
+            (Signal(name=f"before_valid_{k}"), Signal.like(stages[last], name=f"before_{k}"))
+            for k in range(last - 1)
+        ]
+        judged, there = stages[last - 1], port.read_data
+        if not self.size:
+            there = Signal.like(port.read_data, name="there")
+            with m.If(advance):
+                m.d.sync += there.eq(port.read_data)
+        # Compared before it is known which depth counts: the memory's word comes late.
+        m.d.comb += [nearer.eq(judged.depth < there), drawn.eq(valid[last - 1] & nearer)]
+        # Whether places are the same is known a cycle before.
+        nexts = [judged, *(pixel for _, pixel in late[:-1])]
+        same = [Signal(name=f"same_{k}") for k in range(last)]
+        for (written, pixel), flag in reversed(list(zip(late, same, strict=True))):
+            with m.If(written & flag):
+                m.d.comb += nearer.eq(judged.depth < pixel.depth)
+        with m.If(advance):
+            m.d.sync += [
+                valid[0].eq(accept),
+                *(stages[0][name].eq(incoming.pixel[name]) for name in "xyrgb"),
+                *(to.eq(pixel) for pixel, to in pairwise(stages)),
+                *(to.eq(passes) for passes, to in pairwise(valid)),
+                stages[1].depth.eq(depth),
+                valid[last].eq(drawn),
+                *(
+                    flag.eq(_place(pixel) == _place(stages[last - 2]))
+                    for flag, pixel in zip(same, nexts, strict=True)
+                ),
+                *(
+                    to.eq(word)
+                    for earlier, later in pairwise(late)
+                    for word, to in zip(earlier, later, strict=True)
+                ),
+            ]
+        m.d.comb += [
+            port.read_enable.eq(advance),
+            port.write_enable.eq(advance & valid[last]),
+            port.write_data.eq(stages[last].depth),
+            *(port.read_place[name].eq(stages[0][name]) for name in "xy"),
+            *(port.write_place[name].eq(stages[last][name]) for name in "xy"),
+        ]
+        if self.clears:
+            # Nor is a pixel left with which those of the next picture would be compared.
+            empty = ~Cat(valid, *(written for written, _ in late)).any()
+            m.d.comb += held.eq(self._clear(m, empty))
+        m.d.sync += missed.eq(advance & valid[last - 1] & ~drawn)
+        count_events(m, self.status, pixels=advance & valid[last - 1], hidden=missed)
+        return m
+
+    def _clear(self, m: Module, empty: Value) -> Value:
+        """Write to every place of a picture before its first pixel; whether pixels are held back."""
+        picture, port = self.picture, self._port
+        before, stale, sweeps = Signal(name="number"), Signal(name="stale", init=1), Signal(name="sweeps")
+        place = Signal(port.write_place.shape(), name="place")
+        turns = picture.number != before
+        # A picture that is larger than the coordinates would have no last place.
+        ends = {
+            name: place[name].all() | (place[name] + 1 >= picture[size])
+            for name, size in (("x", "width"), ("y", "height"))
+        }
+        m.d.sync += [before.eq(picture.number), stale.eq(stale | turns)]
+        with m.If(sweeps):
+            m.d.comb += [
+                port.write_enable.eq(1),
+                port.write_place.eq(place),
+                port.write_data.eq(DepthTester.CLEARED),
+            ]
+            m.d.sync += place.x.eq(Mux(ends["x"], 0, place.x + 1))
+            with m.If(ends["x"]):
+                m.d.sync += [place.y.eq(Mux(ends["y"], 0, place.y + 1)), sweeps.eq(~ends["y"])]
+        with m.Elif(stale & self.i.valid & empty):
+            m.d.sync += [sweeps.eq(1), stale.eq(turns)]
+        return stale | turns | sweeps
+
+    def _remember(self, m: Module) -> None:
+        """A memory of the picture's size at the port; it holds inverted depths."""
+        # Inverted, so that a cleared memory holds zeros.
+        port, (width, height) = self._port, self.size
+        m.submodules.depths = memory = Memory(shape=DEPTH.width, depth=width * height, init=[])
+        read, write = memory.read_port(), memory.write_port()
+        outside = Signal(name="read_outside")
+        with m.If(port.read_enable):
+            m.d.sync += outside.eq(~is_inside(port.read_place, self.size))
+        m.d.comb += [
+            read.addr.eq(port.read_place.y * width + port.read_place.x),
+            read.en.eq(port.read_enable),
+            port.read_data.eq(Mux(outside, DepthTester.CLEARED, ~read.data)),
+            write.addr.eq(port.write_place.y * width + port.write_place.x),
+            write.en.eq(port.write_enable & is_inside(port.write_place, self.size)),
+            write.data.eq(~port.write_data),
+        ]
+
+
+def _place(pixel) -> Value:
+    return Cat(pixel.x, pixel.y)
