@@ -88,7 +88,7 @@ def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
             yield count
         except KeyboardInterrupt:
             bar.close()
-            click.echo(f"blysk: stopped; {kept} of {total} {unit} are kept, run again to go on", err=True)
+            click.echo(f"blysk: stopped; {kept} of {total} {unit} are kept, run again to continue", err=True)
             raise click.exceptions.Exit(130) from None
 
 

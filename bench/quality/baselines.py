@@ -225,7 +225,7 @@ def _command(words: Sequence[str], update: bool, jobs: int) -> int:
         ):
             new = dict(zip(chosen, results_of(tasks, executor, bar.update), strict=True))
     except KeyboardInterrupt:
-        print("blysk.bench.quality.baselines: interrupted; run it again to go on", file=sys.stderr)
+        print("blysk.bench.quality.baselines: interrupted; run it again to continue", file=sys.stderr)
         return 130
     moved, far = differences(old, new), differences(old, new, TOLERANCE)
     for line in moved:

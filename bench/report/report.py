@@ -124,7 +124,7 @@ def check_folder(folder: Path) -> None:
     names = files_within(folder, PAGE)
     others = [name for name in names if name not in (PAGE, _JSON) and not name.endswith((".csv", ".svg"))]
     if others or (names and not _earlier(folder)):
-        reason = f"holds {(others or names)[0]}, which is of no report"
+        reason = f"holds {(others or names)[0]}, which is not part of a report"
         raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier report")
 
 

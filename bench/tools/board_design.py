@@ -100,7 +100,7 @@ def gpu_of(
 def _design(settings: Settings, scene: Scene, board: Board) -> ShadingPipeline:
     """The shading pipeline of the settings, for the lights and materials of a scene."""
     if scene.local:
-        reason = "a board has lights and a viewer at infinity alone"
+        reason = "a board has only lights and a viewer at infinity"
         raise settings.refuse("lights", reason, "give directions of lights, and a distant viewer", "")
     if len(scene.lights) > MAX_LIGHTS:
         raise settings.refuse("lights", f"{len(scene.lights)} lights", f"give at most {MAX_LIGHTS}", "")

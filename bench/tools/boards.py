@@ -104,8 +104,8 @@ BOARDS = {
             lines=16,
             loader="ulx3s",
             compact=False,
-            known="not tried with quotient so far. Commit c815b08 gave one with an earlier method, at the "
-            "first placement, on a third of the device",
+            known="not tried with quotient so far. On commit c815b08 one was made with an earlier method, at "
+            "the first placement, on a third of the device",
         ),
         Board(
             *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
@@ -118,8 +118,8 @@ BOARDS = {
             lines=8,
             loader="icepi-zero",
             compact=True,
-            known="not tried with quotient so far. Commit c815b08 gave one with an earlier method. The same "
-            "device on an ulx3s-25f gave none on commit 142fa70",
+            known="not tried with quotient so far. On commit c815b08 one was made with an earlier method. "
+            "The same device on an ulx3s-25f gave none on commit 142fa70",
         ),
     )
 }

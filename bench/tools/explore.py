@@ -303,7 +303,7 @@ def explore(
     listed = best[:limit]
     print(_table([designs[index] for index in listed], on_front[listed]))
     if any(designs[index].candidate.design.takes_values for index in listed):
-        print("chord-local is given values of each light with a span; to work them out is not in its cost")
+        print("chord-local gets values of each light with each span; their computation is not in its cost")
     for number, index in enumerate(listed, 1):
         print(f"{number:>3}  {designs[index].candidate.command}")
 

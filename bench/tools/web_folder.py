@@ -76,7 +76,7 @@ def check_folder(folder: Path) -> None:
     ours = {MARK, *(mark["files"] if mark else ())}
     others = [name for name in names if name not in ours]
     if others:
-        reason = f"holds {others[0]}, which is of no site"
+        reason = f"holds {others[0]}, which is not part of a site"
         raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier site")
 
 

@@ -110,7 +110,7 @@ class Drawing:
             )
         wanted = self.controls.materials * self.controls.lights
         if {len(self.commands.starts), len(self.presets), len(self.frames)} != {wanted}:
-            raise ValueError(f"the controls choose from {wanted} lists, there are {len(self.presets)}")
+            raise ValueError(f"the controls choose from {wanted} lists, but there are {len(self.presets)}")
         self.commands.check("transform", index=self.motion.slots, range=self.mesh.vertices)
         self.commands.check("draw", index=design.materials, range=self.mesh.triangles)
 

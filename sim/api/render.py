@@ -36,7 +36,7 @@ __all__ = [
     "render",
 ]
 
-SPECIALISING = "finding out what the scene needs"
+SPECIALISING = "finding what the scene needs"
 """Stage of `prepare_rendering` in which a specialisation is found."""
 BUILDING = "building the model"
 """Stage of `prepare_rendering` in which the hardware is compiled; the cause of a long time is appended."""

@@ -161,7 +161,7 @@ def _parse(path: Path) -> dict[str, Any]:
     # A syntax error, or a whole number of more than 4300 digits.
     except ValueError as error:
         text = str(error).split("\n")[0]
-        raise PartError("", f"is not TOML ({text})", "mend it there; text stands in quotes") from error
+        raise PartError("", f"is not TOML ({text})", "correct it there; put text in quotes") from error
 
 
 def _read_table(

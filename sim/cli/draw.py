@@ -23,7 +23,7 @@ from blysk.sim.output import all_or_none, atomic_writer, write_json
 __all__ = ["draw_frame", "draw_turntable"]
 
 _SPECIALISE = (
-    f"{'specialise':<12}builds the full pipeline and the smaller one and counts what each part takes: "
+    f"{'specialise':<12}builds the full and the smaller pipeline, and counts the parts of each: "
     "about half a minute the first time"
 )
 

@@ -75,7 +75,7 @@ def provide_caches() -> None:
     Yosys (as WebAssembly), nextpnr, Zig and Matplotlib each have a cache below the user's cache or home
     folder, and some end with an error where that cannot be written. The private folder is set in environment
     variables, once in a process: in ``XDG_CACHE_HOME``, and in a tool's own variable only where it is not
-    set. A warning says that models and tools are compiled anew. If only the home folder cannot be written,
+    set. A warning says that models and tools are compiled again. If only the home folder cannot be written,
     Matplotlib alone gets the private folder, without a warning.
 
     Raises
@@ -101,8 +101,8 @@ def provide_caches() -> None:
         os.environ["XDG_CACHE_HOME"] = str(private)
         os.environ.setdefault("YOWASP_CACHE_DIR", str(private / "YoWASP"))
         os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(private / "zig"))
-        text = f"cache folder {folder} cannot be written ({reason}): models and tools are compiled anew"
-        remedy = "set XDG_CACHE_HOME to a folder that can be"
+        text = f"cache folder {folder} cannot be written ({reason}): models and tools are compiled again"
+        remedy = "set XDG_CACHE_HOME to a folder that can be written"
         warnings.warn(f"{text}; {remedy}", RuntimeWarning, stacklevel=3)
     if reason is not None or no_home is not None:
         os.environ.setdefault("MPLCONFIGDIR", str(private_folder() / "matplotlib"))

@@ -72,7 +72,7 @@ def local_executor(
         yield executor
         executor.shutdown()
     except BrokenProcessPool:
-        reason = "a process died, perhaps for want of memory"
+        reason = "a process died, perhaps because memory ran out"
         raise InputError(f"--jobs {jobs}", reason, "use fewer, or smaller pictures") from None
     finally:
         executor.shutdown(wait=False, cancel_futures=True)

@@ -59,12 +59,12 @@ def gltf_document(data: bytes, suffix: str, found: Found) -> dict:
     """The JSON part of a GLB or glTF file, of version 2."""
     if suffix == ".glb":
         if len(data) < 20 or data[:4] != b"glTF":
-            raise Refused("it is no GLB file")
+            raise Refused("it is not a GLB file")
         version, length, json_length = struct.unpack_from("<3I", data, 4)
         if version != 2:
             raise _of_version(f"{version}.0")
         if len(data) < (said := max(length, 20 + json_length)):
-            raise Refused(f"it is cut short: the header says {said} bytes, there are {len(data)}")
+            raise Refused(f"it is cut short: the header says {said} bytes, but there are {len(data)}")
         found.tell("byte after its end", "bytes after its end", len(data) - said)
         data = data[20 : 20 + json_length]
     try:
@@ -84,7 +84,7 @@ def gltf_document(data: bytes, suffix: str, found: Found) -> dict:
 
 
 def _of_version(version: str) -> Refused:
-    return Refused(f"it is glTF of version {version}, and version 2.0 is read", "convert it to glTF 2.0")
+    return Refused(f"it has glTF version {version}, and only version 2.0 is read", "convert it to glTF 2.0")
 
 
 def check_gltf(document: dict) -> None:
@@ -124,16 +124,16 @@ def _check_nodes(document: dict) -> None:
     below = [child for row in children for child in row]
     for index in [*below, *(root for row in roots for root in row)]:
         if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(nodes):
-            raise Refused(f"it refers to node {shown(str(index))} (from 0), there are {len(nodes)}")
+            raise Refused(f"it refers to node {shown(str(index))} (from 0), but there are {len(nodes)}")
     if len(set(below)) < len(below):
-        raise Refused("one of its nodes hangs on two others", "export it with one parent a node")
+        raise Refused("one of its nodes has two parents", "export it with one parent for each node")
     reached = list(set(range(len(nodes))).difference(below))
     for index in reached:
         reached += children[index]
     if len(reached) < len(nodes):
-        raise Refused("its nodes hang on each other in a circle")
+        raise Refused("its nodes form a circle")
     if any(len(set(row)) < len(row) or not set(row).isdisjoint(below) for row in roots):
-        raise Refused("one of its nodes is twice in a scene", "export it with the roots alone in the scene")
+        raise Refused("one of its nodes is twice in a scene", "export it with only the roots in the scene")
 
 
 def complete_scene(document: dict, found: Found) -> None:
@@ -175,7 +175,7 @@ def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
                 continue
             if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(texts):
                 raise Refused(
-                    f"a mesh refers to material {shown(str(index))} (from 0), there are {len(texts)}",
+                    f"a mesh refers to material {shown(str(index))} (from 0), but there are {len(texts)}",
                     ONE_MATERIAL,
                 )
             primitive["material"] = index
@@ -183,7 +183,7 @@ def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
         found.tell("vertex colours")
     if materials and texts:
         if not isinstance(texts, list) or not all(isinstance(text, dict) for text in texts):
-            raise Refused("its materials are no list of objects", ONE_MATERIAL)
+            raise Refused("its materials are not a list of objects", ONE_MATERIAL)
         found.names += [str(text.get("name", "")) for text in texts]
         for number, (name, text) in enumerate(zip(found.names[-len(texts) :], texts, strict=True)):
             given = shown(name)

@@ -36,16 +36,16 @@ def _listed(document: dict, name: str) -> list[dict]:
     """An array of objects of a document."""
     rows = document.get(name, [])
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise Refused(f"its {name} are no list of objects")
+        raise Refused(f"its {name} are not a list of objects")
     return rows
 
 
 def _whole(value: Any, what: str, below: float = math.inf) -> int:
     """Check a whole number: 0 or more, as Python would count a negative index from the end."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise Refused(f"it has {what} {shown(str(value))}, no whole number from 0")
+        raise Refused(f"it has {what} {shown(str(value))}, not a whole number from 0")
     if value >= below:
-        raise Refused(f"it has {what} {value} (from 0), there are {below}")
+        raise Refused(f"it has {what} {value} (from 0), but there are {below}")
     return value
 
 
@@ -103,7 +103,9 @@ def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list
         else:
             found = _beside(folder, uri)
         if len(found) < length:
-            raise Refused(f"its buffer {number} is cut short: it says {length} bytes, there are {len(found)}")
+            raise Refused(
+                f"its buffer {number} is cut short: it says {length} bytes, but there are {len(found)}"
+            )
         buffers.append(found)
     return buffers
 
@@ -207,7 +209,7 @@ class _Arrays:
             return np.arange(accessors[primitive["attributes"]["POSITION"]]["count"])
         accessor = accessors[primitive["indices"]]
         if accessor["componentType"] not in _INDEX or accessor["type"] != "SCALAR":
-            raise Refused("its indices are no unsigned whole numbers")
+            raise Refused("its indices are not unsigned whole numbers")
         return self.read(primitive["indices"])[:, 0]
 
     def vectors(self, index: int, name: str) -> np.ndarray:
@@ -303,7 +305,7 @@ def _plain_primitive(primitive: dict, arrays: _Arrays, found: Found) -> dict:
     elif mode == _STRIP:
         corners = strip_triangles(corners)
     elif len(corners) % 3:
-        raise Refused(f"a part of triangles has {len(corners)} corners, no multiple of 3")
+        raise Refused(f"a part of triangles has {len(corners)} corners, not a multiple of 3")
     plain = {"attributes": {name: arrays.add(values) for name, values in vectors.items()}}
     plain["indices"] = arrays.add(corners.ravel())
     return plain | ({"material": primitive["material"]} if "material" in primitive else {})

@@ -244,7 +244,7 @@ def _of_arrays(source: Sequence[ArrayLike], crease_angle: float) -> LoadedMesh:
         raise Refused(f"it has {len(faces)} triangles; the limit is {MAX_FACES}", "simplify it")
     if not 0 <= faces.min() <= faces.max() < len(vertices):
         wrong = faces.min() if faces.min() < 0 else faces.max()
-        raise Refused(f"a face refers to vertex {wrong} (from 0), there are {len(vertices)}")
+        raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {len(vertices)}")
     normals = arrays.get("normals", np.full(vertices.shape, np.nan))
     if normals.shape != vertices.shape:
         raise Refused(f"there are {len(normals)} normals for {len(vertices)} vertices", GIVE_ARRAYS)
@@ -363,7 +363,7 @@ def _assemble(
         part, triangles = np.array(geometry.vertices), np.array(geometry.faces)
         if not 0 <= triangles.min() <= triangles.max() < len(part):
             wrong = triangles.min() if triangles.min() < 0 else triangles.max()
-            raise Refused(f"a face refers to vertex {wrong} (from 0), there are {len(part)}")
+            raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {len(part)}")
         stored = np.full(part.shape, np.nan)
         # Only the cache tells a stored normal from a computed one; asking for the property computes it.
         has_normals = "vertex_normals" in geometry._cache

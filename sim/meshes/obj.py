@@ -242,7 +242,7 @@ def tidy_obj(data: bytes, found: Found) -> bytes:
     )
     used = map(int, set(re.findall(rb"\d/\d*/(\d+)", b"\n".join(faces))))
     if wrong := [index for index in used if not 1 <= index <= normals]:
-        raise Refused(f"a face has the normal {max(wrong)}, there are {normals}")
+        raise Refused(f"a face has the normal {max(wrong)}, but there are {normals} normals")
     return _triangular(data)
 
 

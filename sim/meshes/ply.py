@@ -74,7 +74,9 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
         rows = [line for line in body.split(b"\n") if line.strip()]
         expected = sum(element.rows for element in elements)
         if len(rows) < expected:
-            raise Refused(f"it is cut short: the header says {expected} lines of data, there are {len(rows)}")
+            raise Refused(
+                f"it is cut short: the header says {expected} lines of data, but there are {len(rows)}"
+            )
         if b"_" in body:
             raise Refused("it has a number with the character _")
     start = 0
@@ -172,7 +174,7 @@ def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
     head, body = data[: end.start()], data[end.end() :]
     lines = [line.strip() for line in plain_text(head, "replace").split("\n") if line.strip()] or [""]
     if lines[0].lower() != "ply":
-        raise Refused("it is no PLY file")
+        raise Refused("it is not a PLY file")
     for line in lines[1:]:
         words = line.split()
         # A comment of several lines: some programs forget the word before the second.

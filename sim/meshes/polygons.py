@@ -20,7 +20,7 @@ def check_corners(corners: np.ndarray, vertices: int) -> None:
     """Refuse indices, from 0, of vertices that do not exist."""
     if corners.size and not 0 <= corners.min() <= corners.max() < vertices:
         wrong = corners.min() if corners.min() < 0 else corners.max()
-        raise Refused(f"a face refers to vertex {wrong} (from 0), there are {vertices}")
+        raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {vertices}")
 
 
 def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

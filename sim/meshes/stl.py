@@ -44,14 +44,14 @@ def _text(data: bytes, found: Found) -> np.ndarray:
         rb"^[ \t]*+(end[ \t]*+)?solid\b(?:(?!\bfacet\s)[^\n])*+", without_name, text, flags=re.MULTILINE
     )
     if not solids[True] and b"facet" not in text:
-        raise Refused("it is no STL file: a text without solid and facet")
+        raise Refused("it is not an STL file: a text without solid and facet")
     ends = solids[False] or len(re.findall(rb"\bend[ \t]*+solid\b", text))
     if ends < max(solids[True], 1):
         raise Refused("it is cut short: the end of the solid is missing")
     first_words = set(re.findall(rb"^[ \t]*+([a-z_]++)", text, re.MULTILINE))
     found.tell_names("keywords", sorted(word.decode() for word in first_words), _KNOWN)
     if not {part.count(b"vertex") for part in text.split(b"facet")} <= {0, 3}:
-        raise Refused("a facet has another number of vertices than 3")
+        raise Refused("a facet does not have 3 vertices")
     numbers = re.findall(rb"\bvertex\s++(\S++)\s++(\S++)\s++(\S++)", text)
     if len(numbers) != text.count(b"vertex"):
         raise Refused("a vertex has fewer than 3 numbers")
@@ -66,13 +66,13 @@ def _text(data: bytes, found: Found) -> np.ndarray:
 
 def _binary(data: bytes, found: Found) -> np.ndarray:
     if len(data) < 84:
-        raise Refused(f"it is cut short: a binary STL has at least 84 bytes, there are {len(data)}")
+        raise Refused(f"it is cut short: a binary STL has at least 84 bytes, but there are {len(data)}")
     (count,) = struct.unpack_from("<I", data, 80)
     size = 84 + 50 * count
     if len(data) < size:
         raise Refused(
             f"its size is wrong: the header says {count} triangles, which take {size} bytes, "
-            f"there are {len(data)}"
+            f"but there are {len(data)}"
         )
     found.tell("byte after the last triangle", "bytes after the last triangle", len(data) - size)
     rows = np.frombuffer(

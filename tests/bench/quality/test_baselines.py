@@ -238,6 +238,6 @@ def test_interrupt_is_one_line(small, monkeypatch, capsys):
 
     monkeypatch.setattr(baselines, "results_of", stop)
     assert main([]) == 130
-    assert capsys.readouterr().err == "blysk.bench.quality.baselines: interrupted; run it again to go on\n"
+    assert capsys.readouterr().err == "blysk.bench.quality.baselines: interrupted; run it again to continue\n"
     assert main(["--update"]) == 130
     assert json.loads(path.read_text()) == figures

@@ -148,7 +148,9 @@ def test_an_earlier_report_is_replaced(tmp_path, points_section, plain_section):
 @pytest.mark.parametrize("name", ["notes.txt", "index.html", "report.json", "a.csv"])
 def test_a_folder_with_other_things_is_refused(tmp_path, name):
     (tmp_path / name).write_text("{}")
-    with pytest.raises(InputError, match=rf"holds {name}, which is of no report; give a new or empty folder"):
+    with pytest.raises(
+        InputError, match=rf"holds {name}, which is not part of a report; give a new or empty folder"
+    ):
         check_folder(tmp_path)
 
 
@@ -306,7 +308,7 @@ def test_interrupt_says_what_is_kept(run, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "results_of", stopped)
     result = run(tmp_path / "report")
     assert result.exit_code == 130
-    assert result.stderr == "blysk: stopped; 1 of 3 measurements are kept, run again to go on\n"
+    assert result.stderr == "blysk: stopped; 1 of 3 measurements are kept, run again to continue\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -325,7 +327,7 @@ def test_interrupt_leaves_nothing_behind(interrupted):
         "    sys.exit(command.main(['report', '--jobs', '1'], standalone_mode=False))\n"
     )
     assert status == 130
-    assert text == "blysk: stopped; 0 of 1 measurements are kept, run again to go on\n"
+    assert text == "blysk: stopped; 0 of 1 measurements are kept, run again to continue\n"
 
 
 @pytest.mark.parametrize("name", SECTIONS)

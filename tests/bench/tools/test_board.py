@@ -56,7 +56,7 @@ def pattern_on(board):
         ),
         (
             ["ulx3s-25f", "--point-light", "1,2,3", "--simulate", "1", "-o", "x"],
-            "--light: a board has lights and a viewer at infinity alone; give directions of lights, and a "
+            "--light: a board has only lights and a viewer at infinity; give directions of lights, and a "
             "distant viewer",
         ),
         (

@@ -97,7 +97,7 @@ def test_interrupt_keeps_what_is_done(monkeypatch):
     options += ("--fraction-bits", "46", "--styles", "throughput", "--operands", "one_minus_cosine")
     stopped = run(*options)
     assert stopped.exit_code == 130
-    assert stopped.output == "blysk: stopped; 4 of 6 measurements are kept, run again to go on\n"
+    assert stopped.output == "blysk: stopped; 4 of 6 measurements are kept, run again to continue\n"
     resumed = run(*options)
     assert resumed.exit_code == 0
     assert calls == ["linear", "renormalise", "angular", "angular"]
@@ -170,7 +170,7 @@ def test_no_design_under_the_error_is_one_line(monkeypatch, tmp_path):
 
 def test_what_is_given_is_told(monkeypatch):
     made_up(monkeypatch)
-    told = "chord-local is given values of each light with a span; to work them out is not in its cost\n"
+    told = "chord-local gets values of each light with each span; their computation is not in its cost\n"
     assert told in run("--methods", "chord-local").output
     assert told not in run("--methods", "angular").output
 

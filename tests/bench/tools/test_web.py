@@ -262,7 +262,7 @@ def test_folder_of_something_else(tmp_path, site):
     with pytest.raises(InputError, match="it is a file"):
         web_folder.check_folder(tmp_path / "file")
     (site / "spans" / "mine.txt").write_text("mine")
-    with pytest.raises(InputError, match=r"holds spans/mine.txt, which is of no site"):
+    with pytest.raises(InputError, match=r"holds spans/mine.txt, which is not part of a site"):
         web_folder.check_folder(site)
     with pytest.raises(InputError, match="there is no folder"):
         web_folder.check_folder(tmp_path / "no" / "site")
@@ -463,4 +463,4 @@ def test_interrupt_leaves_nothing_behind(interrupted):
         "    sys.exit(command.main(['--jobs', '1'], standalone_mode=False))\n"
     )
     assert status == 130
-    assert text == "blysk: stopped; 0 of 1 parts are kept, run again to go on\n"
+    assert text == "blysk: stopped; 0 of 1 parts are kept, run again to continue\n"

@@ -152,7 +152,7 @@ def test_what_does_not_fit_is_refused():
     drawing = Drawing.of([scene()])
     with pytest.raises(ValueError, match="a band of 160x8 has 8 and 3"):
         replace(drawing, lines=8)
-    with pytest.raises(ValueError, match="choose from 2 lists, there are 1"):
+    with pytest.raises(ValueError, match="choose from 2 lists, but there are 1"):
         replace(drawing, controls=Controls(lights=2))
     with pytest.raises(ValueError, match="last must be an end"):
         DrawCommands(np.array([[1, 0, 0, 1]]), (0,))

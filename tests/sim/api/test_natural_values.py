@@ -156,7 +156,11 @@ def test_a_mesh_with_colours_is_told(recwarn):
         (5, {}, 'a mesh of type int: cannot be drawn; give "teapot", the name of a mesh or scene'),
         (trimesh.Trimesh(), {}, "trimesh.Trimesh: it has no faces; use a mesh of triangles; "),
         ((V,), {}, 'a mesh of type tuple: cannot be drawn; give "teapot"'),
-        ((V, [[0, 1, 3]]), {}, "the arrays of a mesh: a face refers to vertex 3 (from 0), there are 3; mend"),
+        (
+            (V, [[0, 1, 3]]),
+            {},
+            "the arrays of a mesh: a face refers to vertex 3 (from 0), but there are 3; mend",
+        ),
         (
             (V, [[0, 1, 1.5]]),
             {},

@@ -12,7 +12,7 @@ from blysk.sim.cli.main import main
 from blysk.sim.errors import InputError
 
 RENDER = ["render", "teapot", "--triangles", "64", "--size", "8x6", "--engine", "pysim"]
-WARNING = "models and tools are compiled anew; set XDG_CACHE_HOME to a folder that can be"
+WARNING = "models and tools are compiled again; set XDG_CACHE_HOME to a folder that can be written"
 PLACES = ("HOME", "XDG_CACHE_HOME", "BLYSK_CACHE", "YOWASP_CACHE_DIR", "TMPDIR", "COVERAGE_PROCESS_CONFIG")
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="/proc is where nobody can write")

@@ -175,7 +175,7 @@ def test_instances(path, kind):
     ("attributes", "reason"),
     [
         ({}, "no count of instances"),
-        ({"TRANSLATION": -1}, "no whole number from 0"),
+        ({"TRANSLATION": -1}, "not a whole number from 0"),
         ({"TRANSLATION": 9}, "there are 2"),
         ({"TRANSLATION": 1}, "not 3 finite numbers"),
     ],
@@ -228,13 +228,13 @@ NEGATIVE = {
 def test_negative_numbers(path, change):
     document, buffer = plain()
     change(document)
-    check_refused(path, "no whole number from 0", content=(document, buffer))
+    check_refused(path, "not a whole number from 0", content=(document, buffer))
 
 
 @pytest.mark.parametrize("kind", ["<i1", "<i2", "<f4"])
 def test_indices_of_a_wrong_type(path, kind):
     content = document_of([PLAIN[0], (FACES.ravel().astype(kind), False)])
-    check_refused(path, "its indices are no unsigned whole numbers", content=content)
+    check_refused(path, "its indices are not unsigned whole numbers", content=content)
 
 
 def test_quantised_array_that_is_too_long_for_its_view(path):

@@ -59,17 +59,17 @@ def test_other_versions_are_named(tmp_path, version, suffix):
             document["buffers"] = [{"uri": "data:,"}]
             document["meshes"] = {"a": document["meshes"][0]}
     data = glb(document, buffer) if suffix == ".glb" else (document, buffer)
-    check_refused(tmp_path / f"a{suffix}", f"it is glTF of version {version}", content=data)
+    check_refused(tmp_path / f"a{suffix}", f"it has glTF version {version}", content=data)
 
 
 def test_versions_that_are_read(tmp_path):
     for asset in ({"version": "2.0"}, {"version": "2.1"}, {"version": "2.0", "minVersion": "2.0"}, {}):
         assert load(tmp_path / "a.glb", changed(lambda d, a=asset: d.update(asset=a))).ignored == ()
     content = changed(lambda d: d.update(asset={"version": "2.1", "minVersion": "2.1"}))
-    check_refused(tmp_path / "a.glb", "it is glTF of version 2.1", content=content)
+    check_refused(tmp_path / "a.glb", "it has glTF version 2.1", content=content)
     data = bytearray(glb(*mesh_gltf()))
     data[4] = 1
-    check_refused(tmp_path / "a.glb", "it is glTF of version 1.0", content=bytes(data))
+    check_refused(tmp_path / "a.glb", "it has glTF version 1.0", content=bytes(data))
 
 
 @pytest.mark.parametrize("scenes", [None, []])
@@ -168,7 +168,9 @@ def test_gltf_contents_that_are_not_read(tmp_path, name):
 
 def test_odd_counts_of_corners(tmp_path):
     content = mesh_gltf(faces=[0, 1, 2, 0])
-    check_refused(tmp_path / "a.glb", "a part of triangles has 4 corners, no multiple of 3", content=content)
+    check_refused(
+        tmp_path / "a.glb", "a part of triangles has 4 corners, not a multiple of 3", content=content
+    )
     document, buffer = mesh_gltf()
     empty = {**document["accessors"][1], "count": 0}
     document["accessors"].append(empty)

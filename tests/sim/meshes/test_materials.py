@@ -336,8 +336,8 @@ RANGE = "not three numbers from 0 to 1"
 @pytest.mark.parametrize(
     ("materials", "index", "reason"),
     [
-        ([base(1, 0, 0, 1)], 1, "a mesh refers to material 1 (from 0), there are 1"),
-        (None, 0, "a mesh refers to material 0 (from 0), there are 0"),
+        ([base(1, 0, 0, 1)], 1, "a mesh refers to material 1 (from 0), but there are 1"),
+        (None, 0, "a mesh refers to material 0 (from 0), but there are 0"),
         ([base(1, 0, 0, 1)], -1, "a mesh refers to material -1"),
         ([base(1, 0, 0, 1)], 10**30, "a mesh refers to material 1000000000"),
         ([base(1, 0, 0, 1)], "0", "a mesh refers to material 0"),
@@ -354,7 +354,7 @@ RANGE = "not three numbers from 0 to 1"
             for key, value in (("metallicFactor", 2), ("roughnessFactor", -0.5), ("roughnessFactor", True))
         ),
         *(
-            (value, 0, "its materials are no list of objects")
+            (value, 0, "its materials are not a list of objects")
             for value in ([7], {"0": base(1, 0, 0, 1)}, "red")
         ),
     ],

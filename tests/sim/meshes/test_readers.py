@@ -66,9 +66,9 @@ def test_objects_and_materials_weld_to_one(tmp_path):
         (CORNERS + "f 0 1 2", "vertex index 0"),
         (CORNERS + "f 1 2 3\nf 1 2", "fewer than 3 corners"),
         (CORNERS + "f 1 2 -9", "has the index -9, with 3 v before it"),
-        (CORNERS + "vn 0 1 0\nvn 0 0 1\nf 1//1 2//2 3//3", "has the normal 3, there are 2"),
-        (CORNERS + "f 1/1/1 2/1/1 3/1/1", "has the normal 1, there are 0"),
-        (CORNERS + "vn 0 1 0\nf 1//1 2//0 3//1", "has the normal 0, there are 1"),
+        (CORNERS + "vn 0 1 0\nvn 0 0 1\nf 1//1 2//2 3//3", "has the normal 3, but there are 2 normals"),
+        (CORNERS + "f 1/1/1 2/1/1 3/1/1", "has the normal 1, but there are 0 normals"),
+        (CORNERS + "vn 0 1 0\nf 1//1 2//0 3//1", "has the normal 0, but there are 1 normals"),
         (CORNERS + "f 1 2 3\nf 1 x 3", "not indices"),
         ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3", "not 3 numbers"),
     ],
@@ -156,7 +156,7 @@ def test_ply_negative_index(tmp_path):
 
 @pytest.mark.parametrize("index", [3, 2**31, 2**32 - 1])
 def test_gltf_index_out_of_range(tmp_path, index):
-    reason = f"a face refers to vertex {index} (from 0), there are 3"
+    reason = f"a face refers to vertex {index} (from 0), but there are 3"
     check_refused(tmp_path / "a.glb", reason, content=mesh_gltf(faces=[0, 1, index]))
 
 
@@ -184,14 +184,14 @@ def test_corrupt_gltf_does_not_load_its_neighbour(tmp_path):
 @pytest.mark.parametrize(
     ("children", "reason"),
     [
-        ([[0]], "in a circle"),
-        ([[1], [0]], "in a circle"),
-        ([[], [2], [1]], "in a circle"),
-        ([[1], [2], [1]], "hangs on two others"),
-        ([[1, 2], [2], []], "hangs on two others"),
-        ([[1, 1], []], "hangs on two others"),
-        ([[k + 1] for k in range(9999)] + [[0]], "in a circle"),
-        ([[1]], "refers to node 1 (from 0), there are 1"),
+        ([[0]], "form a circle"),
+        ([[1], [0]], "form a circle"),
+        ([[], [2], [1]], "form a circle"),
+        ([[1], [2], [1]], "has two parents"),
+        ([[1, 2], [2], []], "has two parents"),
+        ([[1, 1], []], "has two parents"),
+        ([[k + 1] for k in range(9999)] + [[0]], "form a circle"),
+        ([[1]], "refers to node 1 (from 0), but there are 1"),
         ([[-1]], "refers to node -1 (from 0)"),
         ([["0"]], "refers to node 0 (from 0)"),
         ([[True], []], "refers to node True (from 0)"),

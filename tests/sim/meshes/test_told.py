@@ -176,7 +176,7 @@ def test_ply_strips(tmp_path, form, rows, faces):
 
 def test_ply_strip_of_a_vertex_that_is_not_there(tmp_path):
     text = PLY.replace("element face", "element tristrips").replace("3 0 1 2", "3 0 1 3")
-    check_refused(tmp_path / "a.ply", "a face refers to vertex 3 (from 0), there are 3", content=text)
+    check_refused(tmp_path / "a.ply", "a face refers to vertex 3 (from 0), but there are 3", content=text)
 
 
 def binary_stl(tail=b"", attribute=0, head=b"", count=1):
@@ -213,7 +213,7 @@ def test_stl_contents_that_are_not_read(tmp_path, name):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        (STL.replace("vertex 0 1 0\n", ""), "a facet has another number of vertices than 3"),
+        (STL.replace("vertex 0 1 0\n", ""), "a facet does not have 3 vertices"),
         (STL.replace("0 1 0", "0,5 1 0"), "a vertex holds no number"),
         (STL.replace("0 1 0", "1_0 1 0"), "a number with the character _"),
         (STL.replace("endsolid a vertex", ""), "cut short"),
