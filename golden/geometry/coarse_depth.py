@@ -36,8 +36,8 @@ class CoarseDepth:
     with the tag of another picture counts as cleared. With each picture `swept` words are cleared, the words
     cleared longest ago first. So every word is cleared before its tag comes up again.
 
-    Spans go on to shading and to `DepthTester` in the order in which they came. So the depths under a bound are
-    stored before the depths of a later span are tested. Pictures with and without this test are equal.
+    Spans go on to shading and to `DepthTester` in the order in which they came. So the depths under a bound
+    are stored before the depths of a later span are tested. Pictures with and without this test are equal.
 
     Parameters
     ----------
