@@ -4,7 +4,7 @@
 white light and with a grey, glossy material, by the method quotient at every exponent from 1 to 1000 with the
 model blinn and at 30 of them with phong; by another method at every exponent with cosquad and at 30 with
 every other model. Each frame is computed by `ShadingPipeline.compute`, which the simulated pipeline
-equals to the bit (``python -m blysk.bench.report.pairs`` and the tests of `pipeline`), and compared with
+equals to the bit (``python -m blysk.bench.quality.pairs`` and the tests of `pipeline`), and compared with
 exact normals at every pixel and the same model. ``--json`` keeps the figures of every frame. The exit status
 is 1 if the error of a pixel is over 1 LSB, switched pixels left out (see `Point`); 2 for a mesh that
 cannot be read.

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report import pairs
-from blysk.bench.report.pairs import Pair, main, measure
+from blysk.bench.quality import pairs
+from blysk.bench.quality.pairs import Pair, main, measure
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.engines.engine import SimulationError
@@ -109,7 +109,7 @@ def test_judged(outcome, capsys, frame, text):
 
 def test_bad_mesh_is_one_line(capsys):
     assert main(["missing.obj"]) == 2
-    assert capsys.readouterr().err.startswith("blysk.bench.report.pairs: missing.obj: ")
+    assert capsys.readouterr().err.startswith("blysk.bench.quality.pairs: missing.obj: ")
 
 
 @pytest.mark.long

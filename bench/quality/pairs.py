@@ -1,6 +1,6 @@
 """Every method with every reflection model: simulated pixels against those of the bit-accurate model.
 
-``python -m blysk.bench.report.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
+``python -m blysk.bench.quality.pairs [MESH ...]`` renders each mesh (the teapot by default) at 96x72 and
 exponents 1, 30 and 1000 with each pair, also without specular light, in the compiled engine, and compares
 every output pixel, hidden ones too, with `ShadingPipeline.compute`. It prints a line for each pair. A table
 of the method quotient ends at a right angle: an exponent at which a model lives on beyond is left out, and
@@ -169,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 1 when a pixel differs or a frame is missing, 2 when a mesh cannot be read.
     """
     parser = argparse.ArgumentParser(
-        prog="blysk.bench.report.pairs", description="every method with every model"
+        prog="blysk.bench.quality.pairs", description="every method with every model"
     )
     parser.add_argument("meshes", nargs="*", default=["teapot"])
     parser.add_argument("--width", type=int, default=96)
@@ -184,7 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         meshes = [load_mesh(source, materials=False).mesh for source in options.meshes]
     except InputError as error:
-        print(f"blysk.bench.report.pairs: {error}", file=sys.stderr)
+        print(f"blysk.bench.quality.pairs: {error}", file=sys.stderr)
         return 2
     models = [None if model == "none" else model for model in options.models]
     pairs = []
