@@ -33,6 +33,7 @@ from blysk.bench.tools.parts_by_unit import parts_by_unit, sum_parts
 from blysk.bench.tools.place_and_route import Layout, lay_out, versions_of
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.bench.units.names import UNITS
+from blysk.golden.build import Build
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.bus import core_of
@@ -128,18 +129,21 @@ def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Co
         yield from ((entry.title, entry.variant.unit) for entry in found)
 
 
+_TOLD = {"style": "{}", "setup_interval": "interval {}", "pipes": "{} pipelines", "setups": "{} lanes"}
+"""Build options in the name of a design, where it is not the option's name and its value."""
+
+
 def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
-    """Name of a design in tables: core, method, model, lights, and build options that are no defaults."""
+    """Name of a design in tables: core, method, model, lights, and build options other than the defaults."""
     build = design.build
     name = [f"{'pipeline' if build.top == 'shader' else build.top} {design.method}"]
     name += [design.model or "no model"]
     name += [f"{design.lights} lights" if design.lights != 1 else "1 light"]
     name += [operand] if operand else []
-    name += [build.style] if build.style != "throughput" else []
-    name += [f"interval {build.setup_interval}"] if build.setup_interval else []
     name += ["gate"] if design.gate else []
-    name += [f"{build.pipes} pipelines"] if build.pipes > 1 else []
-    name += [f"{build.setups} lanes"] if build.setups > 1 else []
+    default = vars(Build(top=build.top))
+    changed = {option: value for option, value in vars(build).items() if value != default[option]}
+    name += [_TOLD.get(option, f"{option} {{}}").format(value) for option, value in changed.items()]
     return ", ".join(name)
 
 

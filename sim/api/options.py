@@ -399,19 +399,17 @@ BUILD: dict[str, Option] = {
         "size. Needs a core from triangles to pixels.",
     ),
 }
-"""Options of a core, of Verilog: fields of `Build`, which `design.built` sets; ``style`` and
-``setup_interval`` are in `DESIGN`."""
+"""Options of a core, of Verilog. They are fields of `Build`, which `design.built` sets."""
 
 RENDERING: dict[str, Option] = {
-    **{name: BUILD[name] for name in ("geometry", "setups")},
-    # The picture has a size: the test is for that.
+    **{name: BUILD[name] for name in ("geometry", "pipes", "setups")},
+    # For the picture's size, which is an option of the scene.
     "coarse": Option(
         Truth(),
         False,
         "With --geometry hardware: add a coarse depth test, which drops hidden spans before shading.",
         "pipeline.coarse",
     ),
-    "pipes": BUILD["pipes"],
     "specialise": Option(
         Truth(),
         False,
@@ -467,24 +465,26 @@ class DesignOptions(TypedDict, total=False):
     style: Style
 
 
-class BuildOptions(TypedDict, total=False):
-    """Options of a core, by their names in Python: those of `BUILD`."""
+class SharedOptions(TypedDict, total=False):
+    """Options that are both in `BUILD` and, of the same type, in `RENDERING`, by their names in Python."""
 
     geometry: Literal["software", "hardware"]
     pipes: Literal[1, 2, 4, 8]
+    setups: Literal[1, 2]
+
+
+class BuildOptions(SharedOptions, total=False):
+    """Options of a core, by their names in Python: those of `BUILD`."""
+
     merged: bool
     top: Literal["shader", "geometry", "render"]
     bus: Literal["native", "axi", "wishbone"]
-    setups: Literal[1, 2]
     coarse: tuple[int, int] | str
 
 
-class RenderOptions(SceneOptions, DesignOptions, total=False):
+class RenderOptions(SceneOptions, DesignOptions, SharedOptions, total=False):
     """Options of a rendering, by their names in Python."""
 
-    geometry: Literal["software", "hardware"]
-    setups: Literal[1, 2]
     coarse: bool
-    pipes: Literal[1, 2, 4, 8]
     specialise: bool
     short_words: bool

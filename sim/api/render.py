@@ -13,7 +13,7 @@ from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import built, design_of, refused_counts
-from blysk.sim.api.options import DESIGN, RENDERING, SCENE, SLOW_SIZE, Engine, RenderOptions, Source
+from blysk.sim.api.options import BUILD, DESIGN, RENDERING, SCENE, SLOW_SIZE, Engine, RenderOptions, Source
 from blysk.sim.api.rendered_frame import RenderedFrame
 from blysk.sim.api.scene import load, scenes_of
 from blysk.sim.api.settings import Settings, check_engine, rendering_settings
@@ -208,18 +208,19 @@ def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
     if hardware and settings["specialise"]:
         reason, remedy = "a specialised pipeline takes spans", "leave out specialise, or use software"
         raise settings.refuse("geometry", reason, remedy)
-    given = {name: settings[name] for name in ("geometry", "setups", "pipes")}
-    if settings["coarse"]:
+    given = {name: settings[name] for name in BUILD if name in RENDERING}
+    if given.pop("coarse"):
         given["coarse"] = (source.width, source.height) if isinstance(source, Scene) else settings["size"]
     try:
         return built(design, given)
     except OptionError as error:
-        if hardware and error.option == "pipes":
-            raise settings.refuse("geometry", error.reason, "leave out pipes, or use software") from None
-        if not hardware and error.option in ("setups", "coarse"):
-            remedy = "also give geometry hardware"
-            raise settings.refuse(error.option, error.reason, remedy, error.value) from None
-        raise
+        if error.option == "geometry" or (error.option == "pipes" and not hardware):
+            raise
+        if hardware:
+            remedy = f"leave out {error.option}, or use software"
+            raise settings.refuse("geometry", error.reason, remedy) from None
+        remedy = "also give geometry hardware"
+        raise settings.refuse(error.option, error.reason, remedy, error.value) from None
 
 
 def _check_lobes(scene: Scene, design: ShadingPipeline, settings: Settings) -> None:

@@ -1,15 +1,18 @@
 """Scene files: all options of a picture in TOML."""
 
+import json
 import os
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from textwrap import wrap
+from typing import Any, TypeVar
 
 from blysk.golden.text import plain_text
 from blysk.sim.api.lights import Lights
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE
+from blysk.sim.api.signature import in_python
 from blysk.sim.errors import InputError
 from blysk.sim.run_files import reads
 from blysk.sim.value_types import PartError, Value, shown, shown_key
@@ -43,6 +46,23 @@ class SceneFile:
     keys: dict[str, str]
 
 
+Reader = TypeVar("Reader", bound=Callable[..., SceneFile])
+
+
+def _with_rendering(function: Reader) -> Reader:
+    """Put the keys of `RENDERING` with their defaults and helps into a docstring, as comments."""
+    if function.__doc__:
+        before, _, after = function.__doc__.partition("{rendering}")
+        indent, column, lines = before.rpartition("\n")[2], 36, []
+        for name, option in RENDERING.items():
+            text = wrap(in_python(option.help), 100 - column)
+            lines.append(f"{f'# {name} = {json.dumps(option.default)}':<{column}}# {text[0]}")
+            lines += [f"{'':<{column}}# {more}" for more in text[1:]]
+        function.__doc__ = before + f"\n{indent}".join(lines) + after
+    return function
+
+
+@_with_rendering
 def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
     """Read a scene file.
 
@@ -89,14 +109,9 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
         model = "blinn"
         style = "throughput"                # "compact"
         gate = false                        # the highlight gate, of other methods
-        specialise = false                  # only what the scene needs
-        short_words = false                 # with specialise: words as short as the error bound allows
         # operand = "cosine"                # "one_minus_cosine", of methods that find unit normals
         # setup_interval = 4                # of methods with that choice
-        # geometry = "software"             # "hardware": simulate triangles to spans and the depth test, too
-        # setups = 1                        # with hardware: lanes of triangle setup, 1 or 2
-        # coarse = false                    # with hardware: drop hidden spans before shading
-        # pipes = 1                         # pipelines for different scanlines, 1, 2, 4 or 8
+        {rendering}
 
     The values' ranges are those of the command line. Its texts serve, too: ``size = "640x480"``.
     Neither the mesh file nor conflicts between values are checked.

@@ -162,7 +162,7 @@ def test_designs():
     forms = names(fpga.units_of(["quadratic_evaluator"]))
     assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
     full = {"method": "quadratic", "style": "compact", "setup_interval": 7, "gate": True}
-    whole = "pipeline quadratic, blinn, 2 lights, compact, interval 7, gate"
+    whole = "pipeline quadratic, blinn, 2 lights, gate, compact, interval 7"
     assert names(fpga.pipelines_of(full, 2, False)) == [whole]
     assert names(fpga.pipelines_of({}, 1, False)) == ["pipeline quotient, blinn, 1 light"]
     assert names(fpga.pipelines_of({"model": "exp"}, 1, False)) == ["pipeline renormalise, exp, 1 light"]

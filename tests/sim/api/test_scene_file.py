@@ -60,8 +60,6 @@ def test_documented_example(write):
         "model": "blinn",
         "style": "throughput",
         "gate": False,
-        "specialise": False,
-        "short_words": False,
     }
     assert file.keys["mesh"] == "mesh.file"
     assert file.keys["exponent"] == "material.exponent"
