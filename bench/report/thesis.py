@@ -438,8 +438,8 @@ _DOCUMENT = Document(
             "and for the recurrence the direct evaluation of the cosines, too. Price: what a root, a "
             "division or a cosine would have to cost, in multiplications or additions, for the counted "
             "operations alone to give the published ratio. Difference: between the results of both, as "
-            "components of a unit normal or cosines; a line's normals lie on another curve than the great "
-            "circle, which is part of it.",
+            "components of a unit normal or cosines. A line's normals lie on another curve than the great "
+            "circle; this is part of the difference.",
             {
                 "price of a root": "price",
                 "largest difference": "difference",
@@ -455,8 +455,8 @@ _DOCUMENT = Document(
             "Above 1 the unit of [T] takes less. Cells, before technology mapping, are operators, "
             "multiplexers, registers and memories of any width. An interpolator is whole: setup, and N·L "
             "and N·H of one light. No figure: the unit has none. The section *Units, one by one* has each "
-            "unit's own figures, those on the documents' criteria and on place and route cycles and clock "
-            "rates of whole pipelines.",
+            "unit's own figures. The sections *The documents' criteria* and *Place and route* have cycles "
+            "and clock rates of whole pipelines.",
             {"multipliers": "multipliers", "cells": "cells", "register bits": "register_bits"},
         ),
         ClaimTable(
