@@ -1,4 +1,4 @@
-"""Layout of a payload in the bytes of a bus: the one that a C compiler gives a structure."""
+"""Layout of a payload in the bytes of a bus, as a C compiler lays a structure out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,7 +26,8 @@ class Field:
     format : str
         Number format, for people.
     below : int, optional
-        Where not all codes are values: how many are, from 0 on. Low bits past the last are read as the last.
+        Number of codes that are values, from 0 on, if not all codes are. Low bits past the last value are
+        read as the last value.
 
     Raises
     ------
@@ -52,12 +53,12 @@ class Field:
 
     @property
     def count(self) -> int:
-        """How many numbers the field has."""
+        """Number of numbers in the field."""
         return prod(self.shape)
 
     @property
     def values(self) -> str:
-        """What its numbers are, for people."""
+        """Description of its numbers, for people."""
         return self.format or (f"0 to {self.below - 1}" if self.below else f"{self.width} bits")
 
     @property
@@ -70,15 +71,15 @@ class Field:
 class ByteLayout:
     """Bytes of a payload, little endian: each number in 1, 2, 4 or 8 bytes at a multiple of its size.
 
-    A number is extended to its bytes, by its sign if it has one. Fields follow in the order of the payload;
-    the size of the payload is a multiple of the largest number's size. Bytes between numbers are 0. So the
-    layout is that of a C structure of ``c_type`` members on every processor whose integers are aligned to
-    their size, and a DMA controller can send an array of such structures as it is.
+    A number is extended to its bytes, by its sign or by zeros. Fields follow in the order of the payload. The
+    size of the payload is a multiple of the largest number's size. Bytes between numbers are 0. So on every
+    processor whose integers are aligned to their size, the layout equals a C structure of ``c_type`` members.
+    A DMA controller can send an array of these structures as it stands.
 
     Parameters
     ----------
     fields : tuple of Field
-        At least one, their names different.
+        At least one field, with different names.
 
     Source: docs/theory/bus.md#streams.
     """
@@ -152,6 +153,6 @@ class ByteLayout:
         return found
 
     def _numbers(self, data: np.ndarray) -> dict[str, tuple[Field, np.ndarray]]:
-        """Each field with its numbers as on the bus, not cut to the field's width."""
+        """Each field with its numbers as on the bus, with all bits."""
         words = np.ascontiguousarray(data, dtype=np.uint8).view(self.dtype)[:, 0]
         return {field.name: (field, words[field.name].astype(np.int64)) for field in self.fields}

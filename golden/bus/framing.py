@@ -1,4 +1,4 @@
-"""Framing of streams: which beats of a core's output are the first and the last of a frame or a packet."""
+"""Framing of streams: the first and the last beat of a frame or a packet in a core's output."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ BUSES = ("axi", "wishbone")
 """Buses by which a core and its registers can be accessed."""
 
 PACKETS = {"shader": "span", "geometry": "frame", "render": "run"}
-"""What ends with TLAST, by core: a span, a frame, or a run of pixels, each one right of the one before."""
+"""Packet that ends with TLAST, by core: a span, a frame, or a run of pixels side by side in one row."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Framing:
     made : ByteLayout
         Layout of the output payload.
     packets : str
-        What a packet is: one of the values of `PACKETS`.
+        Kind of packet, one of the values of `PACKETS`.
 
     Raises
     ------

@@ -75,12 +75,12 @@ class Register:
     address : int
         Address of its first byte, a multiple of 4.
     access : str
-        ``"read-only"``, ``"read-write"`` (reset to 0), ``"write-only"``, or ``"clear"``: a 1 written clears
-        its bit, and a 1 for a bit that there is not does nothing.
+        ``"read-only"``, ``"read-write"`` (reset to 0), ``"write-only"``, or ``"clear"``: a written 1 clears
+        its bit, and a 1 for a missing bit does nothing.
     width : int
         Bits of its value.
     signed : bool
-        Whether the value is in two's complement; it is then sign-extended to 32 bits.
+        Whether the value is in two's complement. It is then sign-extended to 32 bits.
     text : str
         Description.
     format : str
@@ -88,7 +88,7 @@ class Register:
     bits : tuple of (str, int, int, str)
         Parts of the value: name, first bit, number of bits, description.
     range : (int, int), optional
-        Least and largest value, where not all codes are values.
+        Least and largest value, if not all codes are values.
     """
 
     name: str
@@ -116,12 +116,12 @@ class Register:
 
 
 def frame_registers(keep: bool = False) -> list[Register]:
-    """Registers of the picture, of a core that takes triangles; see `Frame`.
+    """Registers of the picture, for a core that takes triangles; see `Frame`.
 
     Parameters
     ----------
     keep : bool
-        Whether the core tests depths, which begin anew with each frame unless they are kept.
+        Whether the core tests depths. These begin anew with each frame unless they are kept.
     """
     borders = {
         "left": "first column of the picture on the grid",
@@ -231,7 +231,7 @@ class RegisterMap:
     core : str
         Name of the core, for people.
     counters : sequence of (str, int, str)
-        Counters since the reset: name, bits, what is counted.
+        Counters since the reset: name, bits, description.
     picture : sequence of Register
         Registers of the picture, if the core has some.
     constants : sequence of Register
@@ -294,7 +294,7 @@ class RegisterFile:
     map : RegisterMap
         The registers.
     values : dict of str to int
-        Values of the registers by name, read-only ones included, which the core sets; 0 if not given.
+        Values of the registers by name, by default 0. The core sets the read-only registers.
     """
 
     map: RegisterMap
@@ -303,16 +303,16 @@ class RegisterFile:
     def access(
         self, address: int, data: int | None = None, strobe: int = 15, busy: bool = False
     ) -> tuple[int, str]:
-        """The word that is read, 0 for a write, and the cause if the access is refused, else an empty text.
+        """The read word, 0 for a write, and the cause of a refusal, else an empty text.
 
         Parameters
         ----------
         address : int
-            Byte address, 12 bits; a read takes the word in which it is, and so does a write of some bytes.
+            Byte address, 12 bits. A read, or a write of some bytes, takes the word that contains it.
         data : int, optional
             The word to write; ``None``: a read.
         strobe : int
-            One bit for each byte: whether it is written. A write of no byte changes nothing.
+            One bit for each byte, 1 if the byte is written. A write of no byte changes nothing.
         busy : bool
             Whether the core is working on a frame.
         """

@@ -55,9 +55,9 @@ class FrameErrors(ErrorFigures):
     max_lsb, p999_lsb, rmse_lsb, psnr_db : float
         See `ErrorFigures`.
     steady_lsb : float
-        Largest error of the pixels off the border of every light, see `border_mask`; 0 without any.
+        Largest error of the pixels off the border of every light, see `border_mask`; 0 without these pixels.
     border_lsb : float
-        Largest error of the pixels at a border; 0 without any.
+        Largest error of the pixels at a border; 0 without these pixels.
     """
 
     steady_lsb: float
@@ -76,23 +76,23 @@ class Comparison:
         The exact frame with the frame's model, in [0, 1]: per-pixel normals, perspective-correct and
         normalised, of the triangles as rasterised.
     arithmetic_error : FrameErrors
-        Against the same method and model in float64; NaN where the spans are not known.
+        Against the same method and model in float64; NaN if the spans are unknown.
     method_error : FrameErrors
         Against ``golden``.
     total_error : FrameErrors
         Against the exact frame with the model ``target``.
     target : str
-        Name of that model, see `target_of`.
+        Name of this model, see `target_of`.
     bound_lsb : float or None
-        Bound of ``method_error.steady_lsb``, see `error_bound`; ``None`` where the spans are not known.
+        Bound of ``method_error.steady_lsb``, see `error_bound`; ``None`` if the spans are unknown.
     visible_pixels : int
         Pixels that show the surface.
     border : str
-        The cosines that are near 0 at a border: ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see `highlight_step`.
+        Cosines near 0 at a border: ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see `highlight_step`.
     step_lsb : float
         See `highlight_step`.
     border_pixels : int
-        Pixels of these at the border of a light.
+        Visible pixels at the border of a light.
     nmse : float
         Normalised mean squared error against the exact frame.
     mnse_published, mnse_published_share : float
@@ -123,9 +123,9 @@ def method_in_float64(scene: Scene, design: ShadingPipeline, raster: Raster) -> 
     Parameters
     ----------
     scene, design
-        What is drawn, and by which pipeline.
+        The scene, and the pipeline that draws it.
     raster : Raster
-        The spans, wide ones cut.
+        The spans. Wide spans are cut.
 
     Returns
     -------
@@ -171,9 +171,9 @@ def _model_of(design: ShadingPipeline) -> ReflectionModel:
 
 
 def target_of(design: ShadingPipeline) -> ReflectionModel:
-    """Model of the exact frame of the total error: of a lobe its own, else Blinn's power.
+    """Model of the exact frame of the total error: Blinn's power, or a lobe's own model.
 
-    The other models approximate that power; a lobe is a table of its own model.
+    The other models approximate Blinn's power. A lobe is a table of its own model.
     """
     return _model_of(design) if design.loads_tables else BLINN
 
@@ -181,13 +181,13 @@ def target_of(design: ShadingPipeline) -> ReflectionModel:
 def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None) -> float | None:
     """Bound of the error against exact normals of every pixel with the same model, in LSB.
 
-    Let c be the largest channel of all terms together: over the materials the largest sum over the lights of
-    colour times diffuse and specular reflection, where 1 is the full channel. Then::
+    Let c be the largest channel of all terms together, where 1 is the full channel. It is the largest sum,
+    over the materials, of the lights' colours times diffuse and specular reflection. Then::
 
         arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
 
-    The half is the rounding of the pixel. The quarter is the tolerance by which spans are cut, which is
-    checked at some places of a span and not proved for all: docs/theory/chord.md#where-spans-are-cut. The
+    The half is the rounding of the pixel. The quarter is the tolerance of cut spans. It is checked at some
+    places of a span; a proof for all places is missing (docs/theory/chord.md#where-spans-are-cut). The
     sixteenth holds the rounding of operands and terms.
 
     The bound holds for spans from software, and off the border of every light, see `border_mask`.
@@ -197,15 +197,19 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
     scene, design
         As for `compare`.
     cut : Raster, optional
-        The spans that were shaded. With them ``quotient`` has a bound, see `quotient_bound`.
+        The shaded spans. With them ``quotient`` has a bound, see `quotient_bound`.
 
     Returns
     -------
     float or None
-        The bound of the method error; ``None`` where no bound is known: of another method than
-        ``chord-local``, ``renormalise`` and ``quotient``, of a pipeline that was not made for the scene's
-        materials, of a measured curve, and of a roughness under `LEAST_ROUGHNESS`. ``renormalise`` has none
-        either where `Lobe.scale_of` gives a scale: its words of 1 - N·H are too coarse for so sharp a lobe.
+        The bound of the method error. ``None``: no bound is known, in one of these cases:
+
+        - another method than ``chord-local``, ``renormalise`` and ``quotient``;
+        - a pipeline for other materials than the scene's;
+        - a measured curve;
+        - a roughness under `LEAST_ROUGHNESS`;
+        - ``renormalise`` with a lobe for which `Lobe.scale_of` gives a scale. Its words of 1 - N·H are too
+          coarse for this sharp lobe.
     """
     return None if design.specular is None else design.interpolator.bound(_Bounds(scene, design, cut))
 
@@ -228,7 +232,7 @@ class _Bounds:
 
 
 def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
-    """Bound from the tolerances by which spans are cut, as `error_bound` states it."""
+    """Bound from the tolerances of cut spans, as `error_bound` states it."""
     model = _model_of(design)
     made = design.for_materials(scene.materials)
     if made.interpolator != design.interpolator:
@@ -253,10 +257,10 @@ def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
 
 
 def highlight_step(scene: Scene, model: ReflectionModel) -> float:
-    """Largest step of a highlight at N·H = 0 in LSB, of one light; 0 where it is a quarter or less.
+    """Largest step of a light's highlight at N·H = 0 in LSB; 0 if it is a quarter or less.
 
-    ``ggx`` at a large roughness does not end in 0 there, and a curve of a file need not. Polynomials of a
-    small exponent are not 0 there either, but go on behind: they have no step.
+    ``ggx`` at a large roughness does not end in 0 there, and a curve of a file may not. Polynomials of a
+    small exponent go on behind, so they have no step.
     """
     brightest = max((max(light.color) for light in scene.lights), default=0.0)
     steps = [0.0]
@@ -267,10 +271,10 @@ def highlight_step(scene: Scene, model: ReflectionModel) -> float:
 
 
 def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndarray:
-    """Which shown pixels are at the border of a light, where its term switches between on and off.
+    """Shown pixels at the border of a light, where its term switches between on and off.
 
-    There ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if there is a
-    `highlight_step`. An error there may be that of the term.
+    There ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if there is a `highlight_step`. An error there may be as
+    large as the term.
 
     Parameters
     ----------
@@ -308,14 +312,14 @@ _CHUNK = 1 << 15
 
 
 def compare(scene: Scene, design: ShadingPipeline, frame: Picture) -> Comparison:
-    """Errors of a frame against three frames of the golden renderer; NaN if the frame shows no surface.
+    """Errors of a frame against three frames of the golden renderer. NaN if the frame shows no surface.
 
     Parameters
     ----------
     scene, design
-        What was drawn, and by which pipeline; after a specialisation the full scene and pipeline.
+        The scene, and the pipeline that drew it. After a specialisation, the full scene and pipeline.
     frame : Picture
-        The frame of that pipeline.
+        The frame of the pipeline.
     """
     bound = error_bound(scene, design, frame.cut_raster)
     return _compare(scene, design, frame.image, frame.raster, frame.cut_raster, bound)
@@ -326,13 +330,13 @@ def compare_triangles(
 ) -> Comparison:
     """Errors of a picture by triangles, with the bound of the method ``quotient``.
 
-    The bound holds where the picture shows the triangle that the exact one shows, see
-    `quotient_triangle_bound`; of other methods none is known.
+    The bound holds where the picture shows the triangle that the exact picture shows, see
+    `quotient_triangle_bound`. Other methods have no known bound.
 
     Parameters
     ----------
     scene : Scene
-        What was drawn.
+        The drawn scene.
     renderer : Renderer
         Geometry and shading.
     sent : SceneTriangles
@@ -347,7 +351,7 @@ def compare_triangles(
 
 
 def compare_image(scene: Scene, design: ShadingPipeline, image: np.ndarray) -> Comparison:
-    """Errors of a picture whose spans are not known, so that there is no arithmetic error.
+    """Errors of a picture with unknown spans, without an arithmetic error.
 
     Parameters
     ----------

@@ -18,11 +18,11 @@ __all__ = ["cut_by_angle", "cut_by_ends", "cut_by_error", "cut_by_length", "cut_
 
 
 def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Raster, int]:
-    """Spans cut as the method of a pipeline needs them, and how many of the given spans were cut.
+    """Spans cut for the method of a pipeline, and the number of given spans that were cut.
 
     The normal at a cut is the true normal of the surface, ``normalise((1-t) m_l N_l + t m_r N_r)`` along the
-    span that was cut, with the lengths m of the rasteriser. An odd pixel goes to the right half. The
-    fragments and their order do not change.
+    given span, with the lengths m of the rasteriser. An odd pixel goes to the right half. The fragments and
+    their order do not change.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Ra
     raster : Raster
         The same fragments in narrower spans, with the weights and lengths m of their ends.
     cut : int
-        How many of the given spans were cut.
+        Number of given spans that were cut.
     """
     return design.interpolator.cut(_Cutter(scene, raster, design))
 
@@ -71,14 +71,14 @@ class _Cutter:
 
 
 def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
-    """Halve spans of more than two pixels until the angle between their end normals is at most a given one.
+    """Halve spans of more than two pixels until the angle between their end normals is small enough.
 
     Parameters
     ----------
     raster : Raster
         Spans.
     largest_angle : float
-        In degrees, over 0.
+        Largest angle in degrees, over 0.
 
     Returns
     -------
@@ -96,16 +96,16 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
 
 
 def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
-    """Halve spans until no pixel's normal, not of unit length, is too short beside the longer end's.
+    """Halve spans until no pixel's normal is too short beside the longer end's; normals have lengths.
 
-    Such normals come of W that differ much along a span, and of ends that are nearly opposite.
+    Short normals come from values of W that differ much along a span, and from nearly opposite ends.
 
     Parameters
     ----------
     raster : Raster
         Spans.
     largest_ratio : float
-        Largest length of an end over that of the normal of a pixel.
+        Largest ratio of the length of an end to the length of a pixel's normal.
 
     Returns
     -------
@@ -131,9 +131,9 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
 
 
 def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
-    """Halve spans whose normals, not of unit length, differ in length or by over 90 degrees at the two ends.
+    """Halve spans whose end normals differ in length, or by over 90 degrees; normals have lengths.
 
-    Spans of two pixels become two of one, whatever their ends.
+    Spans of two pixels become two spans of one pixel, for all ends.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
     Returns
     -------
     raster, cut
-        As of `cut_spans`. Spans of two pixels count as cut only if their ends differ so.
+        As of `cut_spans`. Spans of two pixels count as cut only if their ends differ by more than the limits.
     """
 
     def differs(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
@@ -163,7 +163,7 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
 
 
 def split_pairs(raster: Raster) -> Raster:
-    """Spans of two pixels as two of one, as a method that takes vectors asks; the others as they are."""
+    """Spans of two pixels as two of one, for a method that takes vectors. Other spans stay."""
     return _halve(raster, lambda _, first, last: last - first == 1)[0]
 
 
@@ -237,17 +237,17 @@ def cut_by_error(
 
     - its angle is over the method's `Interpolator.widest_span`;
     - ``chord-local`` would flag it: a word of `ChordSetup` would overflow;
-    - it has pixels between those through which the method's curve is put, and vectors turn farther along it
-      than `LocalChordInterpolator` allows, or the error of N·L or u is over its tolerance. The tolerance of u
-      depends on the exponent of the span's material and on the least u of the span, as dark spans may have
-      larger errors;
+    - it has pixels between the places of the method's curve, and either vectors turn farther along it than
+      `LocalChordInterpolator` allows, or the error of N·L or u is over its tolerance. The tolerance of u
+      depends on the exponent of the span's material and on the least u of the span, because dark spans may
+      have larger errors;
     - N·L of a light changes its sign, or nearly, where its highlight shows, and N·L of a pixel might have
-      another sign than the exact value, unless the exact value is within 2^-25 of 0;
+      another sign than the exact value. Exact values within 2^-25 of 0 are left out;
     - the errors of a light that fades, with N·L times its factor, are over the budgets of
-      `LocalChordInterpolator` at any pixel: here every pixel is checked.
+      `LocalChordInterpolator` at any pixel. Here every pixel is checked.
 
-    For a light that is behind the surface along the whole span only the turn counts; a light that is off
-    has no effect.
+    For a light that is behind the surface along the whole span only the turn counts. A light that is off has
+    no effect.
 
     Parameters
     ----------

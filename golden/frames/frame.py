@@ -1,4 +1,4 @@
-"""A shaded frame: its picture, and the frame of a pipeline's bit-accurate model."""
+"""A shaded frame: its picture, and the frame by a pipeline's bit-accurate model."""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -24,7 +24,7 @@ class Picture:
     prepared : PreparedFrame
         The pipeline's spans.
     out_of_range_spans : int
-        Spans whose angle the pipeline reports as larger than its method serves.
+        Spans with a larger angle than the method serves, as the pipeline reports.
     seconds : dict
         Time by step: ``raster`` (rasterise, cut, quantise), and ``model`` or ``simulate`` for the pixels.
     """
@@ -46,12 +46,12 @@ class Picture:
 
     @property
     def spans(self) -> int:
-        """Number of spans that went into the pipeline."""
+        """Number of spans on the pipeline's input."""
         return len(self.cut_raster.length)
 
     @property
     def pixels(self) -> int:
-        """Number of pixels that came out of it, hidden ones included."""
+        """Number of pixels on its output, hidden pixels included."""
         return len(self.cut_raster.span)
 
 
@@ -63,7 +63,7 @@ def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray
     scene : Scene
         Size and background; the background colour is rounded to the nearest code, half up.
     raster : Raster
-        Fragments, and which of them are visible.
+        Fragments, with flags of the visible fragments.
     colors : uint8 array, shape (fragments, 3)
         Red, green, blue of each fragment.
 
@@ -79,12 +79,12 @@ def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray
 
 
 def model_frame(scene: Scene, design: ShadingPipeline) -> Picture:
-    """Frame by a pipeline's bit-accurate model: bit for bit the image of the simulated pipeline.
+    """Frame by a pipeline's bit-accurate model, equal to the simulated pipeline's image bit for bit.
 
     Parameters
     ----------
     scene : Scene
-        What to draw: at most as many lights as the design has, and as many materials.
+        The scene, with at most as many lights as the design has, and as many materials.
     design : ShadingPipeline
         The pipeline.
 

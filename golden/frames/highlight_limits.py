@@ -1,4 +1,4 @@
-"""Highlight limits: tolerances of u for a scene's highlights, and where there is no highlight."""
+"""Highlight limits: tolerances of u for a scene's highlights, and regions without a highlight."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -58,15 +58,15 @@ class _Curve:
 class HighlightLimits:
     """Tolerances of u = 1 - N·H for the highlights of materials.
 
-    For a polynomial or a power the tolerance follows from the exponent, as in `LocalChordInterpolator`; for a
-    lobe from its curve: it is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope from u on.
+    For a polynomial or a power the tolerance follows from the exponent, as in `LocalChordInterpolator`. For a
+    lobe it is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope of its curve from u on.
 
     Parameters
     ----------
     exponents : float array, shape (materials,)
         Exponent, or `ReflectionModel.steepness`, of each material.
     curves : sequence of _Curve or None
-        Curve of each material; ``None`` for one without a lobe.
+        Curve of each material; ``None`` for a material without a lobe.
 
     Source: docs/theory/chord.md#where-spans-are-cut.
     """
@@ -78,7 +78,7 @@ class HighlightLimits:
 
     @classmethod
     def of(cls, materials: Sequence[Material], design: ShadingPipeline | None = None) -> "HighlightLimits":
-        """Limits of materials with the specular unit of a design; without a design by their exponents."""
+        """Limits of materials with the specular unit of a design. Without a design, by their exponents."""
         if design is None or design.specular is None:
             exponents = [float(material.exponent) for material in materials]
         else:
@@ -107,10 +107,11 @@ class HighlightLimits:
         return self._of("tolerance", LocalChordInterpolator().highlight_tolerance, material, u)
 
     def turn(self, material: np.ndarray) -> np.ndarray:
-        """Angle in radians by which a normal may turn, whatever u.
+        """Angle in radians by which a normal may turn, for every u.
 
-        It is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope of S over gamma: of a
-        polynomial or a power at most `STEEPEST` times ``sqrt n``, of a lobe the largest ``sqrt(2u) |dS/du|``.
+        It is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope of S over gamma. For a
+        polynomial or a power the slope is at most `STEEPEST` times ``sqrt n``. For a lobe it is the largest
+        ``sqrt(2u) |dS/du|``.
 
         Parameters
         ----------

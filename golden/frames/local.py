@@ -35,7 +35,7 @@ def weights_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray
 
 
 def lines_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Normals, not of unit length, at t of each span, shape (spans, 3); they are linear in t."""
+    """Normals with their lengths at t of each span, shape (spans, 3); they are linear in t."""
     t = t[:, np.newaxis]
     left, right = line_ends(raster, span)
     found: np.ndarray = (1 - t) * left + t * right
@@ -43,7 +43,7 @@ def lines_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-    """Normals, not of unit length, at the two ends of all or some spans, each of shape (spans, 3)."""
+    """Normals with their lengths at the two ends of all or some spans, each of shape (spans, 3)."""
     return (
         raster.magnitude_left[span, np.newaxis] * raster.normal_left[span],
         raster.magnitude_right[span, np.newaxis] * raster.normal_right[span],
@@ -54,8 +54,10 @@ def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[n
 class SurfacePoints:
     """Exact values at points of the surface, for each light.
 
-    Shapes: ``normal`` N and ``viewer`` V (count, 3), ``direction`` L (lights, count, 3); ``diffuse`` N·L
-    times a, ``highlight`` u, and ``factor`` a (count, lights), which is 1 for a light that does not fade.
+    - ``normal`` N and ``viewer`` V have the shape (count, 3);
+    - ``direction`` L has the shape (lights, count, 3);
+    - ``diffuse`` N·L times a, ``highlight`` u, and ``factor`` a have the shape (count, lights). a is 1 for a
+      light that does not fade.
     """
 
     normal: np.ndarray
@@ -129,9 +131,9 @@ def chunks(count: int) -> Iterator[slice]:
 def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> SpanValues:
     """Input of ``chord-local`` for each span: exact values of N·L and u at three places, as codes.
 
-    N, L and H are of unit length at each place. Where a point light is on the surface itself N·L is 0; where
-    there is no half-way vector (``L = -V``) u is 2. The middle values of a span of two pixels are means of
-    its ends. N·L of a light that fades is multiplied by its factor.
+    N, L and H are of unit length at each place. Where a point light is on the surface, N·L is 0. Where there
+    is no half-way vector (``L = -V``), u is 2. The middle values of a span of two pixels are means of its
+    ends. The factor of a light that fades multiplies its N·L.
 
     Parameters
     ----------
@@ -140,8 +142,8 @@ def local_values(scene: Scene, raster: Raster, lights: int | None = None) -> Spa
     raster : Raster
         Spans from `cut_spans`, in any order.
     lights : int, optional
-        Number of lights of the pipeline, by default that of the scene. Lights that the scene does not have,
-        and lights that are off, are dark: their N·L is 0.
+        Number of lights of the pipeline, by default of the scene. Lights that the scene does not have, and
+        lights that are off, are dark: their N·L is 0.
     """
     return local_operands(scene, raster, lights)[0]
 
@@ -160,7 +162,7 @@ def local_operands(
     scene, raster, lights
         As for `local_values`.
     factors : sequence of int
-        Indices of the lights whose factors are wanted.
+        Indices of the lights whose factors are computed.
     scale : int
         Scale of u, see `SpanValues.quantise`.
 

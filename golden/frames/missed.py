@@ -1,4 +1,4 @@
-"""Missed spans: how many spans of a frame a method's curve, or its words, miss."""
+"""Missed spans: the spans of a frame that a method's curve, or its words, miss."""
 
 from typing import Any
 
@@ -48,8 +48,8 @@ def _missed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Spans that are off by more than the tolerances, by the method's curve or by their words.
 
-    The errors of a normal that is turned by e are at most e for N·L and ``sqrt(2u) e + e^2/2`` for u, as
-    ``|N - H| = sqrt(2u)``. The signs of N·L are not looked at.
+    A normal that is turned by e has errors of at most e for N·L and ``sqrt(2u) e + e^2/2`` for u, as
+    ``|N - H| = sqrt(2u)``. The signs of N·L are ignored.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def _missed(
     Returns
     -------
     by_curve, by_words : bool arrays, shape (spans,)
-        A span is ``by_curve`` only if it is not ``by_words``.
+        A span is at most one of the two: if it is ``by_words``, it is not ``by_curve``.
     """
     limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
     by_curve, by_words = np.zeros((2, len(raster.length)), dtype=bool)
@@ -77,17 +77,18 @@ def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dic
     """Numbers of the pieces that are off by more than the tolerances of `LocalChordInterpolator`.
 
     Geometry cuts a span by an angle. The angle bounds the error of a method's curve only where the lengths of
-    N/W at both ends of a piece are equal. So N·L and u of the curve are compared with those of the piece's
-    own line at its quarters, as `cut_by_error` does before it cuts. The quarters know the error in between up
-    to a factor that was found by search, see `LocalChordInterpolator`.
+    N/W at both ends of a piece are equal. So N·L and u of the curve are compared with N·L and u of the
+    piece's own line at its quarters, as `cut_by_error` does before it cuts. The quarters give the error in
+    between up to a factor, which was found by search, see `LocalChordInterpolator`.
 
-    The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle, which turns
-    a normal of length m by that over m. Where this alone is over a tolerance, the normals are short.
+    The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle. This error
+    over m is the angle by which a normal of length m turns. If the angle alone is over a tolerance, the
+    normals are short.
 
     Parameters
     ----------
     scene : Scene
-        What is drawn; without point lights and with a far viewer.
+        The drawn scene, without point lights and with a distant viewer.
     renderer : Renderer
         Geometry and shading.
     sent : SceneTriangles
@@ -148,7 +149,7 @@ def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) ->
 
 
 def nearest(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Least distance of straight lines between two points, each of shape (S, 3), from 0."""
+    """Least distance from 0 of straight lines between two points, each of shape (S, 3)."""
     step = right - left
     square = np.einsum("sk,sk->s", step, step)
     t = -np.einsum("sk,sk->s", left, step) / np.where(square, square, 1.0)

@@ -1,4 +1,4 @@
-"""Pieces of spans: how far a method's curve is from the exact values along them."""
+"""Pieces of spans, and the distance of a method's curve from the exact values along them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ class Pieces:
         return cls(scene, raster, origin, first, last, places)
 
     def miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
-        """Whether the curve of a method is too far from the exact one; bool, shape (pieces,)."""
+        """Whether the curve of a method is too far from the exact curve; bool, shape (pieces,)."""
         return self._scaled(interpolator)._miss(interpolator, limits, material)
 
     def off(
@@ -286,10 +286,10 @@ def _misses_of_pixels(
     Returns
     -------
     misses : dict of float64 array, shape (pieces, lights)
-        Errors of ``diffuse``, where values under 0 count as 0, and of ``factor`` at pixels where the light is
-        not behind the surface.
+        Errors of ``diffuse``, where values under 0 count as 0. Errors of ``factor`` at pixels where the light
+        is not behind the surface.
     largest : float64 array, shape (pieces, lights)
-        Largest factor at such pixels; 0 without any.
+        Largest factor at these pixels; 0 without these pixels.
     """
     shape = len(origin), len(scene.lights)
     misses, largest = {name: np.zeros(shape) for name in curves}, np.zeros(shape)

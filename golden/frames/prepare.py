@@ -1,4 +1,4 @@
-"""The input of a pipeline for a frame: spans that are cut, ordered and quantised, and frame constants."""
+"""The input of a pipeline for a frame: cut, ordered and quantised spans, and frame constants."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -47,8 +47,8 @@ class PreparedFrame:
     spans : Spans
         Spans of ``cut_raster``, quantised: the pipeline's input.
     missed_spans : int
-        For a method whose spans are not cut by error: number of spans in which its curve is off by more than
-        a quarter of an LSB.
+        For a method whose spans are cut by their angle alone: number of spans in which its curve is off by
+        more than a quarter of an LSB.
     """
 
     raster: Raster
@@ -64,7 +64,7 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
     Raises
     ------
     ValueError
-        If the scene has point lights or a near viewer, and the method does not take values; or a light that
+        If the scene has point lights or a near viewer, and the method does not take values. If a light that
         fades has no factor in the design.
     """
     if scene.local and not design.takes_values:
@@ -83,7 +83,7 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
 
 
 def spans_for(scene: Scene, cut: Raster, design: ShadingPipeline) -> Spans:
-    """The input beats of a pipeline for spans that are cut for it, with what the method takes.
+    """The input beats of a pipeline for spans that are cut for it, with the operands of the method.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class _Filler:
 
 
 def _true_ends(scene: Scene, cut: Raster) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the true line; where both vanish, the normal of the face, as `fragment_normals` has it."""
+    """Ends of the true line. Where both vanish, the normal of the face, as in `fragment_normals`."""
     left, right = line_ends(cut)
     lost = np.ones(len(left), dtype=bool)
     for end, weights in ((left, cut.weights_left), (right, cut.weights_right)):
@@ -161,8 +161,8 @@ def constants_of(scene: Scene, design: ShadingPipeline) -> list[FrameConstants]:
     Raises
     ------
     ValueError
-        If the scene has more lights, another number of materials, or more lobes than the design has banks, or
-        a term is brighter than 8.
+        If the scene has more lights or another number of materials than the design, or more lobes than banks.
+        If a term is brighter than 8.
     """
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
@@ -177,7 +177,7 @@ def constants_of(scene: Scene, design: ShadingPipeline) -> list[FrameConstants]:
 def with_tables(
     constants: Sequence[FrameConstants], materials: Sequence[Material], design: ShadingPipeline
 ) -> list[FrameConstants]:
-    """Frame constants with the tables of the materials' lobes; equal ones share a bank.
+    """Frame constants with the tables of the materials' lobes. Equal tables share a bank.
 
     Parameters
     ----------
@@ -191,8 +191,8 @@ def with_tables(
     Raises
     ------
     ValueError
-        If the materials have more lobes than there are banks, or a lobe that is not among those fixed at
-        build time.
+        If the materials have more lobes than banks, or a lobe that is not among the lobes fixed at build
+        time.
     """
     lobe = design.lobe
     parameters = [material.parameter(lobe.reflection) for material in materials]
@@ -221,7 +221,7 @@ def with_tables(
 
 
 def sort_by_material(raster: Raster, material: np.ndarray) -> Raster:
-    """The same spans and fragments, spans of one material after the other.
+    """The same spans and fragments, sorted by material.
 
     Parameters
     ----------

@@ -26,16 +26,20 @@ __all__ = ["quotient_bound", "quotient_triangle_bound"]
 def quotient_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> float:
     """Bound of the error against exact normals of every pixel with the same model, in LSB.
 
-    The rounding of a pixel, 1/2, and of its colour operands, 1/128 each; and, for the brightest material, the
-    bounds of N·L and of the highlight times reflection and light. `QuotientErrors` proves these for every
-    span; the error of a lobe's table is measured at seven places of every step.
+    It is the sum of
+
+    - the rounding of a pixel, 1/2, and of its colour operands, 1/128 each;
+    - for the brightest material, the bounds of N·L and of the highlight, times reflection and light.
+
+    `QuotientErrors` has these bounds for every span, and docs/theory/quotient.md#bound proves them. The error
+    of a lobe's table is measured at seven places of every step.
 
     Parameters
     ----------
     scene, design
-        As for `compare`; the method is ``quotient``, with specular light.
+        As for `compare`. The method is ``quotient``, with specular light.
     cut : Raster
-        The spans that were shaded.
+        The shaded spans.
     """
     if not len(cut.length):
         return 0.5
@@ -45,18 +49,21 @@ def quotient_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> float:
 
 
 def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
-    """The same bound of a frame by triangles, where it shows the triangle that exact shading shows, in LSB.
+    """The same bound of a frame by triangles, in LSB, where it shows the triangle of exact shading.
 
-    A component of N/W is off by `component_error`, times the shift, and by the words of `VectorAdapter`: half
-    a step for the start, the rounding of the step, and an eighth of a step for cuts. Slivers, which have the
-    attributes of their longest edge, are off by those of their middle corner against that edge, too.
-    `MirrorAdapter` turns psi by 2^-15 at most. Components of further lights have the error of the vector that
-    `LightAdapter` turns, that of its axes, and a rounding of their own.
+    - A component of N/W is off by `component_error`, times the shift.
+    - The words of `VectorAdapter` add half a step for the start, the rounding of the step, and an eighth of a
+      step for cuts.
+    - Slivers have the attributes of their longest edge. So they are also off by the distance of their middle
+      corner's attributes from this edge.
+    - `MirrorAdapter` turns psi by 2^-15 at most.
+    - Components of further lights have the error of the vector that `LightAdapter` turns, the error of its
+      axes, and a rounding of their own.
 
     Parameters
     ----------
     scene : Scene
-        What is drawn.
+        The drawn scene.
     renderer : Renderer
         Geometry and shading, of the method ``quotient``, with specular light.
     sent : SceneTriangles
@@ -111,7 +118,7 @@ def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
 def _bound(
     scene: Scene, design: ShadingPipeline, errors: QuotientErrors, further: QuotientErrors | None = None
 ) -> float:
-    """From the bounds of directions, of the first light and of further ones, to that of a pixel."""
+    """Bound of a pixel, from the bounds of directions of the first light and of further lights."""
     lobe = design.lobe
     kinds = [errors] if further is None or len(scene.lights) < 2 else [errors, further]
     largest = 0.0

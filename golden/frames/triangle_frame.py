@@ -38,7 +38,7 @@ class TriangleFrame:
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     sent : SceneTriangles
-        The triangles that were drawn.
+        The drawn triangles.
     owner : int64 array, shape (height, width)
         Face of the mesh that each pixel shows, -1 for the background.
     counts : mapping of str to int
@@ -61,7 +61,8 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     renderer : Renderer
         Geometry and shading.
     angle : float, optional
-        In degrees, 0 to 60; by default `SPAN_ANGLE`. True lines and vectors are not cut at an angle.
+        In degrees, 0 to 60, by default `SPAN_ANGLE`. Spans of true lines and vectors have no cuts at an
+        angle.
 
     Raises
     ------
@@ -126,12 +127,12 @@ def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarra
 
 
 def triangle_frame(scene: Scene, renderer: Renderer, angle: float | None = None) -> TriangleFrame:
-    """Frame by the bit-accurate models: bit for bit the image of the simulated hardware.
+    """Frame by the bit-accurate models, equal to the simulated hardware's image bit for bit.
 
     Parameters
     ----------
     scene : Scene
-        What to draw: at most as many lights as the design has, and as many materials.
+        The scene, with at most as many lights as the design has, and as many materials.
     renderer : Renderer
         Geometry and shading.
     angle : float, optional

@@ -10,7 +10,7 @@ __all__ = ["further_axes", "triangle_axes", "vector_axes"]
 
 
 def vector_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
-    """Axes in the scene's frame of the components that a method takes of ``N/W``, by rows.
+    """Axes, by rows, in the scene's frame of the components of ``N/W`` that a method takes.
 
     Without highlights z is along each light.
 
@@ -39,9 +39,9 @@ def vector_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
 
 
 def triangle_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
-    """Axes in the scene's frame of the normals that triangles have, for a method that takes vectors, by rows.
+    """Axes, by rows, in the scene's frame of the normals of triangles, for a method that takes vectors.
 
-    x, y and z of the first light's frame; without highlights z is along the light.
+    They are x, y and z of the first light's frame. Without highlights z is along the light.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def further_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
     Parameters
     ----------
     scene, design
-        As for `vector_axes`; two lights at least.
+        As for `vector_axes`, with two lights at least.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Band buffer: one band of lines is drawn while another is shown; which band is drawn next."""
+"""Band buffer: one band of lines is drawn while another is shown, and the choice of the next band."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ RGB565 = (5, 6, 5)
 
 @dataclass(frozen=True)
 class BandBuffer:
-    """Two bands of colour: one is shown, the other is drawn; pixels that were not drawn are background.
+    """Two bands of colour: one is shown, the other is drawn. All other pixels are background.
 
-    The *slot* of a band is the time in which the display shows its `lines` lines. A band that is not complete
-    when its slot begins is *late*: the background is shown in its place, and the band is dropped when it is
-    complete. The next band to draw is the one after the last one; if its slot has begun, it is the band of
-    the next slot (`following`). So each line of a frame is either right or background, and the display's
-    timing does not depend on the drawing.
+    The *slot* of a band is the time in which the display shows its `lines` lines. A band that is incomplete
+    when its slot begins is *late*. The display shows the background in its place, and the band is dropped
+    when it is complete. The next band to draw follows the last band. If its slot has begun, the next band is
+    the band of the next slot (`following`). So each line of a frame is either right or background. The
+    display's timing does not depend on the drawing.
 
     Colours are kept as their highest bits, ``channel >> (8 - bits)``, and shown with these bits repeated
-    below: black stays black, white stays white, and the error of a channel is at most ``2^(8 - bits) - 1``.
+    below. Black stays black, and white stays white. The error of a channel is at most ``2^(8 - bits) - 1``.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class BandBuffer:
         Raises
         ------
         ValueError
-            If the picture has another size than the display, or there is no band of an index.
+            If the picture has another size than the display, or an index has no band.
         """
         size = (self.mode.vertical.visible, self.mode.horizontal.visible, 3)
         if np.shape(picture) != size:
@@ -115,9 +115,9 @@ class BandBuffer:
         return shown
 
     def following(self, band: np.ndarray, slot: np.ndarray) -> np.ndarray:
-        """Band that is drawn after ``band``, if the last slot that has begun is ``slot``.
+        """Band that is drawn after ``band``; ``slot`` is the last slot that has begun.
 
-        With two buffers at most the next two slots' bands are worth drawing.
+        With two buffers at most the bands of the next two slots are useful.
         """
         next_band = (band + 1) % self.bands
         ahead = (next_band - slot) % self.bands

@@ -11,13 +11,13 @@ __all__ = ["BandDepth"]
 
 @dataclass(frozen=True)
 class BandDepth:
-    """A memory of depths; a word that was not written in the present band counts as cleared.
+    """A memory of depths. Words from earlier bands count as cleared.
 
     A word holds a depth and a tag of ``tag_bits`` bits: the number of the band in which it was written,
-    modulo ``2^tag_bits``. A word with another tag than the present one reads as `DepthTester.CLEARED`. An old
-    tag must not become the present one again. So when a band begins, ``swept`` words are written with the tag
-    before the present one, first those that were swept longest ago: with ``2^t`` tags every word is swept
-    again at most ``2^t - 2`` bands later, one band before its tag would be the present one.
+    modulo ``2^tag_bits``. A word with another tag than the present tag reads as `DepthTester.CLEARED`. An old
+    tag must not become the present tag again. So when a band begins, ``swept`` words are written with the tag
+    before the present tag, the words swept longest ago first. With ``2^t`` tags every word is swept again at
+    most ``2^t - 2`` bands later, one band before its tag would be the present tag.
 
     Parameters
     ----------
@@ -54,12 +54,12 @@ class BandDepth:
     def compute(
         self, begins: np.ndarray, writes: np.ndarray, place: np.ndarray, depth: np.ndarray
     ) -> np.ndarray:
-        """Depth read at each step: the last one written at its place since the present band began.
+        """Depth read at each step: the last depth written at its place since the present band began.
 
         Parameters
         ----------
         begins : bool array, shape (N,)
-            Steps on which a band begins; its other words have no effect.
+            Steps on which a band begins. Their other words have no effect.
         writes : bool array, shape (N,)
             Steps that write ``depth`` after they have read.
         place, depth : int64 arrays, shape (N,)
@@ -68,7 +68,7 @@ class BandDepth:
         Raises
         ------
         ValueError
-            If there is no word of an index.
+            If an index has no word.
         """
         for wrong in place[(place < 0) | (place >= self.words)][:1]:
             raise ValueError(f"a band has words 0 to {self.words - 1}, not {wrong}")

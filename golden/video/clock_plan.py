@@ -19,7 +19,7 @@ FEEDBACK = 200_000_000
 """Highest rate of the fed-back output, Hz, although the PLL's outputs go to 400 MHz."""
 
 SERIAL = 5
-"""Rate of the serial clock over that of the pixel clock."""
+"""Rate of the serial clock over the rate of the pixel clock."""
 
 TOLERANCE = Fraction(1, 200)
 """Largest relative error of a display's pixel clock."""
@@ -33,17 +33,17 @@ class NoClockPlan(ValueError):
 class ClockPlan:
     """Dividers of a PLL: the oscillator runs at ``reference / input * feedback * loop``.
 
-    Its outputs are the oscillator over a divider each: one that is fed back, the serial clock, the pixel
-    clock and the drawing clock.
+    Each output is the oscillator over a divider: the fed-back output, the serial clock, the pixel clock and
+    the drawing clock.
 
     Parameters
     ----------
     reference : int
         Rate of the board's clock, Hz.
     input_divider, feedback_divider : int
-        Dividers of the reference, and of the output that is fed back.
+        Dividers of the reference, and of the fed-back output.
     loop, serial, pixel, draw : int
-        Dividers of the outputs; ``loop`` of the one that is fed back.
+        Dividers of the outputs; ``loop`` belongs to the fed-back output.
 
     Source: docs/theory/video.md#display.
     """
@@ -69,14 +69,14 @@ class ClockPlan:
 
 
 def clock_plan(reference: int, pixel_rate: float, draw_rate: float) -> ClockPlan:
-    """The plan with the nearest pixel clock; among equal ones, that with the fastest drawing clock.
+    """The plan with the nearest pixel clock, and among equal plans the fastest drawing clock.
 
     Parameters
     ----------
     reference : int
         Rate of the board's clock, Hz.
     pixel_rate : float
-        Wanted pixel clock, Hz; the plan's is within `TOLERANCE`.
+        Wanted pixel clock, Hz. The plan's pixel clock is within `TOLERANCE`.
     draw_rate : float
         Largest rate of the drawing clock, Hz.
 

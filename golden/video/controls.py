@@ -35,9 +35,9 @@ class ControlState:
 class Controls:
     """Angle and preset of each frame, controlled by buttons.
 
-    A button is sampled every ``2^debounce_bits`` cycles, which is longer than it bounces; it is pressed when
-    it is down and was up in the sample before. In a pause the press of ``step`` turns by one step, else it
-    reverses the motion. The list of a frame has the index ``light * materials + material``.
+    A button is sampled every ``2^debounce_bits`` cycles, longer than it bounces. It is pressed when it is
+    down and was up in the sample before. In a pause a press of ``step`` turns by one step. Else it reverses
+    the motion. The list of a frame has the index ``light * materials + material``.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Controls:
     first : int
         Code of the angle before the first frame, 0 to 4095.
     debounce_bits : int
-        Bits of the counter of cycles between two samples, 1 to 24; the default is 10 ms at 52 MHz.
+        Bits of the counter of cycles between two samples, 1 to 24. The default is 10 ms at 52 MHz.
 
     Raises
     ------

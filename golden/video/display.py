@@ -1,4 +1,4 @@
-"""Display: frames to the words of four lanes, and back to frames, with every rule of the lanes checked."""
+"""Display: frames to the words of four lanes, and back to frames with a check of every rule of the lanes."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,16 +19,20 @@ __all__ = ["Display", "LaneError"]
 
 
 class LaneError(ValueError):
-    """Raised for lanes that break a rule of the display mode; the message is one line."""
+    """Raised for lanes that break a rule of the display mode. The message is one line."""
 
 
 @dataclass(frozen=True)
 class Display:
     """Words of four lanes for frames in a mode: blue with both sync signals, green, red, and the clock.
 
-    `compute` makes the words of frames; `decode` finds words in bits as a display does, by the control words,
-    and checks four rules: words are control words exactly where the mode is blank, both sync signals pulse at
-    the right pixels, lanes are aligned with the lane of the clock, and no disparity exceeds `MAX_DISPARITY`.
+    `compute` makes the words of frames. `decode` finds words in bits as a display does, by the control words.
+    It checks four rules:
+
+    - words are control words exactly where the mode is blank;
+    - both sync signals pulse at the right pixels;
+    - lanes are aligned with the lane of the clock;
+    - no disparity exceeds `MAX_DISPARITY`.
 
     Parameters
     ----------
@@ -41,7 +45,7 @@ class Display:
     mode: DisplayMode = VGA
 
     def compute(self, frames: np.ndarray) -> np.ndarray:
-        """Words of frames from power-up: from the first blank line before the first frame on.
+        """Words of frames from power-up on, which begins with the first blank line before the first frame.
 
         Parameters
         ----------
@@ -67,12 +71,12 @@ class Display:
         Parameters
         ----------
         bits : int array, shape (n, 4)
-            Bits of the lanes in the order in which they are sent, from any bit on.
+            Bits of the lanes in the order of sending, from any bit on.
 
         Raises
         ------
         LaneError
-            At the first rule that is broken.
+            At the first broken rule.
         """
         words = self.words(bits)
         is_control = np.isin(words[:, :3], CONTROL_WORDS)
@@ -135,7 +139,7 @@ class Display:
         return found
 
     def _check_sync(self, control: np.ndarray, active: np.ndarray, tops: np.ndarray) -> None:
-        """Check both sync signals where lines are blank, from the first frame's top to the last one's."""
+        """Check both sync signals where lines are blank, from the first frame's top to the last frame's."""
         for top, following in pairwise(tops):
             if following - top != self.mode.cycles:
                 raise LaneError(f"a frame lasts {following - top} pixels, not {self.mode.cycles}")

@@ -47,7 +47,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class DisplayMode:
-    """A mode of a display; the default is 640x480 at 60 Hz, 800x525 with its porches.
+    """A mode of a display. The default is 640x480 at 60 Hz, 800x525 with its porches.
 
     Parameters
     ----------
@@ -85,12 +85,11 @@ VGA = DisplayMode()
 
 @dataclass(frozen=True)
 class DisplayTiming:
-    """Position, whether it is in the picture, and both sync signals, for each cycle of the pixel clock.
+    """Position, a flag of the picture, and both sync signals, for each cycle of the pixel clock.
 
-    Cycle 0 is the first pixel below the picture, so that the blank lines come before the first frame. The
-    position counts the porches, too: x is below the line's total, y below the frame's total. The vertical
-    sync signal changes at the start of the horizontal pulse, so that its porches count from the last pixel's
-    end.
+    Cycle 0 is the first pixel below the picture. So the blank lines come before the first frame. The position
+    counts the porches, too: x is below the line's total, y below the frame's total. The vertical sync signal
+    changes at the start of the horizontal pulse. So its porches count from the last pixel's end.
 
     Parameters
     ----------

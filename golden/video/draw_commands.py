@@ -1,4 +1,4 @@
-"""Draw commands: lists of commands that are executed for every band, and their making from a mesh."""
+"""Draw commands: lists of commands that are executed for every band, and made from a mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _ONCE = (KINDS.index("transform"), KINDS.index("frame_constant"))
 
 @dataclass(frozen=True)
 class DrawCommands:
-    """Lists of commands in one memory; each ends with ``end``.
+    """Lists of commands in one memory. Each ends with ``end``.
 
     ================== ======================= ================== ============= =======================
     kind               index                   first              count         does
@@ -45,8 +45,8 @@ class DrawCommands:
     Raises
     ------
     ValueError
-        If a field does not fit, a kind is unknown, the last command is not ``end``, or a list begins at no
-        command.
+        If a field outgrows its word, a kind is unknown, the last command is not ``end``, or a list begins at
+        no command.
 
     Source: docs/theory/video.md#bands; [T] chapter 4.
     """
@@ -65,14 +65,14 @@ class DrawCommands:
             raise ValueError(f"a list must begin at a command, 0 to {len(self.words) - 1}, not {wrong}")
 
     def check(self, kind: str, **most: int) -> None:
-        """Refuse commands of a kind with an index or a range that goes past the end of what it is for.
+        """Refuse commands of a kind with an index or a range past the end of its elements.
 
         Parameters
         ----------
         kind : str
             One of `KINDS`.
         **most : int
-            ``index``: how many indices there are; ``range``: how many elements a range is of.
+            ``index``: number of indices. ``range``: number of elements that a range may take.
 
         Raises
         ------
@@ -92,7 +92,8 @@ class DrawCommands:
         cull: Sequence[int] = (),
         sets: Sequence[int] | None = None,
     ) -> "DrawCommands":
-        """A list for each preset: its constants, a transform of each part by its own slot, and the draws.
+        """A list for each preset, with its constants, a transform of each part by its own slot, and the
+        draws.
 
         Parameters
         ----------

@@ -24,12 +24,12 @@ from blysk.golden.video.vertex_unit import ScreenVertices, VertexTransform
 __all__ = ["BandPixels", "Drawing", "board_design", "turned"]
 
 _SHORTER = 1 - 2.0**-11
-"""Length of axes with several lights, so that no normal is longer than 1 after the matrix's roundings."""
+"""Length of axes with several lights. So no normal is longer than 1 after the matrix's roundings."""
 
 
 @dataclass(frozen=True)
 class BandPixels:
-    """Pixels of a band in the order in which they are drawn.
+    """Pixels of a band in the order of drawing.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ class BandPixels:
 class Drawing:
     """Bit-accurate model of drawing in bands: a mesh memory, its motion, lists of commands, a renderer.
 
-    A frame's vertices are transformed once; for every band all triangles are read, clipped to the lines of
-    the band, and shaded. As depth and colour of a pixel depend on its triangle and not on the clipping, the
-    bands together are the picture of the whole frame, to the bit.
+    A frame's vertices are transformed once. For every band all triangles are read, clipped to the lines of
+    the band, and shaded. Depth and colour of a pixel depend on its triangle alone. So the bands together are
+    the picture of the whole frame, to the bit.
 
     Parameters
     ----------
@@ -69,11 +69,12 @@ class Drawing:
     presets : tuple of tuple of FrameConstants
         Constants that the lists write, of each preset and material.
     renderer : Renderer
-        Renderer with a design whose ``x_bits`` and ``y_bits`` are those of `place_bits`.
+        Renderer with a design whose ``x_bits`` and ``y_bits`` come from `place_bits`.
     size : (int, int)
         Width and height of the picture.
     frames : tuple of FrameSettings
-        The whole picture for each preset, as spans are cut shorter for a steeper highlight.
+        The whole picture for each preset. Each preset has its own, because a steeper highlight needs shorter
+        spans.
     controls : Controls
         Angle and preset of each frame.
     lines : int
@@ -84,8 +85,8 @@ class Drawing:
     Raises
     ------
     ValueError
-        If the design is made for another size, the numbers of lists, presets and frames are not that of the
-        controls, or a command goes past the end of the slots, the materials, the vertices or the triangles.
+        If the design is made for another size, or the numbers of lists, presets and frames differ from the
+        controls'. If a command goes past the end of the slots, the materials, the vertices or the triangles.
 
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
@@ -116,7 +117,7 @@ class Drawing:
 
     @staticmethod
     def place_bits(size: tuple[int, int], lines: int) -> tuple[int, int]:
-        """Bits of a column and of a line of a band: ``x_bits`` and ``y_bits`` of the design."""
+        """Bits of a column and of a line of a band, ``x_bits`` and ``y_bits`` of the design."""
         return max((size[0] - 1).bit_length(), 1), max((lines - 1).bit_length(), 1)
 
     @classmethod
@@ -141,14 +142,14 @@ class Drawing:
         scenes : sequence of Scene
             The presets: scenes with the same mesh, camera and size, and different materials and lights.
         design : ShadingPipeline, optional
-            Shading; its ``x_bits`` and ``y_bits`` are replaced. By default `board_design` for the lights and
+            Shading. Its ``x_bits`` and ``y_bits`` are replaced. By default `board_design` for the lights and
             materials of the scenes.
         lines : int
             Number of lines of a band.
         axis : three floats
             Axis of the rotation.
         controls : Controls, optional
-            Buttons; by default every scene is a material of the controls.
+            Buttons. By default every scene is a material of the controls.
         transform : VertexTransform, optional
             Vertex unit.
         angle : float, optional
@@ -157,8 +158,8 @@ class Drawing:
         Raises
         ------
         ValueError
-            If a scene does not fit the design, the mesh the memory, or the camera the matrix; or triangles
-            do not serve the design, see `Renderer`.
+            If a scene does not fit the design, the mesh the memory, or the camera the matrix. If triangles do
+            not serve the design, see `Renderer`.
         """
         scene, transform = scenes[0], transform or VertexTransform()
         design = design or board_design(max(len(each.lights) for each in scenes), len(scene.materials))
@@ -278,7 +279,7 @@ def board_design(lights: int = 1, materials: int = 1) -> ShadingPipeline:
 
 
 def turned(scene: Scene, angle: int, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> Scene:
-    """The scene with its mesh turned by the code of an angle, in float64: what the frame should show."""
+    """The scene with its mesh turned by the code of an angle, in float64, as the frame should show it."""
     mesh = scene.mesh
     centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     turn = rotation(axis, Motion.radians(angle))

@@ -20,7 +20,7 @@ _BLOCK_WORDS = 512
 def block_rams(words: int, width: int) -> int:
     """Least number of block RAMs of an ECP5 (18 kbit, at most 36 bits wide) for a memory.
 
-    Blocks have 512 words of 36 bits, 1024 of 18, 2048 of 9, 4096 of 4, 8192 of 2 or 16384 of 1; the best
+    Blocks have 512 words of 36 bits, 1024 of 18, 2048 of 9, 4096 of 4, 8192 of 2 or 16384 of 1. The best
     shape is taken.
     """
     shapes = ((512, 36), (1024, 18), (2048, 9), (4096, 4), (8192, 2), (16384, 1))
@@ -55,8 +55,8 @@ class MeshMemory:
     """Contents of the memories of vertices and of triangles.
 
     Positions count from the middle of their mesh's box, in units in which the largest component is ONE.
-    Positions and normals are rounded to ``SQ(1, 17)``, so that the error of a position is at most 2^-18 of
-    half the box's longest side.
+    Positions and normals are rounded to ``SQ(1, 17)``. So the error of a position is at most 2^-18 of half
+    the box's longest side.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class MeshMemory:
         return _words(self.faces, self.index_bits)
 
     def world(self, part: Part) -> Mesh:
-        """The mesh of a part in world units, as it is stored."""
+        """The mesh of a part in world units, as the memory holds it."""
         chosen = slice(part.first, part.first + part.count)
         position = Fixed(COMPONENT, self.position[chosen]).values * part.scale + part.centre
         normal = self.normal[chosen] / np.linalg.norm(self.normal[chosen], axis=1, keepdims=True)
@@ -171,11 +171,11 @@ class MeshMemory:
         Parameters
         ----------
         blocks : int
-            Block RAMs that are left for the mesh.
+            Block RAMs for the mesh.
         screen_bits : int
             Bits of a screen vertex.
         vertices_per_triangle : float
-            Vertices over triangles: 0.5 for a closed mesh, and more for its seams.
+            Ratio of vertices to triangles: 0.5 for a closed mesh, and more for its seams.
         """
         best = 0
         for triangles in range(1, cls.LARGEST):

@@ -41,14 +41,13 @@ def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 class Motion:
     """Entries ``c0 + c1 cos a + c2 sin a`` of the matrices of turning meshes.
 
-    With any axis and camera, every entry of camera times rotation has this form, and so has every entry of
-    axes for normals times rotation. The sines of
-    ``(k + 1/2) 2 pi / 2^12`` are in a table of a quarter turn, 1024 words, in ``SQ(2, 16)``; due to the half
-    step the other quarters are its mirror images. An entry takes two products; their sum with c0 is rounded
-    to 20 fraction bits for offsets, to 16 for the other entries.
+    With any axis and camera, every entry of camera times rotation has this form. So has every entry of axes
+    for normals times rotation. A table of a quarter turn, 1024 words in ``SQ(2, 16)``, has the sines of
+    ``(k + 1/2) 2 pi / 2^12``. Due to the half step the other quarters are its mirror images. An entry takes
+    two products. Their sum with c0 is rounded to 20 fraction bits for offsets, to 16 for the other entries.
 
-    The error of an entry is at most `ENTRY_ERROR`: 2^-17 each for sine and cosine, times coefficients below
-    2; 2^-17 each for c1 and c2; 2^-21 for c0; and half a step for the rounding.
+    The error of an entry is at most `ENTRY_ERROR`. It is the sum of 2^-17 each for sine and cosine, times
+    coefficients below 2; 2^-17 each for c1 and c2; 2^-21 for c0; and half a step for the rounding.
 
     Parameters
     ----------
@@ -84,7 +83,7 @@ class Motion:
     ) -> "Motion":
         """Motion of a memory's parts: each turns around an axis through its own middle.
 
-        Each set of axes for normals has a slot for each part; the slots of the first set come first.
+        Each set of axes for normals has a slot for each part. The slots of the first set come first.
 
         Parameters
         ----------
@@ -97,9 +96,9 @@ class Motion:
         axis : three floats
             Axis of the rotation.
         unit : VertexTransform, optional
-            Vertex unit; only its ``scale_bits`` matter.
+            Vertex unit. Only its ``scale_bits`` matter.
         normal_axes : sequence of float64 arrays, shape (3, 3)
-            Sets of axes, by rows: normals come out in the frame of these. By default the world's.
+            Sets of axes, by rows. Normals come out in their frame. By default the world's frame.
 
         Raises
         ------
@@ -171,7 +170,7 @@ class Motion:
         Raises
         ------
         ValueError
-            If there is no slot of an index.
+            If an index has no slot.
         """
         if np.size(slot) and not 0 <= np.min(slot) <= np.max(slot) < self.slots:
             raise ValueError(f"slots are 0 to {self.slots - 1}, not {np.min(slot)} to {np.max(slot)}")

@@ -14,10 +14,10 @@ LANES = 4
 
 @dataclass(frozen=True)
 class Serialiser:
-    """Words of ten bits as five pairs each, from bit 0 on; bit 0 of a pair is sent first.
+    """Words of ten bits as five pairs each, from bit 0 on. Bit 0 of a pair is sent first.
 
-    An output cell sends both bits of a pair within one cycle of the serial clock (double data rate), so that
-    the serial clock is five times the pixel clock.
+    An output cell sends both bits of a pair within one cycle of the serial clock (double data rate). So the
+    serial clock is five times the pixel clock.
 
     Parameters
     ----------
@@ -47,5 +47,5 @@ class Serialiser:
         return (np.asarray(words)[:, np.newaxis] >> shifts & 3).reshape(-1, self.lanes)
 
     def bits(self, pairs: np.ndarray) -> np.ndarray:
-        """Bits of pairs in the order in which they are sent, shape (2 n, lanes)."""
+        """Bits of pairs in the order of sending, shape (2 n, lanes)."""
         return bits_of(pairs, 2).swapaxes(-1, -2).reshape(-1, self.lanes)

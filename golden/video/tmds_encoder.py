@@ -1,4 +1,4 @@
-"""TMDS encoder: a byte of colour as ten bits with few transitions and no direct current; and decoder."""
+"""TMDS encoder, a byte of colour as ten bits with few transitions and no direct current, and decoder."""
 
 from dataclasses import dataclass
 
@@ -10,10 +10,10 @@ BITS = 10
 """Bits of a word; bit 0 is sent first."""
 
 CONTROL_WORDS = (0b1101010100, 0b0010101011, 0b0101010100, 0b1010101011)
-"""Words outside the picture, by ``c0 + 2 c1``: with seven transitions or more, unlike words of colour."""
+"""Words outside the picture, by ``c0 + 2 c1``. Unlike words of colour they have seven transitions or more."""
 
 CLOCK_WORD = 0b1111100000
-"""What the clock's lane repeats: a word begins with its falling edge."""
+"""Word that the clock's lane repeats. A word begins with its falling edge."""
 
 MAX_DISPARITY = 8
 """Largest running disparity after a word: ones minus zeros sent since the last control word."""
@@ -26,13 +26,13 @@ def bits_of(words: np.ndarray, count: int = BITS) -> np.ndarray:
 
 @dataclass(frozen=True)
 class TmdsEncoder:
-    """Ten bits for each byte, after figure 3-5 of DVI 1.0: a step for few transitions, then one for balance.
+    """Ten bits for each byte, after figure 3-5 of DVI 1.0: a step for few transitions, a step for balance.
 
-    Bit 0 of the *chain* is bit 0 of the byte; each further bit is the bit of the byte XOR or XNOR the chain's
+    Bit 0 of the *chain* is bit 0 of the byte. Each further bit is the bit of the byte XOR or XNOR the chain's
     bit before. XNOR is taken if the byte has more than four ones, or four ones and bit 0 is 0. Bit 8 is 1 for
-    XOR, 0 for XNOR. Then the eight bits are sent as they are, or inverted with bit 9 set, so that the running
-    disparity comes nearer to 0. In a control period one of `CONTROL_WORDS` is sent, and the disparity becomes
-    0.
+    XOR, 0 for XNOR. Then the eight bits are sent as they are, or inverted with bit 9 set. The choice brings
+    the running disparity nearer to 0. In a control period one of `CONTROL_WORDS` is sent, and the disparity
+    becomes 0.
 
     Every word decodes to its byte. The running disparity stays even and within `MAX_DISPARITY` for all data.
 
@@ -42,7 +42,7 @@ class TmdsEncoder:
     latency = 3
 
     def chain(self, byte: np.ndarray) -> np.ndarray:
-        """The nine bits before the balance, any shape of bytes: bits 0 to 7, and 8 for XOR."""
+        """The nine bits before the balance, bits 0 to 7, and 8 for XOR, for any shape of bytes."""
         bits = bits_of(byte, 8)
         ones = bits.sum(-1)
         use_xnor = (ones > 4) | ((ones == 4) & (bits[..., 0] == 0))
@@ -101,7 +101,7 @@ class TmdsEncoder:
         return np.where(active, word[data, before], np.take(CONTROL_WORDS, control))
 
     def decode(self, words: np.ndarray) -> np.ndarray:
-        """Bytes of words that are not of a control period, any shape."""
+        """Bytes of words outside control periods, any shape."""
         bits = bits_of(words)
         chain = bits[..., :8] ^ bits[..., 9:]
         byte = chain.copy()

@@ -19,7 +19,8 @@ class TriangleAssembly:
     """Triangles with no corner outside that may cover the centre of a scanline of the band.
 
     A triangle is *rejected* if no scanline from ``top`` to ``bottom - 1`` has its centre between the highest
-    corner, included, and the lowest, excluded: exactly the triangles that `VertexSort` would find empty by y.
+    corner, included, and the lowest, excluded. These are exactly the triangles that `VertexSort` would find
+    empty by y.
 
     Parameters
     ----------

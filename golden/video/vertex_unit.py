@@ -30,7 +30,7 @@ class Matrix:
     offset : int64 array, shape (3,)
         Offsets of these rows, codes of `OFFSET`.
     normal : int64 array, shape (3, 3)
-        A rotation, codes of `ENTRY`: of the mesh alone, or into the frame of a light after that.
+        Rotation of the mesh, codes of `ENTRY`. It may be followed by the rotation into the frame of a light.
     """
 
     position: np.ndarray
@@ -57,7 +57,7 @@ class ScreenVertices:
         N/W, codes of `ATTRIBUTE`.
     outside : bool array, shape (V,)
         Whether the vertex is nearer than the near plane, at `VertexTransform.FAR` near planes or farther, or
-        beside the grid; its other words are then invalid.
+        beside the grid. Its other words are then invalid.
     """
 
     x: np.ndarray
@@ -76,10 +76,10 @@ class ScreenVertices:
 class VertexTransform:
     """``x = X/W``, ``y = Y/W``, ``1 - 1/W`` and ``N/W`` of vertices by a matrix.
 
-    W is in units of the near plane's distance: it is 1 on the near plane. A vertex with W under 1, or with W
-    of `FAR` or more, is outside. X/W and Y/W are in units of ``2^scale_bits`` pixels from the middle of the
-    grid. The depth ``1 - 1/W`` and N/W are linear on the screen; the scale of N/W is that of the frame, the
-    same for all triangles, so that a vertex is transformed once for all of its triangles.
+    W is in units of the near plane's distance, so it is 1 on the near plane. A vertex with W under 1, or with
+    W of `FAR` or more, is outside. X/W and Y/W are in units of ``2^scale_bits`` pixels from the middle of the
+    grid. The depth ``1 - 1/W`` and N/W are linear on the screen. N/W has the same scale for all triangles of
+    the frame. So a vertex is transformed once for all of its triangles.
 
     ============ ============ =====================================================================
     word         format       why
@@ -97,19 +97,18 @@ class VertexTransform:
     N/W          SQ(1, 23)    ``N' r' 2^-s``, rounded to 26 fraction bits before the shift, then cut
     ============ ============ =====================================================================
 
-    Error bounds, for the given entries. The error of a coordinate of a vertex inside is at most `ERROR` steps
-    of the grid: the last rounding; an eighth of `wide_product.LOST`; and, times ``2^17``, the roundings of X
-    (2^-26 and the cut 2^-25), the reciprocal's error times X' (at most 8) and the cut of m, 2^-25, times 4.
-    The error of the depth is at most `DEPTH_ERROR`: 1 for the cut, plus half of the reciprocal's error and of
-    m's cut in 2^-25. The error of a component of N/W is at most `NORMAL_ERROR`: 2^-18 for N', 2^-17 for r'
-    (whose error only scales N/W of the vertex), 2^-27 and 2^-23 for N/W.
+    Error bounds, for the given entries, are derived in docs/theory/bounds.md#vertices:
+
+    - `ERROR` steps of the grid for a coordinate of a vertex inside;
+    - `DEPTH_ERROR` for the depth;
+    - `NORMAL_ERROR` for a component of N/W.
 
     The unit takes 29 multiplications.
 
     Parameters
     ----------
     scale_bits : int
-        Logarithm to base 2 of the pixels of 1 in X/W, 4 to 11; 9 is for pictures up to 1024 pixels wide.
+        Logarithm to base 2 of the pixels of 1 in X/W, 4 to 11. 9 is for pictures up to 1024 pixels wide.
     grid : Grid
         Fraction bits of the coordinates.
 
