@@ -1,4 +1,4 @@
-"""Shared parts of this folder's commands: progress that can be interrupted, and the exit status."""
+"""Shared parts of the commands: progress that can be interrupted, and the exit status."""
 
 import contextlib
 import io
@@ -15,32 +15,32 @@ from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 __all__ = ["progress", "resumable", "run", "steps"]
 
 _SECONDS = 10
-"""Seconds from a line of `progress` to the next, where there is no terminal."""
+"""Seconds between two lines of `progress` without a terminal."""
 
 Part = TypeVar("Part")
 
 
 class _Lines(tqdm):
-    """Progress without a terminal: a line on standard error each `_SECONDS`, and none of shorter work."""
+    """Progress without a terminal: a line on standard error every `_SECONDS`. Shorter work prints none."""
 
     def __init__(self, *arguments, **options):
         self._printed = time.monotonic()
         super().__init__(*arguments, file=io.StringIO(), ncols=0, **options)
 
     def display(self, msg=None, pos=None):
-        """Print the state, if the last line is long ago; the empty state at the end is left out."""
+        """Print the state if the last line is old enough. The empty state at the end is not printed."""
         if msg is None and time.monotonic() - self._printed >= _SECONDS:
             self._printed = time.monotonic()
             print(self, file=sys.stderr, flush=True)
 
 
 def progress(parts: Iterable[Part] | None = None, *, total: int, unit: str) -> "tqdm[Part]":
-    """Progress of long work: a bar on a terminal, else a line on standard error each 10 seconds.
+    """Progress of long work: a bar on a terminal, else a line on standard error every 10 seconds.
 
     Parameters
     ----------
     parts : iterable, optional
-        The work, over which the bar is then an iterator; else ``update`` tells of each part.
+        The work. The bar then iterates over it. Without it, call ``update`` after each part.
     total : int
         Number of the parts.
     unit : str
@@ -52,9 +52,9 @@ def progress(parts: Iterable[Part] | None = None, *, total: int, unit: str) -> "
 
 @contextlib.contextmanager
 def steps() -> Iterator[Callable[[str], None]]:
-    """Show the step of long work; call the context's value with its name.
+    """Show the steps of long work. Call the context's value with the name of each step.
 
-    On a terminal a line changes; else each step is a line on standard error.
+    On a terminal one line changes. Else each step is a line on standard error.
     """
     if sys.stderr.isatty():
         with tqdm(bar_format="{desc}", leave=False) as bar:
@@ -65,9 +65,9 @@ def steps() -> Iterator[Callable[[str], None]]:
 
 @contextlib.contextmanager
 def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
-    """Show the progress of work whose parts are kept; call the context's value after each part.
+    """Show the progress of work whose parts are kept. Call the context's value after each part.
 
-    An interrupt ends the command with status 130 and a line that says how many parts are kept.
+    An interrupt ends the command with status 130, and a line with the number of parts that are kept.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def run(command: click.Command, name: str, arguments: Sequence[str] | None) -> i
     Returns
     -------
     int
-        Exit status of the command; 1 if a simulation or a tool fails, 2 for bad input.
+        Exit status of the command: 1 if a simulation or a tool fails, 2 for bad input.
     """
     try:
         return command.main(arguments, prog_name=name, standalone_mode=False)

@@ -1,11 +1,11 @@
-"""Texts: of files, however they were saved; of numbers and colours."""
+"""Texts of files in any encoding and with any line ends, and texts of numbers and colours."""
 
 import codecs
 import re
 
 __all__ = ["color_of_text", "is_wide", "numbers_of_text", "plain_text"]
 
-# UTF-32 before UTF-16, whose mark of little-endian files is the first half of the other's.
+# UTF-32 first: the little-endian mark of UTF-16 is the first half of that of UTF-32.
 _MARKS = {
     codecs.BOM_UTF32_LE: "utf-32",
     codecs.BOM_UTF32_BE: "utf-32",
@@ -22,21 +22,21 @@ def is_wide(data: bytes) -> bool:
 def plain_text(data: bytes, errors: str = "strict") -> str:
     r"""The text of a file's bytes: UTF-8, or in the encoding of its byte order mark.
 
-    Each line ends with ``\n``, also where the file has ``\r\n`` or a lone ``\r``. Byte order marks are
-    removed everywhere, because joined files have them inside. The bytes 0 and 26, which old programs put at
-    the end, are removed, too.
+    Each line ends with ``\n``, also where the file has ``\r\n`` or a lone ``\r``. Marks are removed
+    everywhere, because joined files have them inside. The bytes 0 and 26 at the end, from old programs, are
+    removed too.
 
     Parameters
     ----------
     data : bytes
         Contents of the file.
     errors : {"strict", "replace"}
-        What happens to bytes that are no text.
+        What happens to bytes that are not text.
 
     Raises
     ------
     UnicodeDecodeError
-        If bytes are no text, and ``errors`` is ``"strict"``.
+        If bytes are not text, and ``errors`` is ``"strict"``.
     """
     encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
     text = data.decode(encoding, errors).replace("\ufeff", "").rstrip("\0\x1a")
@@ -44,23 +44,23 @@ def plain_text(data: bytes, errors: str = "strict") -> str:
 
 
 def numbers_of_text(text: str) -> list[float]:
-    """Numbers with commas between them, by the rules of `float`.
+    """Read numbers with commas between them, by the rules of `float`.
 
     Raises
     ------
     ValueError
-        If a part is no number.
+        If a part is not a number.
     """
     return [float(part) for part in text.split(",")]
 
 
 def color_of_text(text: str) -> list[float]:
-    """Channels of ``#rrggbb``, 0 to 1 each, or of numbers with commas; one number is all three channels.
+    """Read the channels of ``#rrggbb``, 0 to 1 each, or of numbers with commas; one number is all three.
 
     Raises
     ------
     ValueError
-        If the text is no colour.
+        If the text is not a colour.
     """
     if re.fullmatch("#[0-9a-fA-F]{6}", text):
         return [int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)]

@@ -1,13 +1,13 @@
-"""Exceptions: for bad input a thing, a reason, a remedy; for simulations a line."""
+"""Exceptions. Bad input has a thing, a reason and a remedy; a failed simulation has a line."""
 
 __all__ = ["CompilerMissing", "InputError", "OptionError", "SimulationError", "one_line"]
 
 
 def one_line(text: str, most: int = 1000) -> str:
-    """Text of a user, a file or another program, fit for a message: in one line, and not too long.
+    """Make a text of a user, a file or another program fit for a message: one line, and not too long.
 
-    Characters that cannot be printed (line breaks, escape sequences of a terminal, bytes that are no text)
-    become ``?``.
+    Characters that cannot be printed become ``?``: line breaks, escape sequences of a terminal, bytes that
+    are not text.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class InputError(Exception):
     reason : str
         Why it cannot be used.
     remedy : str
-        An action that mends it.
+        An action that corrects it.
     """
 
     def __init__(self, thing: str, reason: str, remedy: str):
@@ -49,14 +49,14 @@ class InputError(Exception):
 class OptionError(InputError):
     """Bad value of an option, by the option's name in Python.
 
-    The value may come from a scene file or from the command line; `at` makes the error that names that place.
+    The value may come from a scene file or from the command line. `at` makes the error that names this place.
 
     Parameters
     ----------
     option : str
         Name of the option.
     value : object
-        Its value; if it is an empty text, the message shows the name alone.
+        Its value. If this is an empty text, the message shows only the name.
     reason, remedy : str
         As in `InputError`.
     """
@@ -74,11 +74,11 @@ class OptionError(InputError):
 
 
 class SimulationError(Exception):
-    """A simulation failed: the component broke the rules of streams or got stuck, or an engine cannot run it.
+    """A simulation failed: the component broke the rules of streams, it got stuck, or no engine can run it.
 
     The message is one line.
     """
 
 
 class CompilerMissing(SimulationError):
-    """No C++ compiler works; the message says what was tried and what to do."""
+    """No C++ compiler works. The message says what was tried, and what to do."""

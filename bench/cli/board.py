@@ -118,7 +118,7 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
 
 
 def _recorded(path: str | None) -> dict[str, Any]:
-    """Figures of a JSON file, empty if there is no such file yet; checked before long work."""
+    """Figures of a JSON file, checked before long work; empty if the file does not exist yet."""
     if path is None:
         return {}
     check_writable(path)

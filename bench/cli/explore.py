@@ -32,7 +32,7 @@ class _Some(click.ParamType):
         return self.name
 
     def convert(self, value, param, ctx):
-        """The values, each once; `InputError` if one is unknown."""
+        """The values without repetitions; `InputError` if a value is unknown."""
         if isinstance(value, tuple):
             return value
         known = {str(one): one for one in self.values}
@@ -44,7 +44,7 @@ class _Some(click.ParamType):
 
 
 class _Error(click.ParamType):
-    """Type of an option: a limit of the largest error, in LSB."""
+    """Type of an option: limit of the largest error, in LSB."""
 
     name = "LSB"
 

@@ -134,7 +134,7 @@ def command(
     from blysk.bench.tools.fpga import about, count_by_unit, pipelines_of, place, units_of
 
     designs = list(units_of(units) if units else pipelines_of(chosen, lights, every_method, build))
-    # A missing tool is told of before the work.
+    # Report a missing tool before the work.
     about(family)
     if by_unit:
         count_by_unit(designs, family, not keep_registers, figures)

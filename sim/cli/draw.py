@@ -1,4 +1,4 @@
-"""What ``blysk render`` does after it has checked its options."""
+"""The work of ``blysk render``, after its options are checked."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -38,7 +38,7 @@ def draw_frame(
     verbose: bool,
     start: float,
 ) -> Iterable[str]:
-    """Draw a frame, and write its files all or none.
+    """Draw a frame, and write all its files or none.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def draw_turntable(
     address: str | None,
     start: float,
 ) -> Iterable[str]:
-    """Draw the frames of a turntable; each is written as it is done, and stays after an interrupt.
+    """Draw the frames of a turntable. Each frame is written when it is done, and stays after an interrupt.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ def draw_turntable(
     gif : str
         File of the animation.
     jobs : int or None
-        Processes; by default as many as there are processors.
+        Number of processes; by default the number of processors.
     address : str or None
-        Address of a Dask scheduler, whose workers replace the processes.
+        Address of a Dask scheduler. Its workers replace the processes.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def _stages() -> tqdm:
 
 @contextmanager
 def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
-    """Remove files if another output of the block cannot be written; an interrupt leaves them."""
+    """Remove the files if another output of the block cannot be written. An interrupt leaves them."""
     try:
         yield
     except InputError:
@@ -147,7 +147,7 @@ def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
 
 
 def _show_stage(bar: tqdm, text: str) -> None:
-    """Show a stage of the work; for a stage that may take long, print its time, also without a terminal."""
+    """Show a stage of the work. Print the time of a long stage, also without a terminal."""
     bar.set_description_str(text)
     if text == SPECIALISING:
         print(_SPECIALISE, flush=True)
@@ -172,7 +172,7 @@ def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
 def _animation(
     ready: Rendering, pictures: Sequence[str], jobs: int | None, address: str | None, drawn: list[str]
 ) -> dict[str, Any]:
-    """Render and write the frames of a turntable, append their names to ``drawn``; figures of all."""
+    """Render and write the frames of a turntable, and append their names to ``drawn``. Return the figures."""
     start = perf_counter()
     smallest = ready.specialisation
     animation = Animation(smallest.scenes[0], smallest.design, ready.engine, ready.design)

@@ -1,4 +1,4 @@
-"""A command whose file is imported when it runs: the list of commands does not wait for all of them."""
+"""A command whose file is imported when it runs, so that the list of commands is quick."""
 
 from importlib import import_module
 
@@ -8,14 +8,14 @@ __all__ = ["LazyCommand"]
 
 
 class LazyCommand(click.Command):
-    """Place of a command in another file.
+    """A command that stands in another file.
 
     Parameters
     ----------
     line : str
         What the command does, for the list of commands.
     module : str
-        The file; it has the command by the name ``command``.
+        Module with the command, which has the name ``command``.
     """
 
     def __init__(self, line: str, module: str):

@@ -1,4 +1,4 @@
-"""The command line: commands of this folder, and those of installed packages."""
+"""The command line: commands of this folder, and commands of installed packages."""
 
 import os
 import re
@@ -34,22 +34,22 @@ _COMMANDS = {
 
 
 class _Group(click.Group):
-    """Group of this folder's commands and those that installed packages register under ``blysk.commands``.
+    """Group of this folder's commands, and of commands that packages register under ``blysk.commands``.
 
-    Layers above this one add their commands in this way.
+    Higher layers add their commands in this way.
     """
 
     def list_commands(self, ctx):
         return sorted({*_COMMANDS, *_installed()})
 
     def get_command(self, ctx, cmd_name):
-        # Before the import, as Matplotlib looks for its folder when it is imported.
+        # Before the import: Matplotlib looks for its folder when it is imported.
         provide_caches()
         found = _command(cmd_name)
         return found.load() if isinstance(found, LazyCommand) else found
 
     def format_commands(self, ctx, formatter):
-        """The list of commands, by their lines: no command is loaded."""
+        """Write the list of commands from their lines, without loading a command."""
         found = {name: _command(name) for name in self.list_commands(ctx)}
         with formatter.section("Commands"):
             formatter.write_dl([(name, one.get_short_help_str(80)) for name, one in found.items() if one])
@@ -57,14 +57,14 @@ class _Group(click.Group):
 
 @cache
 def _installed() -> dict[str, "EntryPoint"]:
-    """Commands of installed packages by name; to find them reads the metadata of every package."""
+    """Commands of installed packages by name. This reads the metadata of every package."""
     from importlib.metadata import entry_points
 
     return {entry.name: entry for entry in entry_points(group="blysk.commands")}
 
 
 def _command(name: str) -> click.Command | None:
-    """A command of this folder or of an installed package, or its place; ``None`` if there is none."""
+    """A command of this folder or of an installed package, perhaps not loaded; ``None`` if there is none."""
     if name in _COMMANDS:
         return _COMMANDS[name]
     return _installed()[name].load() if name in _installed() else None
@@ -99,7 +99,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _without_traceback(text: str) -> str:
-    """Another program's output, with a traceback cut to its last line without the exception's name."""
+    """Output of another program. A traceback is cut to its last line, without the name of the exception."""
     start, mark, rest = text.partition("Traceback (most recent call last)")
     if not mark:
         return text
@@ -108,21 +108,24 @@ def _without_traceback(text: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit status.
+    """Run the command line, and return the exit status.
 
-    0: done. 1: a simulation went wrong. 2: bad input, or no compiler, memory or disk space, in one line on
-    standard error. 130: interrupted, by a terminal or by SIGTERM. 141: standard output is a closed pipe.
+    - 0: done.
+    - 1: a simulation failed.
+    - 2: bad input, or no compiler, memory or disk space; standard error has one line.
+    - 130: interrupted, by a terminal or by SIGTERM.
+    - 141: standard output is a closed pipe.
     """
 
     def show(message, *_):
-        # Between the lines of a bar, if there is one.
+        # A progress bar may be shown: `write` puts the line above it.
         from tqdm import tqdm
 
         tqdm.write(f"blysk: warning: {one_line(str(message))}", file=sys.stderr)
 
-    # Models in the cache leave components that nothing elaborates; some live to the end of the program.
+    # Cached models leave components that nothing elaborates. Some of these live until the program ends.
     warnings.filterwarnings("ignore", message=r"<blysk\.")
-    # A file's name may have letters that the terminal's encoding lacks, or bytes that are none.
+    # The name of a file may have letters that the terminal cannot show, or bytes that are not text.
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -130,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("default", RuntimeWarning)
             warnings.showwarning = show
             status = _run(sys.argv[1:] if arguments is None else list(arguments))
-        # A closed pipe or full disk behind standard output is found out here, not at exit.
+        # Here, not at exit, a closed pipe or a full disk behind standard output raises its error.
         print(end="", flush=True)
         return status
     except (click.Abort, KeyboardInterrupt):
@@ -165,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _option_error(error: OptionError) -> InputError:
-    """The error of an option in the words of the command line."""
+    """The error of an option, with the name that the option has on the command line."""
     option = error.option
     flag = (option.removesuffix("s") if option.endswith("lights") else option).replace("_", "-")
     return error.at(f"--{flag} {error.value}".strip())
@@ -173,7 +176,7 @@ def _option_error(error: OptionError) -> InputError:
 
 @contextmanager
 def _termination_as_interrupt() -> Iterator[None]:
-    """Treat SIGTERM as an interrupt: else workers would outlive this process, and half-written files stay."""
+    """Treat SIGTERM as an interrupt, so that workers end and no half-written files stay."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -185,5 +188,5 @@ def _termination_as_interrupt() -> Iterator[None]:
 
 
 def _give_up_output() -> None:
-    """Send standard output to the null device, so that its buffer raises no second error at exit."""
+    """Send standard output to the null device. Then its buffer raises no second error at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -40,9 +40,9 @@ def _click_option(name: str, option: Option) -> Callable[[Command], Command]:
 def options_of(table: Mapping[str, Option]) -> Callable[[Command], Command]:
     """Decorator of a command that adds the options of a table.
 
-    The options have no defaults here: the Python interface sets the values that are not given. An option of
-    lights takes the numbers of one, and is repeated for more: ``--light``, ``--point-light``,
-    ``--spot-light``.
+    The options have no defaults here, because the Python interface sets the missing values. An option of
+    lights (``--light``, ``--point-light``, ``--spot-light``) takes the numbers of one light. Repeat it for
+    more lights.
     """
 
     def decorate(command: Command) -> Command:
@@ -69,7 +69,7 @@ def given_options(context: click.Context, names: Iterable[str]) -> dict[str, Any
 
 
 def _values(context: click.Context, name: str) -> Any:
-    """Value of an option; of an option of lights, the lights."""
+    """Value of an option; for an option of lights, the lights."""
     value, kind = context.params[name], SCENE[name].kind if name in SCENE else None
     if not (isinstance(kind, Lights) and isinstance(value, tuple)):
         return value
@@ -84,5 +84,5 @@ def _values(context: click.Context, name: str) -> Any:
 
 
 def _flag(name: str) -> str:
-    """Flag of an option; that of one light for an option of lights."""
+    """Flag of an option. An option of lights has the flag of a single light."""
     return f"--{name.removesuffix('s') if name in LIGHTS else name}".replace("_", "-")

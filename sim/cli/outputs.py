@@ -14,12 +14,12 @@ __all__ = ["animation_paths", "check_outputs"]
 def check_outputs(
     inputs: Sequence[str], pictures: Sequence[str | None], others: Sequence[str | None]
 ) -> None:
-    """Refuse an output that cannot be written, or that is another output, or read by the run.
+    """Refuse an output that cannot be written, that is also another output, or that the run reads.
 
     Parameters
     ----------
     inputs : sequence of str
-        Files that are read, as far as they are known; a mesh names others.
+        Known files that the run reads. A mesh may name more.
     pictures, others : sequences of str or None
         Files to be written.
 
@@ -45,11 +45,11 @@ def animation_paths(output: str, count: int, others: Mapping[str, str | None]) -
     Parameters
     ----------
     output : str
-        Name from which they are made.
+        Name from which the names are made.
     count : int
         Number of frames.
     others : dict
-        Output files of options that are for a single frame only, by option.
+        Output files of options that only a single frame has, by option.
 
     Raises
     ------

@@ -80,7 +80,7 @@ Keys of a scene file (only mesh.file is required):
 @click.option("--json", "figures", type=OutputFile(), help="JSON file with every figure.")
 @options_of(RENDERING)
 @click.option(
-    "--vcd", type=OutputFile(), help="Waveforms of the engine pysim; the default size is then 160x120."
+    "--vcd", type=OutputFile(), help="Write waveforms of the engine pysim. The default size is then 160x120."
 )
 @click.option(
     "--frames",
@@ -99,7 +99,7 @@ Keys of a scene file (only mesh.file is required):
 @click.option("-v", "--verbose", is_flag=True, help="Print every figure, not only the main ones.")
 @click.pass_context
 def command(context, mesh, engine, output, comparison, figures, vcd, frames, jobs, address, verbose, **_):
-    """Render a mesh or a scene file; `_HELP` is the text that users see."""
+    """Render a mesh or a scene file. Users see the text `_HELP`."""
     start = perf_counter()
     if not Path(mesh).stem:
         raise InputError(f"MESH {mesh!r}", "is not a file name", "give a mesh file, a scene file, or teapot")
@@ -107,7 +107,7 @@ def command(context, mesh, engine, output, comparison, figures, vcd, frames, job
     if vcd and engine == "cxxrtl":
         raise InputError("--vcd", "the engine cxxrtl writes no waveforms", "use --engine pysim")
     settings = rendering_settings(mesh, given, vcd)
-    # After the checks of options: what draws takes long to import.
+    # After the checks of options, because these imports take long.
     from blysk.sim.cli.outputs import animation_paths, check_outputs
     from blysk.sim.frames.workers import check_address
 

@@ -70,7 +70,7 @@ def command(context, name, output, testbench, **_):
     beside = [f"{output[:-2]}{suffix}" for suffix in DOCUMENTS] if output and build.bus != "native" else []
     check_outputs([], pictures=[], others=[output, *beside])
     check_beside(beside)
-    # After the checks of options: the hardware's description takes a second to import.
+    # After the checks of options, because the hardware's description takes a second to import.
     from blysk.sim.api.bus_documents import documents_of
     from blysk.sim.api.verilog import header_of, verilog_and_unit
     from blysk.sim.frames.testbench import check_folder, write_testbench

@@ -41,13 +41,13 @@ _REMEDIES = {
     "out_of_range_spans": "their pixels are wrong: use another method, or divide the triangles",
     "sharp_lobes": "use method chord-local",
 }
-"""What helps against a count; after a semicolon."""
+"""Remedy for a count; it follows a semicolon."""
 
 _WARNINGS = (
     *("opposed_faces", "repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals"),
     *("out_of_range_spans", "far_triangles", "sharp_lobes"),
 )
-"""Counts that may come from a fault of the mesh or the design."""
+"""Counts that may show a fault of the mesh or the design."""
 
 
 def _line(name: str, text: str) -> str:
@@ -55,7 +55,7 @@ def _line(name: str, text: str) -> str:
 
 
 def _model(figures: Mapping[str, Any]) -> str:
-    """Reflection model, with its exponent or roughness if it has one."""
+    """Reflection model, with its exponent or roughness."""
     parameters = ((name, figures[name]) for name in ("exponent", "roughness"))
     return ", ".join([figures["model"], *(f"{name} {value:.4g}" for name, value in parameters if value)])
 
@@ -65,7 +65,7 @@ def _triangles(figures: Mapping[str, Any]) -> str:
 
 
 def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """Lines of a frame's figures: those of `frame_figures`, with the mesh's name and its own counts."""
+    """Lines of all figures of a frame, from `frame_figures` with the mesh's name and counts."""
     materials = f", materials {figures['materials']}" if figures["materials"] > 1 else ""
     yield _line("mesh", f"{figures['mesh']}, {figures['width']}x{figures['height']}")
     yield _line("model", f"{_model(figures)}, lights {figures['lights']}{materials}")
@@ -90,7 +90,7 @@ def frame_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 
 def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """A frame's main figures in at most eight lines; `frame_lines` has all of them."""
+    """The main figures of a frame, in at most eight lines. `frame_lines` has all figures."""
     yield _line(
         "mesh",
         f"{figures['mesh']}, {_triangles(figures)}, {figures['width']}x{figures['height']}",
@@ -125,7 +125,7 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 
 def animation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """Lines of an animation's figures: those of `animation_figures`, with the mesh's name and counts."""
+    """Lines of all figures of an animation, from `animation_figures` with the mesh's name and counts."""
     size = f"{figures['width']}x{figures['height']}"
     rate = figures["frame_count"] / figures["seconds"]["frames"]
     yield _line("mesh", f"{figures['mesh']}, {size}, {_triangles(figures)}")
@@ -142,7 +142,7 @@ def animation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 
 def specialisation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """Lines of `saving_figures`, with the cycles and `difference_figures` where both frames are known."""
+    """Lines of `saving_figures`. If both frames are known, cycles and `difference_figures` follow."""
     for reduction in figures["reductions"]:
         saves = [f"{count:,} {name.replace('_', ' ')}" for name, count in reduction["saves"].items() if count]
         yield _line("left out", f"{reduction['reason']}; saves {', '.join(saves) or 'nothing'}")
@@ -176,12 +176,12 @@ def _bound(figures: Mapping[str, Any]) -> str:
     if bound is None:
         return "no bound is known"
     where = " where the same triangle shows" if "geometry" in figures else ""
-    # Rounded up: a bound stays one.
+    # A bound is rounded up, so that it stays a bound.
     return f"bound {math.ceil(100 * bound - 1e-6) / 100:.2f}{where}"
 
 
 def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:
-    """What the largest error and the bound leave out."""
+    """The pixels that the largest error and the bound leave out."""
     count = figures["border_pixels"]
     if count:
         most = max(figures[f"{name}_error"]["border_lsb"] for name in ("total", "method"))
@@ -225,7 +225,7 @@ def _remedy(key: str) -> str:
 
 
 def _ignored_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """What a mesh file has that changes the picture and was not read, in one line."""
+    """One line of everything in a mesh file that changes the picture and was not read."""
     if figures.get("ignored"):
         yield _line("ignored", "; ".join(figures["ignored"]))
 
