@@ -24,7 +24,7 @@ def model_of(method: str) -> str:
 
     It is ``cosquad``, the documents'. A method whose highlights come from a table at any rate has ``blinn``.
     """
-    return "blinn" if (METHODS | PUBLISHED)[method].TAKES_VECTORS else "cosquad"
+    return "blinn" if (METHODS | PUBLISHED)[method].needs_table else "cosquad"
 
 
 _MODELS = ("cosquad7", "cosquad_lin", "lyon3_refitted", "exp", "blinn_product", "blinn")

@@ -27,12 +27,12 @@ class Spans:
     material : int array, shape (spans,), optional
         Index of the material; empty: 0 for all.
     values : SpanValues, optional
-        Values of each light, for methods with `Interpolator.TAKES_VALUES`, which read no normals.
+        Values of each light, for methods that read no normals, see `LocalChordInterpolator`.
     factors : int64 array, shape (spans, factors, 3), optional
         For spans with values: codes of the factors of the lights in `Design.factors`, in the format of N·L.
     vectors : SpanVectors, optional
-        Vectors at the first pixel and their step, for methods with `Interpolator.TAKES_VECTORS`, which read
-        no normals.
+        Vectors at the first pixel and their step, for methods that read no normals, see
+        `QuotientInterpolator`.
     """
 
     x: np.ndarray

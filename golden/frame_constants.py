@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,9 +24,11 @@ __all__ = [
     "LOBE_ADDRESS",
     "MATERIAL_ADDRESS",
     "MAX_MATERIALS",
+    "NOT_READ",
     "THRESHOLD_ADDRESS",
-    "VECTOR_MEANINGS",
+    "UNIT_VECTORS",
     "FrameConstants",
+    "LightMeanings",
     "address_table",
     "by_material",
     "writes_of",
@@ -265,12 +268,33 @@ _MEANINGS = {
     "specular": "specular colour, red green blue, UQ(11, 6)",
 }
 
-VECTOR_MEANINGS = {
-    "normals": {"direction": "unit vector to the light", "halfway": "unit half-way vector"},
-    "vectors": {"direction": "sin a, 0, cos a of the light's frame", "halfway": "not read"},
-    "values": {"direction": "not read", "halfway": "not read"},
-}
-"""Meanings of the vectors of a light, by the kind of span, see `Design.span_members`."""
+
+class LightMeanings(NamedTuple):
+    """Words for the vectors of a light among the frame constants.
+
+    Parameters
+    ----------
+    direction, halfway : str
+        Meaning of L and of H.
+    one : str
+        Code of 1.
+    """
+
+    direction: str
+    halfway: str
+    one: str = "2^17 - 1"
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """Meanings by the names of the fields."""
+        return {"direction": self.direction, "halfway": self.halfway}
+
+
+UNIT_VECTORS = LightMeanings("unit vector to the light", "unit half-way vector")
+"""Meanings for methods of normals."""
+
+NOT_READ = LightMeanings("not read", "not read")
+"""Meanings for methods that read no vector of a light."""
 
 
 def by_material(constants: FrameConstants | Sequence[FrameConstants]) -> list[FrameConstants]:
@@ -284,7 +308,7 @@ def address_table(
     banks: int = 0,
     threshold: Format | None = None,
     loads_tables: bool = False,
-    members: str = "normals",
+    of_a_light: LightMeanings = UNIT_VECTORS,
     axes: Sequence[str] = (),
 ) -> list[str]:
     """Lines of text with the address and format of every frame constant of a pipeline.
@@ -299,12 +323,12 @@ def address_table(
         Format of the threshold of each table; ``None``: tables have none.
     loads_tables : bool
         Whether tables are loaded.
-    members : str
-        Kind of span, see `Design.span_members`.
+    of_a_light : LightMeanings
+        Words for L and H, see `Interpolator.light_meanings`.
     axes : sequence of str
         Names of the axes that each further light has, see `FrameConstants.axes`.
     """
-    vectors = {name: f"{text}, SQ(1, 17)" for name, text in VECTOR_MEANINGS[members].items()}
+    vectors = {name: f"{text}, SQ(1, 17)" for name, text in of_a_light.texts.items()}
     meanings = _MEANINGS | vectors
     rows = [(first, count, name) for name, (first, count) in FIELDS_OF_A_FRAME.items()]
     if materials > 1:

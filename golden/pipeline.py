@@ -107,7 +107,7 @@ class ShadingPipeline:
 
     def _check_factors(self) -> None:
         """Refuse factors of lights that do not exist, and factors that no unit of the design takes."""
-        if not (self.takes_values and self.specular):
+        if not (self.interpolator.serves_local and self.specular):
             raise ValueError("factors of lights need values of spans, of chord-local, and specular light")
         if list(self.factors) != sorted(set(self.factors) & set(range(self.lights))):
             raise ValueError(f"factors must be different lights of {self.lights}, in order")
@@ -175,24 +175,9 @@ class ShadingPipeline:
         return self.specular.name if self.specular else None
 
     @property
-    def takes_values(self) -> bool:
-        """Whether spans carry values of each light in place of normals, so that L and H may be local."""
-        return self.interpolator.TAKES_VALUES
-
-    @property
-    def takes_vectors(self) -> bool:
-        """Whether spans carry vectors ``N/W`` in the frame of each light in place of normals."""
-        return self.interpolator.TAKES_VECTORS
-
-    @property
     def mirror(self) -> bool:
         """Whether the highlight is of R·V in place of N·H."""
         return self.specular is not None and self.specular.reflection.MIRROR
-
-    @property
-    def span_members(self) -> str:
-        """What spans carry: ``"normals"``, ``"values"`` or ``"vectors"``."""
-        return "values" if self.takes_values else "vectors" if self.takes_vectors else "normals"
 
     @property
     def vector_spans(self) -> QuotientSpans:

@@ -103,7 +103,7 @@ class Renderer:
     @property
     def mirrors(self) -> bool:
         """Whether `MirrorAdapter` adds the components of R·V to the vectors of geometry."""
-        return self.design.takes_vectors and self.design.mirror and self.design.lights > 0
+        return self.design.mirror and self.design.lights > 0
 
     @property
     def axes(self) -> tuple[str, ...]:

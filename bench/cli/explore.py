@@ -112,7 +112,7 @@ _USUAL = Sweep()
 @_option("--operands", OPERANDS, OPERANDS, "Operands of the specular unit.")
 @_option(
     "--degrees",
-    sorted({degree for degrees in DEGREES.values() for degree in degrees}),
+    DEGREES,
     _USUAL.degrees,
     "Degrees of the polynomial: 2 and 3 for the forms of quadratic, 1 and 2 for bisection.",
 )

@@ -25,7 +25,8 @@ class _Design(click.ParamType):
         method, _, model = value.partition("/")
         if method not in SERVED:
             raise InputError(f"--design {value}", "unknown method", f"use one of {', '.join(SERVED)}")
-        served = (*TABLES, *MIRROR_LOBES) if METHODS[method].TAKES_VECTORS else (*MODELS, *TABLES)
+        of = METHODS[method]
+        served = (*(() if of.needs_table else MODELS), *TABLES, *(MIRROR_LOBES if of.serves_mirror else ()))
         if model not in served:
             raise InputError(f"--design {value}", "unknown model", f"use one of {', '.join(served)}")
         return method, model

@@ -65,16 +65,16 @@ class Pair:
 
 def models_of(method: str, models: Sequence[str | None]) -> list[str | None]:
     """Those of some models that a method serves, in order: of R·V only ``quotient`` does."""
-    takes_vectors = (METHODS | PUBLISHED)[method].TAKES_VECTORS
-    return [model for model in models if takes_vectors or model not in MIRROR_LOBES]
+    mirror = (METHODS | PUBLISHED)[method].serves_mirror
+    return [model for model in models if mirror or model not in MIRROR_LOBES]
 
 
 def _refuses(design: ShadingPipeline, exponent: int) -> bool:
     """Whether a design has no table of its model at an exponent."""
-    if not (design.takes_vectors and design.loads_tables):
+    if not design.loads_tables:
         return False
     try:
-        design.specular.table(exponent)
+        design.lobe.table(exponent)
     except ValueError:
         return True
     return False

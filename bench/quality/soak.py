@@ -74,7 +74,7 @@ DESIGNS = (
     *(
         (name, _MODELS.get(name, "cosquad"), name == "quadratic-horner")
         for name, method in METHODS.items()
-        if name != "bisection" and not method.TAKES_VALUES
+        if name != "bisection" and not method.given_values
     ),
     ("quadratic", "cosquad", True),
     ("renormalise", "cosquad_q", False),
@@ -206,7 +206,7 @@ def measure(
         constants = tabled(design, random_constants(rng))
         spans = random_spans(rng, min(_BATCH, pixels - totals["pixels"]), constants.halfway[0] / ONE)
         spans = ends_for(design, spans)
-        if design.takes_vectors:
+        if not design.interpolator.brings_ends:
             spans = replace(spans, vectors=vectors_for(rng, design, spans.length))
         shaded = design.compute(spans, constants)
         expected, beats = pixel_beats(shaded), beats_of(unit, spans)

@@ -53,7 +53,7 @@ errors of vectors and words; of ``quotient`` less."""
 
 def models_of(method: str) -> tuple[str, ...]:
     """Models that are swept with a method: of ``quotient`` those whose table has no end at a right angle."""
-    return (model_of(method), *MIRROR_LOBES) if METHODS[method].TAKES_VECTORS else tuple(MODELS)
+    return (model_of(method), *MIRROR_LOBES) if METHODS[method].needs_table else tuple(MODELS)
 
 
 @dataclass(frozen=True)

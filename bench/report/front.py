@@ -68,7 +68,7 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
         "label": label,
         "method": method_name,
         "group": point["group"],
-        "is_prepared": METHODS.get(method_name) is not None and METHODS[method_name].TAKES_VALUES,
+        "is_prepared": METHODS.get(method_name) is not None and METHODS[method_name].given_values,
         "is_mirror": point["settings"]["model"] in MIRROR_LOBES,
         "samples": len(samples),
         "method_error": (min(method), max(method)),

@@ -167,7 +167,7 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
 def _is_comparable(point: Mapping[str, Any]) -> bool:
     """Whether a design does all of the work, for Blinn's picture: as in `front.conclusion`."""
     method, model = (point["settings"][name] for name in ("method", "model"))
-    return not ((method in METHODS and METHODS[method].TAKES_VALUES) or model in MIRROR_LOBES)
+    return not ((method in METHODS and METHODS[method].given_values) or model in MIRROR_LOBES)
 
 
 def _heading(axis: Mapping[str, str]) -> str:

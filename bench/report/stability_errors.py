@@ -1,7 +1,7 @@
 """Errors of every method in stiff and extreme cases, and their grades."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,11 +17,10 @@ from blysk.bench.report.stability_cases import (
     cases_of,
     single_spans,
 )
-from blysk.golden.frames.cut import cut_spans, split_pairs
+from blysk.golden.frames.cut import cut_spans, cutter_of
 from blysk.golden.frames.local import line_ends, local_values
 from blysk.golden.frames.prepare import constants_of, span_vectors, spans_for
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.methods.quotient_interpolator import QuotientErrors
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import ShadingPipeline, Spans
@@ -91,35 +90,66 @@ def spans_of(case: Case, design: ShadingPipeline, raster: Raster) -> Spans:
     """Spans of a case for a design, made by `spans_for` or of the case's own codes."""
     if case.codes is None:
         return spans_for(case.scene, raster, design)
-    left, right = case.codes
-    if design.takes_vectors:
-        given = replace(raster, normal_left=left.astype(np.float64), normal_right=right.astype(np.float64))
-        vectors = span_vectors(case.scene, given, design)
-        return Spans(raster.x, raster.y, raster.length, left, right, vectors=vectors)
-    if design.takes_values:
-        values = local_values(case.scene, raster)
-        return Spans(raster.x, raster.y, raster.length, left, right, values=values)
-    if design.interpolator.takes_line:
+    return design.interpolator.filled(_OfCodes(case, design, raster))
+
+
+@dataclass(frozen=True)
+class _OfCodes:
+    """Fills spans with a case's own codes of normals at the ends, see `SpanFiller`."""
+
+    case: Case
+    design: ShadingPipeline
+    raster: Raster
+
+    def with_normals(self) -> Spans:
+        raster = self.raster
+        return Spans(raster.x, raster.y, raster.length, *self.case.codes)
+
+    def with_lines(self) -> Spans:
         # The same numbers.
-        shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
-        return Spans(raster.x, raster.y, raster.length, left << shift, right << shift)
-    return Spans(raster.x, raster.y, raster.length, left, right)
+        shift = self.design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
+        left, right = self.case.codes
+        return replace(self.with_normals(), normal_left=left << shift, normal_right=right << shift)
+
+    def with_values(self) -> Spans:
+        return replace(self.with_normals(), values=local_values(self.case.scene, self.raster))
+
+    def with_vectors(self) -> Spans:
+        given = _between(self.raster, *self.case.codes)
+        return replace(self.with_normals(), vectors=span_vectors(self.case.scene, given, self.design))
 
 
-def _own(case: Case, design: ShadingPipeline, raster: Raster, spans: Spans) -> np.ndarray:
-    """Picture of the method's own curve in float64, computed from the codes of the spans."""
-    scene, model, method = case.scene, design.specular.reflection, design.interpolator
-    if design.takes_values:
-        cosine, u = method.exact_operands(spans.values, spans.length)
-        return shade_operands(scene, raster, cosine, 1 - u, model)
-    if design.takes_vectors:
-        left, right = case.codes or line_ends(raster)
-        given = replace(raster, normal_left=left.astype(np.float64), normal_right=right.astype(np.float64))
-        return shade_spans(scene, given, method.exact_normals, model)
-    ends = [codes.astype(np.float64) for codes in (spans.normal_left, spans.normal_right)]
-    left, right = ends if method.takes_line else map(normalise, ends)
-    given = replace(raster, normal_left=left, normal_right=right)
-    return shade_spans(scene, given, method.exact_normals, model, method.uses_chord)
+def _between(raster: Raster, left: np.ndarray, right: np.ndarray) -> Raster:
+    """The same spans with other ends."""
+    return replace(raster, normal_left=left.astype(np.float64), normal_right=right.astype(np.float64))
+
+
+@dataclass(frozen=True)
+class _OwnCurve:
+    """Shades a case by the method's own curve in float64, from the codes of the spans; see `ExactShading`."""
+
+    case: Case
+    design: ShadingPipeline
+    raster: Raster
+    spans: Spans
+
+    def by_normals(self) -> np.ndarray:
+        ends = self.spans.normal_left, self.spans.normal_right
+        return self._between(*(normalise(codes.astype(np.float64)) for codes in ends))
+
+    def by_lines(self) -> np.ndarray:
+        if self.spans.vectors is None:
+            return self._between(self.spans.normal_left, self.spans.normal_right)
+        return self._between(*(self.case.codes or line_ends(self.raster)))
+
+    def by_values(self, exact_operands: Callable[..., tuple[np.ndarray, ...]]) -> np.ndarray:
+        cosine, u = exact_operands(self.spans.values, self.spans.length)
+        return shade_operands(self.case.scene, self.raster, cosine, 1 - u, self.design.specular.reflection)
+
+    def _between(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        method, given = self.design.interpolator, _between(self.raster, left, right)
+        model = self.design.specular.reflection
+        return shade_spans(self.case.scene, given, method.exact_normals, model, method.uses_chord)
 
 
 def _shade(case: Case, design: ShadingPipeline, raster: Raster) -> _Shaded:
@@ -129,11 +159,12 @@ def _shade(case: Case, design: ShadingPipeline, raster: Raster) -> _Shaded:
     color = design.compute(spans, constants).color
     out_of_range = design.operands(spans, constants).out_of_range
 
-    by_codes = design.interpolator.takes_line and not design.takes_vectors
+    method = design.interpolator
+    by_codes = method.curve_is_exact and method.brings_ends
     degrees = _line_angles(spans) if by_codes else _angles(raster)
-    degrees = np.minimum(degrees, design.interpolator.MAX_ANGLE).max(initial=0)
-    error = design.interpolator.operand_error(int(raster.length.max(initial=1)), float(degrees))
-    if not (design.takes_values or design.interpolator.takes_line):
+    degrees = np.minimum(degrees, method.MAX_ANGLE).max(initial=0)
+    error = method.operand_error(int(raster.length.max(initial=1)), float(degrees))
+    if method.brings_ends and not method.curve_is_exact:
         error += min(_length_excess((spans.normal_left, spans.normal_right)), LENGTH_TOLERANCE)
     shown = raster.visible
     normals = fragment_normals(scene, case.raster, shown)
@@ -156,25 +187,17 @@ def _shade(case: Case, design: ShadingPipeline, raster: Raster) -> _Shaded:
         for side in (0.0, 2.0**-60)
     ]
 
-    own = _own(case, design, raster, spans).reshape(-1, 3)[raster.pixel[shown]] * 255
+    own = method.exact_frame(_OwnCurve(case, design, raster, spans)).reshape(-1, 3)[raster.pixel[shown]] * 255
     light = np.sum([light.color for light in scene.lights], axis=0)
     terms = np.multiply(material.diffuse, error)
-    highlight_error = _highlight_error(design, material.exponent, int(raster.length.max(initial=1)), error)
+    longest = int(raster.length.max(initial=1))
+    highlight_error = method.highlight_error(design.specular, material.exponent, longest, error)
     terms = terms + np.multiply(material.specular, highlight_error)
     arithmetic = 0.5 + _COLOR_ERROR * len(direction) + 255 * (light * terms).max()
     found, stated = (
         np.min([np.abs(of - one * 255).max(axis=1) for one in exact], axis=0) for of in (color[shown], own)
     )
     return _Shaded(found, stated + arithmetic, raster.span[shown], out_of_range)
-
-
-def _highlight_error(design: ShadingPipeline, exponent: int, longest: int, error: float) -> float:
-    """Stated error of a specular term, for an error of N·L and N·H; with vectors by their own bound."""
-    unit = design.specular
-    if not design.takes_vectors:
-        return exponent * error + unit.error
-    bounds = QuotientErrors.worst(longest, design.mirror)
-    return bounds.highlight(unit.reflection, exponent) + unit.line_error(exponent) + unit.ERROR
 
 
 def _angles(raster: Raster) -> np.ndarray:
@@ -198,7 +221,7 @@ def _line_angles(spans: Spans) -> np.ndarray:
 def _has_unit_length(design: ShadingPipeline, codes: Sequence[np.ndarray]) -> np.ndarray:
     """Whether both ends of spans have length 1 within `LENGTH_TOLERANCE`; for a line, the longer end."""
     lengths = np.linalg.norm(np.stack(codes) / ONE, axis=2)
-    if design.interpolator.takes_line:
+    if design.interpolator.curve_is_exact:
         lengths = lengths.max(axis=0, keepdims=True)
     return (np.abs(lengths - 1) <= LENGTH_TOLERANCE + _STEP).all(axis=0)
 
@@ -264,15 +287,16 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
         the case has its own codes.
     """
     design = _design(case, method)
-    raster = split_pairs(case.raster) if design.takes_vectors else case.raster
+    by_angle = design.interpolator.brings_ends and not design.interpolator.curve_is_exact
+    raster = design.interpolator.least_cut(cutter_of(case.scene, case.raster, design))
     cut, _ = cut_spans(case.scene, raster, design)
     first = np.flatnonzero(cut.offset == 0)
     parts = np.bincount(raster.span[first], minlength=len(raster.length))
-    if design.takes_values or design.interpolator.takes_line:
-        inside = parts == 1
-    else:
+    if by_angle:
         widest = design.interpolator.widest_span(case.scene.materials[0].exponent)
         inside = _angles(raster) <= widest + _SLACK
+    else:
+        inside = parts == 1
     if case.codes is not None:
         inside &= _has_unit_length(design, case.codes)
     prepared = None
@@ -321,7 +345,7 @@ def widest_span(method: str, exponent: int) -> float:
     widest span that is not cut.
     """
     design = preset(method, model_of(method))
-    if not (design.takes_values or design.takes_vectors):
+    if design.interpolator.brings_ends:
         return METHODS[method].widest_span(exponent)
     low, high = 0.0, METHODS[method].MAX_ANGLE
     while high - low > 0.05:

@@ -12,7 +12,6 @@ from blysk.bench.store import Task
 from blysk.bench.tools.sweep import COSTS, Candidate
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
 from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.scene import Scene
 from blysk.hdl.emit.cost import cost_of
@@ -141,7 +140,7 @@ def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
         frame = measured[errors_of, replace(candidate, style="throughput")]
         lengths, counts = np.array(frame["lengths"]).T
         cycles = np.maximum(result["cycles_per_pixel"] * lengths, result["setup_interval"])
-        divides = isinstance(candidate.design.interpolator, BisectionInterpolator)
+        divides = candidate.design.interpolator.divides_spans
         found.append(
             Explored(
                 candidate,
@@ -173,7 +172,7 @@ def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values
     """
     errors = [
         None
-        if one.out_of_range_spans or (one.candidate.design.takes_values and not given_values)
+        if one.out_of_range_spans or (one.candidate.design.interpolator.given_values and not given_values)
         else one.errors[error]["max_lsb"]
         for one in designs
     ]

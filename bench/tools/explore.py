@@ -105,7 +105,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         (False, "The cheapest with an error of 1 LSB or less against exact normals in this scene"),
         (True, "The cheapest that is given values of each light with a span, and counts none of that work,"),
     ):
-        those = [designs[k] for k in best if designs[k].candidate.design.takes_values == given]
+        those = [designs[k] for k in best if designs[k].candidate.design.interpolator.given_values == given]
         if those:
             text.append(
                 f"{which} takes {those[0].costs['cells']:,} cells; its largest error here is "
@@ -302,7 +302,7 @@ def explore(
         )
     listed = best[:limit]
     print(_table([designs[index] for index in listed], on_front[listed]))
-    if any(designs[index].candidate.design.takes_values for index in listed):
+    if any(designs[index].candidate.design.interpolator.given_values for index in listed):
         print("chord-local gets values of each light with each span; their computation is not in its cost")
     for number, index in enumerate(listed, 1):
         print(f"{number:>3}  {designs[index].candidate.command}")

@@ -9,11 +9,7 @@ from itertools import product
 from typing import TYPE_CHECKING, NamedTuple, get_args
 
 from blysk.golden.build import STYLES
-from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
 from blysk.golden.methods.interpolator import Operand
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
-from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED, preset
 
@@ -34,17 +30,14 @@ OPERANDS = get_args(Operand)
 """Operands of the specular unit."""
 
 
-DEGREES = {QuadraticInterpolator: (2, 3), BisectionInterpolator: (1, 2)}
-"""Degrees of a method's polynomial."""
-
-_FITS = {2: "minimax_2", 3: "exact"}
-"""Middle normal of each degree."""
-
 SERVED = LOBES | MIRROR_LOBES | MODELS
 """Specular units by reflection model; a model with a roughness takes the roughness of the exponent."""
 
-WORDS = range(36, 47, 2)
-"""Fraction bits of the differences of ``chord-local``."""
+DEGREES = sorted({degree for of in METHODS.values() for degree in of.degrees})
+"""Degrees that polynomials of methods can have."""
+
+WORDS = sorted({bits for of in METHODS.values() for bits in of.word_choices})
+"""Fraction bits that words of methods can have."""
 
 
 @dataclass(frozen=True)
@@ -84,20 +77,14 @@ class Candidate:
     def design(self) -> ShadingPipeline:
         """Its `ShadingPipeline`: the bit-accurate model of the pipeline."""
         usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
-        interpolator, changes = usual.interpolator, {}
-        if usual.takes_vectors and self.model in MODELS:
+        interpolator = usual.interpolator
+        if interpolator.needs_table and self.model in MODELS:
             raise ValueError(f"method {self.method} has tables of lobes, and no circuits of other models")
-        if self.fraction_bits is not None and not isinstance(interpolator, LocalChordInterpolator):
-            raise ValueError(f"method {self.method} has no choice of words")
-        if self.degree not in (None, *_degrees(self.method)):
-            raise ValueError(f"method {self.method} has no polynomial of degree {self.degree}")
         if self.fraction_bits is not None:
-            changes = {"fraction_bits": self.fraction_bits}
-        elif self.degree is not None and isinstance(interpolator, QuadraticInterpolator):
-            changes = {"middle_normal": MiddleNormal(_FITS[self.degree])}
-        elif self.degree is not None:
-            changes = {"bisection": replace(interpolator.bisection, degree=self.degree)}
-        return replace(usual, interpolator=replace(interpolator, **changes))
+            interpolator = interpolator.with_words(self.fraction_bits)
+        if self.degree is not None:
+            interpolator = interpolator.with_degree(self.degree)
+        return replace(usual, interpolator=interpolator)
 
     def unit(self) -> "ShadingPipelineUnit":
         """Its hardware."""
@@ -123,10 +110,6 @@ class Candidate:
         return shlex.join(["python", "-c", f'{imports}; print(emit(Candidate({arguments}).unit(), "blysk"))'])
 
 
-def _degrees(method: str) -> Sequence[int]:
-    return DEGREES.get(type(METHODS.get(method)), ())
-
-
 class Sweep(NamedTuple):
     """Values to combine in all ways. A method that lacks a choice is taken once.
 
@@ -149,9 +132,10 @@ class Sweep(NamedTuple):
         found: dict[Candidate, None] = {}
         refused: dict[str, list[str]] = {}
         for method in self.methods:
-            degrees = self.degrees if _degrees(method) else (None,)
-            words = self.fraction_bits if method == "chord-local" else (None,)
-            usual = (METHODS | PUBLISHED)[method].operand
+            of = (METHODS | PUBLISHED)[method]
+            degrees = self.degrees if of.degrees else (None,)
+            words = self.fraction_bits if of.word_choices else (None,)
+            usual = of.operand
             operands = [None if operand == usual else operand for operand in self.operands]
             if usual not in OPERANDS:
                 operands = [None]

@@ -26,8 +26,6 @@ from blysk.golden.frames.local import line_ends
 from blysk.golden.frames.prepare import quantise_spans, spans_for, with_tables
 from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import COMPONENT, ONE
@@ -285,7 +283,7 @@ def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tu
     scene = scene_of(START | {"mesh": mesh, "view": view, "exponent": exponent})
     raster = rasterise(scene)
     cut, _ = cut_spans(scene, raster, design)
-    if not design.takes_vectors:
+    if design.interpolator.brings_ends:
         return cut, spans_for(scene, cut, design)
     left, right = quantise_line(*line_ends(cut))
     return cut, replace(quantise_spans(cut, scene.mesh.material), normal_left=left, normal_right=right)
@@ -296,7 +294,7 @@ def with_vectors(spans: Spans, scene: Scene, design: ShadingPipeline) -> Spans:
 
     The page's script computes the same, a product and a sum at a time.
     """
-    if not design.takes_vectors:
+    if design.interpolator.brings_ends:
         return spans
     axes = vector_axes(scene, design)
     ends = []
@@ -332,7 +330,7 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
         streams[method] = []
         for exponent in BANDS:
             cut, spans = spans_of(mesh, view, exponent, design)
-            if design.interpolator.takes_line:
+            if design.interpolator.curve_is_exact:
                 cut = replace(cut, magnitude_left=cut.magnitude_right)
             ratio = cut.magnitude_right / np.where(cut.magnitude_left, cut.magnitude_left, 1.0)
             data = encode(spans, cut.visible, np.where(ratio, ratio, 1.0))
@@ -381,7 +379,7 @@ def module_of(method: str, model: str) -> dict[str, Any]:
         ],
         "stages": [dict(zip(("name", "title", "from", "to"), stage, strict=True)) for stage in stages],
         "lobe": lobe_of(design),
-        "vectors": list(design.vector_spans.components) if design.takes_vectors else None,
+        "vectors": None if design.interpolator.brings_ends else list(design.vector_spans.components),
     }
 
 
@@ -398,8 +396,7 @@ def lobe_of(design: ShadingPipeline) -> dict[str, Any] | None:
     """
     if not design.loads_tables:
         return None
-    lobe = design.specular
-    assert isinstance(lobe, Lobe)
+    lobe = design.lobe
     name = lobe.reflection.PARAMETER or "exponent"
     parameters = ROUGHNESSES if name == "roughness" else range(1, MAX_EXPONENT + 1)
     scene = scene_of(START)
@@ -407,12 +404,11 @@ def lobe_of(design: ShadingPipeline) -> dict[str, Any] | None:
     plain = FrameConstants.of(scene)
     found = [with_tables([plain], [replace(material, **{name: of})], design)[0] for of in parameters]
     entries, middles = (cosines.tolist() for cosines in lobe.cosines)
-    two = isinstance(lobe, QuotientLobe) and lobe.parts == 2
     return {
         "model": model_table(design.model or ""),
         "entries": entries,
         "middles": middles,
-        "border": len(lobe.knots) - 1 if two else None,
+        "border": len(lobe.knots) - 1 if lobe.parts == 2 else None,
         "parameter": name,
         "parameters": list(parameters),
         "exponents": [of.exponent for of in found],

@@ -8,7 +8,7 @@ __all__ = ["DESIGNS", "SERVED", "TABLES"]
 TABLES = ("blinn", "ggx")
 """Models of N·H with a table that the page's script can make."""
 
-SERVED = tuple(name for name, of in METHODS.items() if not of.TAKES_VALUES)
+SERVED = tuple(name for name, of in METHODS.items() if not of.given_values)
 """Methods of modules. Those whose spans bring values of each light are left out: the light moves. Vectors are
 turned into its frame by the page."""
 

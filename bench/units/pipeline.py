@@ -86,7 +86,7 @@ def _measure(rng, count, design):
             colors = (grey[name][np.newaxis] for name in ("diffuse", "specular"))
             zero = np.zeros_like(length)
             spans, direction = ends_for(design, Spans(zero, zero, length, left, right)), light
-            if design.takes_vectors:
+            if not interpolator.brings_ends:
                 spans, direction = spans_in_frame(spans, light, halfway)
             constants = FrameConstants(exponent, grey["ambient"], direction, halfway, *colors)
             found = design.compute(spans, tabled(design, constants)).color[:, 0]

@@ -28,6 +28,7 @@ from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.light_frame import light_frame
+from blysk.hdl.pipeline import span_shape
 
 __all__ = [
     "any_constants",
@@ -60,9 +61,10 @@ def any_constants(
     """Constants of each material; L and H are normals of spans, so that highlights are among the pixels."""
     lights = design.lights
     direction, halfway = (unit_codes(rng, lights) for _ in range(2))
-    if design.takes_vectors:
+    members = span_shape(design).members
+    if "step" in members:
         direction = np.insert(line_directions(rng, lights), 1, 0, axis=1)
-    elif lights and len(spans) and not design.takes_values:
+    elif "normal_left" in members and len(spans):
         direction[:] = spans.normal_right[rng.integers(0, len(spans), lights)]
         halfway[:] = spans.normal_left[rng.integers(0, len(spans), lights)]
     found = []
@@ -157,7 +159,7 @@ def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndar
     angles = np.where(rng.random(count) < 0.1, rng.uniform(largest, 180, count), largest * rng.random(count))
     angles[::20] = 0
     left, right = (quantise(normals) for normals in pairs_at(rng, count, angles))
-    length = length % (1 << design.length_bits)
+    length, members = length % (1 << design.length_bits), span_shape(design).members
     return Spans(
         x=rng.integers(0, np.maximum((1 << design.x_bits) - length, 1)),
         y=rng.integers(0, 1 << design.y_bits, count),
@@ -165,9 +167,9 @@ def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndar
         normal_left=left,
         normal_right=right,
         material=np.sort(rng.integers(0, design.materials, count)),
-        values=any_values(rng, count, design.lights) if design.takes_values else None,
+        values=any_values(rng, count, design.lights) if "values" in members else None,
         factors=any_factors(rng, count, len(design.factors)) if design.factors else None,
-        vectors=vectors_for(rng, design, length) if design.takes_vectors and design.lights else None,
+        vectors=vectors_for(rng, design, length) if "step" in members else None,
     )
 
 

@@ -14,7 +14,6 @@ from blysk.golden.frame_constants import (
     LOBE_ADDRESS,
     MATERIAL_ADDRESS,
     THRESHOLD_ADDRESS,
-    VECTOR_MEANINGS,
 )
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import LIMIT_BITS
@@ -193,10 +192,10 @@ def constant_registers(design: ShadingPipeline, axes: Sequence[str] = ()) -> lis
     if design.banks > 1:
         width = (design.banks - 1).bit_length()
         rows.append(("bank", BANK_ADDRESS, width, False, "", "bank of a material's table"))
-    one = "2^17 - 2" if design.takes_vectors else "2^17 - 1"
+    meanings = design.interpolator.light_meanings
     texts_of_a_light = _OF_A_LIGHT | {
-        name: text if text == "not read" else f"{text}, component times {one}"
-        for name, text in VECTOR_MEANINGS[design.span_members].items()
+        name: text if text == "not read" else f"{text}, component times {meanings.one}"
+        for name, text in meanings.texts.items()
     }
     for light in range(design.lights):
         add(f"light{light}_", (light + 1) * LIGHT_STRIDE, FIELDS_OF_A_LIGHT, texts_of_a_light)

@@ -231,6 +231,23 @@ class _Bounds:
         return _tolerance_bound(self.scene, self.design)
 
 
+@dataclass(frozen=True)
+class _TriangleBounds:
+    """Bounds the error of a picture by triangles, see `ErrorBounds`; no tolerance tells of its spans."""
+
+    scene: Scene
+    renderer: Renderer
+    sent: SceneTriangles
+
+    def by_vectors(self) -> float | None:
+        if not self.renderer.design.lights:
+            return None
+        return quotient_triangle_bound(self.scene, self.renderer, self.sent)
+
+    def by_tolerance(self) -> float | None:
+        return None
+
+
 def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
     """Bound from the tolerances of cut spans, as `error_bound` states it."""
     model = _model_of(design)
@@ -345,8 +362,8 @@ def compare_triangles(
         The frame buffer.
     """
     design, bound = renderer.design, None
-    if design.takes_vectors and design.specular is not None and design.lights:
-        bound = quotient_triangle_bound(scene, renderer, sent)
+    if design.specular is not None:
+        bound = design.interpolator.bound(_TriangleBounds(scene, renderer, sent))
     return _compare(scene, design, image, rasterise(scene), None, bound)
 
 

@@ -7,14 +7,24 @@ import numpy as np
 
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks, lines_along, weights_along
+from blysk.golden.frames.missed import missed_spans
 from blysk.golden.frames.pieces import Pieces
+from blysk.golden.methods.frame_steps import SpanCutter
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["cut_by_angle", "cut_by_ends", "cut_by_error", "cut_by_length", "cut_spans", "split_pairs"]
+__all__ = [
+    "cut_by_angle",
+    "cut_by_ends",
+    "cut_by_error",
+    "cut_by_length",
+    "cut_spans",
+    "cutter_of",
+    "split_pairs",
+]
 
 
 def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Raster, int]:
@@ -40,7 +50,7 @@ def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Ra
     cut : int
         Number of given spans that were cut.
     """
-    return design.interpolator.cut(_Cutter(scene, raster, design))
+    return design.interpolator.cut(cutter_of(scene, raster, design))
 
 
 @dataclass(frozen=True)
@@ -68,6 +78,20 @@ class _Cutter:
 
     def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
         return cut_by_ends(self.raster, largest_ratio)
+
+    def uncut(self) -> Raster:
+        return self.raster
+
+    def split_pairs(self) -> Raster:
+        return split_pairs(self.raster)
+
+    def missed(self, cut: Raster) -> int:
+        return missed_spans(self.scene, cut, self.design.interpolator, self._limits)
+
+
+def cutter_of(scene: Scene, raster: Raster, design: ShadingPipeline) -> SpanCutter:
+    """Ways to cut the spans of a scene for a design, among which its method chooses."""
+    return _Cutter(scene, raster, design)
 
 
 def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:

@@ -105,8 +105,8 @@ def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dic
     design = renderer.design
     limits = HighlightLimits.of(scene.materials, design)
     turn = _turn(drawn, pieces, renderer)
-    axes = triangle_axes(scene, design) if design.takes_vectors and design.lights else np.eye(3)
-    raster = _raster(pieces, sent.source[drawn.source], axes)
+    axes = triangle_axes(scene, design)
+    raster = _raster(pieces, sent.source[drawn.source], np.eye(3) if axes is None else axes)
     curve, words = _missed(scene, raster, design.interpolator, limits, turn)
     return {"missed_pieces": int(curve.sum()), "short_normals": int(words.sum())}
 

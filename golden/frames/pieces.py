@@ -54,7 +54,7 @@ class Pieces:
             "diffuse": turn,
             "highlight": np.sqrt(2 * np.maximum(curves["highlight"].largest, 0)) * turn + turn**2 / 2,
         }
-        if interpolator.takes_line:
+        if interpolator.curve_is_exact:
             misses = dict.fromkeys(curves, np.zeros_like(turn))
         else:
             misses = self._misses_of_normals(interpolator)
@@ -69,7 +69,7 @@ class Pieces:
             return found
 
         by_words = too_far(words, words["highlight"]) & (turn > limits.turn(material)[:, np.newaxis])
-        if interpolator.takes_line:
+        if interpolator.curve_is_exact:
             return np.zeros(len(turn), dtype=bool), np.logical_or.reduce(by_words, axis=1)
         both = {name: curve[name] + words[name] for name in curves}
         inner = margin / LocalChordInterpolator.MARGIN * misses["highlight"] + words["highlight"]

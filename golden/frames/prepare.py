@@ -7,10 +7,8 @@ import numpy as np
 
 from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cut_spans
-from blysk.golden.frames.highlight_limits import HighlightLimits
+from blysk.golden.frames.cut import cutter_of
 from blysk.golden.frames.local import line_ends, local_operands
-from blysk.golden.frames.missed import missed_spans
 from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
@@ -67,18 +65,17 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
         If the scene has point lights or a near viewer, and the method does not take values. If a light that
         fades has no factor in the design.
     """
-    if scene.local and not design.takes_values:
+    if scene.local and not design.interpolator.serves_local:
         raise ValueError("point lights and a near viewer need the method chord-local")
     if design.specular is not None:
         for index, light in enumerate(scene.lights):
             if light.fades and index not in design.factors:
                 raise ValueError(f"light {index} fades, and the design has no factor for it: give factors")
     raster = rasterise(scene)
-    cut, count = cut_spans(scene, raster, design)
+    cutter = cutter_of(scene, raster, design)
+    cut, count = design.interpolator.cut(cutter)
     cut = sort_by_material(cut, scene.mesh.material)
-    method, missed = design.interpolator, 0
-    if not (method.CUT_BY_ERROR or method.takes_line):
-        missed = missed_spans(scene, cut, method, HighlightLimits.of(scene.materials, design))
+    missed = design.interpolator.missed(cutter, cut)
     return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), missed)
 
 

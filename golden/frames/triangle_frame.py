@@ -73,7 +73,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
         raise ValueError("point lights and a near viewer need spans with values, which triangles do not give")
     angle = SPAN_ANGLE if angle is None else angle
     design = renderer.design
-    axes = triangle_axes(scene, design) if design.takes_vectors and design.lights else None
+    axes = triangle_axes(scene, design)
     return scene_triangles(scene, renderer.geometry.grid, FrameSettings.limit_of(angle), axes).by_material()
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.golden.reference.light_frame import LightFrame, light_frames
+from blysk.golden.reference.light_frame import light_frames
 from blysk.golden.reference.scene import Scene
 
 __all__ = ["further_axes", "triangle_axes", "vector_axes"]
@@ -30,7 +30,7 @@ def vector_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
     frames = light_frames(scene, design.lights)
     rows: dict[str, np.ndarray] = {}
     for k, frame in enumerate(frames):
-        x, y, z = _axes(frame, model.highlights)
+        x, y, z = frame.axes_for(model.highlights)
         if model.mirror:
             rows.setdefault("s0", frame.sine * y)
             y = frame.cosine * y
@@ -38,21 +38,9 @@ def vector_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
     return np.stack([rows[name] for name in model.components])
 
 
-def triangle_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
-    """Axes, by rows, in the scene's frame of the normals of triangles, for a method that takes vectors.
-
-    They are x, y and z of the first light's frame. Without highlights z is along the light.
-
-    Parameters
-    ----------
-    scene, design
-        As for `vector_axes`.
-
-    Returns
-    -------
-    float64 array, shape (3, 3)
-    """
-    return _axes(light_frames(scene, 1)[0], design.vector_spans.highlights)
+def triangle_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray | None:
+    """Axes of the normals that triangles have, see `Interpolator.triangle_axes`."""
+    return design.interpolator.triangle_axes(scene, design.lights, design.specular is not None)
 
 
 def further_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
@@ -67,14 +55,7 @@ def further_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
     -------
     float64 array, shape (lights - 1, rows, 3)
     """
-    rows = vector_axes(scene, design) @ triangle_axes(scene, design).T
+    first = light_frames(scene, 1)[0].axes_for(design.vector_spans.highlights)
+    rows = vector_axes(scene, design) @ first.T
     found: np.ndarray = rows[3 : len(rows) - design.vector_spans.mirror].reshape(design.lights - 1, -1, 3)
     return found
-
-
-def _axes(frame: LightFrame, highlights: bool) -> np.ndarray:
-    """x, y, z of a light's frame; without highlights x and y across L, z along it."""
-    if highlights:
-        return frame.axes
-    x, y, z = frame.axes
-    return np.stack([frame.cosine * x - frame.sine * z, y, frame.sine * x + frame.cosine * z])

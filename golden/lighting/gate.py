@@ -24,6 +24,11 @@ class Gate:
         """Format of a threshold."""
         raise NotImplementedError
 
+    @property
+    def threshold_rule(self) -> str | None:
+        """How the threshold of a table follows from its values; ``None``: by a rule of the model alone."""
+        return None
+
     @cached_property
     def thresholds(self) -> Fixed:
         """The PROM: thresholds for exponents 0 to 1023."""

@@ -31,6 +31,7 @@ class HighlightOperand:
     ARGUMENT_FORMAT = UQ(1, 25)
     RESULT_FORMAT = UQ(0, 17)
     EXPONENT_BITS = 10
+    ERROR: ClassVar[float]
 
     def __post_init__(self) -> None:
         if self.operand not in self.OPERANDS:
@@ -61,6 +62,29 @@ class HighlightOperand:
     def table_options(self) -> dict[str, Any]:
         """Options of a lobe's tables that hold for every operand; empty without a table."""
         return {}
+
+    @property
+    def error(self) -> float:
+        """Largest error of a term against the model, without `line_error`."""
+        return self.ERROR
+
+    @property
+    def parts(self) -> int:
+        """Of a unit with a table: number of tables one after the other, each of another argument."""
+        return 1
+
+    @property
+    def argument_text(self) -> str:
+        """Of a unit with a table: what the argument of the first one is."""
+        return "u = 1 - N.H"
+
+    def line_error(self, parameter: float | None) -> float:
+        """Largest error of a table between its entries; 0 without a table."""
+        return 0.0
+
+    def is_sharp(self, parameter: float | None) -> bool:
+        """Whether a lobe is so sharp that a frame has to tell of its `line_error`."""
+        return False
 
     def for_operand(self, operand: Any, scale: int = 0) -> "HighlightOperand":
         """The unit for another operand.

@@ -66,6 +66,15 @@ class QuotientLobe(Lobe):
         return Lobe(self.reflection, operand, scale=scale, **self.table_options)
 
     @property
+    def argument_text(self) -> str:
+        """What the first table's argument is."""
+        return "s = (1 - R.V)/2" if self.reflection.MIRROR else "s = 1 - (N.H)^2"
+
+    def is_sharp(self, parameter: float | None) -> bool:
+        """Whether `line_error` is over a quarter of an LSB."""
+        return self.line_error(parameter) > 1 / 1020
+
+    @property
     def parts(self) -> int:
         """Parts of the table: 2, or 1 for a lobe of R·V."""
         return 1 if self.reflection.MIRROR else 2

@@ -59,6 +59,11 @@ class ValueGate(Gate):
         """``THRESHOLD_FORMAT``."""
         return self.THRESHOLD_FORMAT
 
+    @property
+    def threshold_rule(self) -> str | None:
+        """See `Gate.threshold_rule`."""
+        return "2^16 times the least u from which on all values are 0, rounded up, + 1"
+
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
         """Thresholds from the largest arguments with a term over 0, in steps of 2^-25; rounded up.
 

@@ -1,10 +1,12 @@
 """Bisection of spans into segments short enough for straight lines ([T] figure 2.7): method ``bisection``."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
+from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
@@ -60,6 +62,22 @@ class BisectionInterpolator(NormalInterpolator):
     def serves_gate(self) -> bool:
         """Whether the method serves a highlight gate. With the published polynomials it serves none."""
         return not self.bisection.as_published
+
+    @property
+    def divides_spans(self) -> bool:
+        """``True``: a span of several segments takes longer."""
+        return True
+
+    @property
+    def degrees(self) -> Sequence[int]:
+        """Degrees of the factor of `Bisection`; none as published."""
+        return () if self.bisection.as_published else (1, 2)
+
+    def with_degree(self, degree: int) -> Interpolator:
+        """The method with another factor, see `Interpolator.with_degree`."""
+        if degree not in self.degrees:
+            return super().with_degree(degree)
+        return replace(self, bisection=replace(self.bisection, degree=degree))
 
     @property
     def normaliser(self) -> AdaptiveNormaliser:

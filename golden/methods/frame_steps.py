@@ -30,6 +30,15 @@ class SpanCutter(Protocol):
     def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
         """Until the two ends are alike, see `cut_by_ends`."""
 
+    def uncut(self) -> Raster:
+        """The spans as they are given."""
+
+    def split_pairs(self) -> Raster:
+        """Spans of two pixels as two of one; the others as they are."""
+
+    def missed(self, cut: Raster) -> int:
+        """Number of cut spans that `by_error` would cut further, see `missed_spans`."""
+
 
 class SpanFiller(Protocol):
     """Ways to fill the beats of cut spans."""

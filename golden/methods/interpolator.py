@@ -10,7 +10,7 @@ import numpy as np
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.quotient_spans import QuotientSpans
-from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frame_constants import NOT_READ, FrameConstants, LightMeanings
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
@@ -43,7 +43,7 @@ class Operands(NamedTuple):
     out_of_range : bool array, shape (spans,)
         Whether the angle of the span is larger than the method serves. Its operands are then without meaning.
     factor : Fixed, shape (pixels, fading lights), optional
-        Factor of each light that fades, of methods with `Interpolator.TAKES_VALUES`.
+        Factor of each light that fades, of methods with `Interpolator.serves_local`.
     """
 
     cosine: Fixed
@@ -73,14 +73,6 @@ class Interpolator(ABC):
         The curve of `CURVES` on which the method's normals lie in exact arithmetic.
     ORIGIN : str
         Origin of the method, for tables: ``"documents"``, ``"own"``, or ``"baseline"``.
-    TAKES_VALUES : bool
-        Whether spans carry values of N·L and 1 - N·H of each light in place of normals, so that L and H may
-        differ from pixel to pixel.
-    TAKES_VECTORS : bool
-        Whether spans carry vectors ``N/W`` at the first pixel and their step, in the frame of each light.
-    CUT_BY_ERROR : bool
-        Whether spans are cut until the curve keeps its tolerance, a quarter of an LSB, at the checked places.
-        If not, spans are cut by their angle alone.
     END_FORMAT : Format
         Format of the normals at a span's ends: ``SQ(1, 17)`` for unit normals. Ends of the true line have
         lengths, relative to the larger length, and another format.
@@ -94,10 +86,7 @@ class Interpolator(ABC):
     MAX_ANGLE: ClassVar[float] = MAX_SPAN_ANGLE
     CURVE: ClassVar[str] = "normalised"
     ORIGIN: ClassVar[Literal["documents", "own", "baseline"]] = "own"
-    TAKES_VALUES: ClassVar[bool] = False
-    TAKES_VECTORS: ClassVar[bool] = False
     END_FORMAT: ClassVar[Format] = COMPONENT
-    CUT_BY_ERROR: ClassVar[bool] = True
     CHECKED_AT: ClassVar[tuple[float, ...]] = (0.25, 0.5, 0.75)
 
     @property
@@ -131,9 +120,64 @@ class Interpolator(ABC):
         return False
 
     @property
-    def takes_line(self) -> bool:
-        """Whether a span carries the ends of the true line, which have lengths, in place of unit normals."""
-        return self.END_FORMAT != COMPONENT
+    def curve_is_exact(self) -> bool:
+        """Whether the curve is the exact one, of perspective-correct normals: spans bring the true line."""
+        return False
+
+    @property
+    def lights_cut(self) -> bool:
+        """Whether each light that is on may cut spans, one without effect too: the curve has an error."""
+        return False
+
+    @property
+    def lights_share_words(self) -> bool:
+        """Whether the last bits of a light's operands depend on the other lights and on their highlights."""
+        return False
+
+    @property
+    def serves_local(self) -> bool:
+        """Whether L and H may differ from pixel to pixel: near lights and viewer, and lights that fade."""
+        return False
+
+    @property
+    def given_values(self) -> bool:
+        """Whether spans bring values of each light: to compute them is no work of the pipeline."""
+        return False
+
+    @property
+    def brings_ends(self) -> bool:
+        """Whether spans bring normals at both ends, of length 1 or along the true line."""
+        return False
+
+    @property
+    def serves_mirror(self) -> bool:
+        """Whether the method finds highlights of R·V, and not of N·H alone."""
+        return False
+
+    @property
+    def needs_table(self) -> bool:
+        """Whether highlights come from a lobe's table, whatever the reflection model."""
+        return False
+
+    @property
+    def divides_spans(self) -> bool:
+        """Whether the cycles of a span depend on its normals."""
+        return False
+
+    @property
+    def degrees(self) -> Sequence[int]:
+        """Degrees that the method's polynomial can have, see `with_degree`; empty without a choice."""
+        return ()
+
+    @property
+    def word_choices(self) -> Sequence[int]:
+        """Fraction bits that the method's words can have, see `with_words`; empty without a choice."""
+        return ()
+
+    @property
+    def light_meanings(self) -> LightMeanings:
+        """What the vectors of a light among the frame constants are."""
+        return NOT_READ
 
     @property
     def uses_chord(self) -> bool:
@@ -149,6 +193,44 @@ class Interpolator(ABC):
             If the method has one operand.
         """
         raise ValueError(f"method {self.name} finds no normals, so it has one operand")
+
+    def with_degree(self, degree: int) -> "Interpolator":
+        """The method with a polynomial of another degree.
+
+        Raises
+        ------
+        ValueError
+            If the degree is not one of `degrees`.
+        """
+        raise ValueError(f"method {self.name} has no polynomial of degree {degree}")
+
+    def with_words(self, fraction_bits: int) -> "Interpolator":
+        """The method with words of other fraction bits.
+
+        Raises
+        ------
+        ValueError
+            If the method has no `word_choices`.
+        """
+        raise ValueError(f"method {self.name} has no choice of words")
+
+    def shortest_words(self, longest: int) -> int | None:
+        """Fraction bits that serve spans up to a length, if fewer than the method has; else ``None``."""
+        return None
+
+    def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
+        """Lines that tell the user of a pipeline what a span brings, for a header of Verilog.
+
+        Parameters
+        ----------
+        lights : int
+            Number of lights, at least 1.
+        highlights : bool
+            Whether there is specular light.
+        factors : sequence of int
+            Indices of the lights that fade.
+        """
+        return []
 
     def matched(self, specular: HighlightOperand | None) -> "Interpolator":
         """The method for a specular unit; ``None``: without specular light.
@@ -263,6 +345,17 @@ class Interpolator(ABC):
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
         """The spans of a frame, cut for the method, and the number of given spans that were cut."""
 
+    def least_cut(self, cutter: SpanCutter) -> Raster:
+        """The spans of a frame with as few cuts as the method's hardware can take, whatever their errors."""
+        return cutter.uncut()
+
+    def missed(self, cutter: SpanCutter, cut: Raster) -> int:
+        """Of cut spans, how many have a curve that is off by more than a quarter of an LSB, as `cut` left it.
+
+        0 of a method whose `cut` looks at the error, or whose curve is exact.
+        """
+        return 0
+
     @abstractmethod
     def filled(self, filler: SpanFiller) -> Spans:
         """The beats of cut spans, with the operands of the method."""
@@ -273,6 +366,24 @@ class Interpolator(ABC):
 
     def bound(self, bounds: ErrorBounds) -> float | None:
         """Bound of the error of a frame against exact normals, in LSB; ``None``: no bound is known."""
+        return None
+
+    def triangle_axes(self, scene: Scene, lights: int, highlights: bool) -> np.ndarray | None:
+        """Axes in the scene's frame of the normals that triangles have, by rows; ``None``: the scene's own.
+
+        Parameters
+        ----------
+        scene : Scene
+            Lights and viewer.
+        lights : int
+            Number of lights of the design.
+        highlights : bool
+            Whether there is specular light.
+
+        Returns
+        -------
+        float64 array, shape (3, 3), or None
+        """
         return None
 
     def widest_span(self, exponent: int) -> float:
@@ -290,6 +401,24 @@ class Interpolator(ABC):
             Angle of the span, up to `MAX_ANGLE`.
         """
         raise NotImplementedError
+
+    def highlight_error(
+        self, unit: HighlightOperand, parameter: float | None, length: int, error: float
+    ) -> float:
+        """Bound of the error of a specular term against the method's own curve in float64.
+
+        Parameters
+        ----------
+        unit : HighlightOperand
+            The specular unit.
+        parameter : float or None
+            Exponent or roughness.
+        length : int
+            Pixels of the span.
+        error : float
+            Bound of the error of N·H, of `operand_error`.
+        """
+        return (parameter or 0) * error + unit.error
 
     def exact_normals(self, normal_left: np.ndarray, normal_right: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Normals of the method's curve in float64, as `interpolate` gives them.

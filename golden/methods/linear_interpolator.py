@@ -44,11 +44,19 @@ class LinearInterpolator(NormalInterpolator):
 
     CURVE = "linear"
     ORIGIN = "baseline"
-    CUT_BY_ERROR = False
+
+    @property
+    def lights_cut(self) -> bool:
+        """``False``: see `cut`."""
+        return False
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
         """Spans cut by their angle alone."""
         return cutter.by_angle()
+
+    def missed(self, cutter: SpanCutter, cut: Raster) -> int:
+        """Spans whose angle alone does not keep the tolerance, see `Interpolator.missed`."""
+        return cutter.missed(cut)
 
     @property
     def normal_error(self) -> float:

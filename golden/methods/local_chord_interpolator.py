@@ -98,7 +98,6 @@ class LocalChordInterpolator(Interpolator):
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
     CURVE = "quadratic"
-    TAKES_VALUES = True
     HIGHLIGHT_BUDGET: ClassVar[float] = 0.4
     DIFFUSE_BUDGET: ClassVar[float] = 0.12
     FACTOR_BUDGET: ClassVar[float] = 0.25
@@ -140,6 +139,54 @@ class LocalChordInterpolator(Interpolator):
     def fitted(self, lobe: Lobe, parameters: Sequence[float | None]) -> "LocalChordInterpolator":
         """The method with the scale that suits sharp lobes, see `Lobe.scale_of`."""
         return replace(self, scale=lobe.scale_of(parameters))
+
+    @property
+    def serves_local(self) -> bool:
+        """``True``: spans bring values of N·L and u of each light."""
+        return True
+
+    @property
+    def given_values(self) -> bool:
+        """``True``: see `serves_local`."""
+        return True
+
+    @property
+    def word_choices(self) -> Sequence[int]:
+        """Fraction bits of the differences."""
+        return range(36, 47, 2)
+
+    def with_words(self, fraction_bits: int) -> "LocalChordInterpolator":
+        """The method with other differences, see `Interpolator.with_words`."""
+        return replace(self, fraction_bits=fraction_bits)
+
+    def shortest_words(self, longest: int) -> int | None:
+        """See `Interpolator.shortest_words`."""
+        serving = (bits for bits in self.word_choices if longest <= ChordSetup(bits).longest)
+        bits = min(serving, default=self.fraction_bits)
+        return bits if bits < self.fraction_bits else None
+
+    def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
+        """Values, see `Interpolator.input_lines`."""
+        diffuse, highlight = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
+        lines = [
+            f"i_values: a light's three codes of N.L, {diffuse}, and three of 1 - N.H, {highlight},",
+            "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
+        ]
+        if self.scale:
+            lines.append(f"1 - N.H is times {1 << self.scale}, and 1 at most; so it is in the table")
+        if factors:
+            one = len(factors) == 1
+            lines += [
+                f"i_factors: three codes of the factor a, 0 to 1, in {diffuse}, times (1 - 2^-17)^2, of "
+                f"light{'' if one else 's'} {', '.join(map(str, factors))}, which fade{'s' if one else ''};",
+                "their N.L in i_values is times a",
+            ]
+        return lines
+
+    @property
+    def lights_cut(self) -> bool:
+        """``True``: see `cut`."""
+        return True
 
     @property
     def serves_gate(self) -> bool:

@@ -1,13 +1,14 @@
 """Methods whose spans carry normals at their ends, and methods that find the normal of each pixel."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord import Chord
-from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frame_constants import UNIT_VECTORS, FrameConstants, LightMeanings
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_gate import GateLimits, HighlightGate
@@ -74,6 +75,25 @@ class EndNormalInterpolator(Interpolator):
     def gate_limits(self) -> GateLimits:
         """`highlight_excess`, `shortest_normal` and `gate_angle`, for a highlight gate."""
         return GateLimits(self.highlight_excess, self.shortest_normal, self.gate_angle)
+
+    @property
+    def brings_ends(self) -> bool:
+        """``True``."""
+        return True
+
+    def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
+        """Unit vectors, see `Interpolator.input_lines`."""
+        return ["i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)"]
+
+    @property
+    def lights_cut(self) -> bool:
+        """``True``: see `cut`."""
+        return True
+
+    @property
+    def light_meanings(self) -> LightMeanings:
+        """Unit vectors."""
+        return UNIT_VECTORS
 
     def gate(self, specular: HighlightOperand) -> Gate:
         """Model of the gate by unit normals, see `Interpolator.gate`."""

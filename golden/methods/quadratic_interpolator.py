@@ -1,10 +1,12 @@
 """Quadratic interpolation of normals ([T] 2.2): methods ``quadratic``, ``-eval`` and ``-horner``."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
+from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.normal_interpolator import NormalInterpolator, difference_rounding
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
@@ -72,6 +74,17 @@ class QuadraticInterpolator(NormalInterpolator):
     def serves_gate(self) -> bool:
         """Whether the method serves a highlight gate: only with the default fit of the middle normal."""
         return self.middle_normal == MiddleNormal()
+
+    @property
+    def degrees(self) -> Sequence[int]:
+        """Degrees of the middle normal's polynomial: 2, a plain minimax fit, or 3; none as published."""
+        return () if self.middle_normal == MiddleNormal("as_published") else (2, 3)
+
+    def with_degree(self, degree: int) -> Interpolator:
+        """The method with another middle normal, see `Interpolator.with_degree`."""
+        if degree not in self.degrees:
+            return super().with_degree(degree)
+        return replace(self, middle_normal=MiddleNormal({2: "minimax_2", 3: "exact"}[degree]))
 
     @property
     def normal_error(self) -> float:

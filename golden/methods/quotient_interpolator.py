@@ -8,8 +8,8 @@ import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.quotient import Quotient
-from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
-from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
+from blysk.golden.frame_constants import FrameConstants, LightMeanings
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
@@ -55,8 +55,6 @@ class QuotientInterpolator(Interpolator):
     COSINE_FORMAT = Quotient.COSINE_FORMAT
     MAX_ANGLE = 180.0
     CURVE = "normalised"
-    CUT_BY_ERROR = False
-    TAKES_VECTORS = True
     LARGEST_RATIO: ClassVar[float] = 2.0
     SHORTEST: ClassVar[float] = 1 / (2 * 5**0.5)
 
@@ -71,9 +69,29 @@ class QuotientInterpolator(Interpolator):
         return Quotient(self.spans(1, True)).place_format
 
     @property
-    def takes_line(self) -> bool:
+    def curve_is_exact(self) -> bool:
         """``True``: vectors have the lengths of the true line."""
         return True
+
+    @property
+    def serves_mirror(self) -> bool:
+        """``True``: `matched` takes the kind of highlight from the unit's model."""
+        return True
+
+    @property
+    def needs_table(self) -> bool:
+        """``True``: the operand is a place in the table."""
+        return True
+
+    @property
+    def lights_share_words(self) -> bool:
+        """``True``: vectors of all lights have one exponent, and q of the first light serves all."""
+        return True
+
+    @property
+    def light_meanings(self) -> LightMeanings:
+        """L in the frame of the light; there H is z."""
+        return LightMeanings("sin a, 0, cos a of the light's frame", "not read", "2^17 - 2")
 
     def matched(self, specular: HighlightOperand | None) -> "QuotientInterpolator":
         """The method with the kind of highlight of a unit's model."""
@@ -85,6 +103,45 @@ class QuotientInterpolator(Interpolator):
         if specular.operand == self.operand:
             return specular
         return QuotientLobe(specular.reflection, **specular.table_options)
+
+    def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
+        """Vectors and their frames, see `Interpolator.input_lines`."""
+        model = self.spans(lights, highlights)
+        mirrored = (
+            ["y_k is times cos a of light k; s0 is y of light 0 times its sin a."] if model.mirror else []
+        )
+        axes = (
+            [
+                "Frame of light k, L and V unit vectors to it and to the viewer: z = (L + V)/|L + V|,",
+                "x = (L - V)/|L - V|, y = cross product z x x. "
+                "So L = (sin a, 0, cos a), V = (-sin a, 0, cos a).",
+                "L = V: any x across z, sin a = 0. L = -V: x = L, any z across x, cos a = 0"
+                + ("." if model.mirror else ", specular colour 0."),
+            ]
+            if highlights
+            else [
+                "Frame of light 0: z = L, x and y across it. "
+                "Of a further light z = L alone. L, H are not read."
+            ]
+        )
+        constants = [f"constants: of L write sin a, 0, cos a, times {model.ONE}; H is not read"]
+        return [
+            *axes,
+            "v = N/W, linear on the screen over a triangle: corner normals over their W, interpolated.",
+            f"i_start: components {', '.join(model.components)} of v at the first pixel centre.",
+            *mirrored,
+            f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one factor, so",
+            f"that the largest component at an end is 1/2 to 1 - {MARGIN} 2^-17. At 1 it would wrap.",
+            "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), times",
+            "2^i_exponent. i_exponent: the largest with which i_step fits, "
+            "at most ceil(log2(length - 1)) + 3.",
+            "Halve a span where |v| at its ends differs by a factor over 2, "
+            "or where they are over 90 degrees",
+            "apart. Give a span of two pixels as two of one, whose step is 0. "
+            "A span with a pixel of |v| under",
+            "1/128, which these cuts exclude, is wrong, and counted in status_out_of_range_spans.",
+            *(constants if highlights else []),
+        ]
 
     def geometry(self, lights: int) -> Geometry:
         """Geometry that makes vectors. With several lights it turns them."""
@@ -99,9 +156,17 @@ class QuotientInterpolator(Interpolator):
                 codes[index] = np.rint(frame.direction * QuotientSpans.ONE)
         return [replace(of, direction=codes, halfway=np.zeros_like(codes)) for of in constants]
 
+    def triangle_axes(self, scene: Scene, lights: int, highlights: bool) -> np.ndarray | None:
+        """x, y and z of the first light's frame; without highlights z is along the light."""
+        return light_frames(scene, 1)[0].axes_for(highlights) if lights else None
+
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
         """Spans whose ends differ in length by `LARGEST_RATIO` at most."""
         return cutter.by_ends(self.LARGEST_RATIO)
+
+    def least_cut(self, cutter: SpanCutter) -> Raster:
+        """Spans of two pixels as two of one: their step would not fit."""
+        return cutter.split_pairs()
 
     def filled(self, filler: SpanFiller) -> Spans:
         """Spans with vectors in the frame of each light."""
@@ -151,6 +216,13 @@ class QuotientInterpolator(Interpolator):
         pixels = spans.compute(vectors, length, direction[:, ::2])
         cosine, place, too_small = Quotient(spans).compute(pixels)
         return Operands(cosine, place, np.bincount(pixels_of(length)[0], too_small, len(length)) > 0)
+
+    def highlight_error(
+        self, unit: HighlightOperand, parameter: float | None, length: int, error: float
+    ) -> float:
+        """Bound from the words of the worst span, with those of the table, see `QuotientErrors.highlight`."""
+        own = QuotientErrors.worst(length, self.mirror).highlight(unit.reflection, parameter)
+        return own + unit.line_error(parameter) + unit.error
 
     def errors(self, vectors: SpanVectors, length: np.ndarray) -> "QuotientErrors":
         """Bounds of the errors of spans, see `QuotientErrors`."""

@@ -1,5 +1,6 @@
 """Renormalisation at every pixel: perspective-correct normals of wide spans."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -54,7 +55,6 @@ class RenormaliseInterpolator(NormalInterpolator):
     MAX_ANGLE = 180.0
     CURVE = "normalised"
     ORIGIN = "baseline"
-    CUT_BY_ERROR = False
 
     @property
     def name(self) -> str:
@@ -65,6 +65,24 @@ class RenormaliseInterpolator(NormalInterpolator):
     def serves_gate(self) -> bool:
         """``False``, because a gate takes unit normals."""
         return False
+
+    @property
+    def curve_is_exact(self) -> bool:
+        """``True``: each vector of the true line is divided by its length."""
+        return True
+
+    @property
+    def lights_cut(self) -> bool:
+        """``False``: see `cut`."""
+        return False
+
+    def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
+        """Ends of the true line, see `Interpolator.input_lines`."""
+        return [
+            "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
+            f"in {self.END_FORMAT}; pixels under 1/256 of it are wrong, and their spans are "
+            "counted in status_out_of_range_spans"
+        ]
 
     def geometry(self, lights: int) -> Geometry:
         """Geometry that makes true lines."""

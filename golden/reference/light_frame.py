@@ -30,6 +30,13 @@ class LightFrame(NamedTuple):
         """L in this frame, shape (3,)."""
         return np.array([self.sine, 0.0, self.cosine])
 
+    def axes_for(self, highlights: bool) -> np.ndarray:
+        """`axes`; without highlights x and y across L, z along L."""
+        if highlights:
+            return self.axes
+        x, y, z = self.axes
+        return np.stack([self.cosine * x - self.sine * z, y, self.sine * x + self.cosine * z])
+
 
 def light_frame(direction: np.ndarray, viewer: np.ndarray) -> LightFrame:
     """Frame of a light and a viewer, both at infinity.

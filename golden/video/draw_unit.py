@@ -167,10 +167,8 @@ class Drawing:
         x_bits, y_bits = cls.place_bits(size, lines)
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
         renderer, mesh = Renderer(design), MeshMemory.of([scene.mesh])
-        turned_to = [
-            triangle_axes(each, design) if design.takes_vectors and design.lights else np.eye(3)
-            for each in scenes
-        ]
+        given = [triangle_axes(each, design) for each in scenes]
+        turned_to = [np.eye(3) if axes is None else axes for axes in given]
         axes, sets = np.unique(np.stack(turned_to), axis=0, return_inverse=True)
         if renderer.rows:
             axes = axes * _SHORTER

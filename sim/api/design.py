@@ -79,7 +79,7 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
         If there is no such pipeline.
     """
     method = settings["method"]
-    if settings["model"] in MIRROR_LOBES and not (METHODS | PUBLISHED)[method].TAKES_VECTORS:
+    if settings["model"] in MIRROR_LOBES and not (METHODS | PUBLISHED)[method].serves_mirror:
         remedy = (
             "use method quotient; or phong_coplanar, equal where N, L and V lie in a plane, elsewhere with "
             "rounder highlights, 11 LSB off on the default teapot"
@@ -95,8 +95,8 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
     if settings["setup_interval"] is not None:
         _check_interval(settings, made)
     _check_parameter(settings, made)
-    if isinstance(made.specular, Lobe):
-        made = replace(made, specular=replace(made.specular, banks=min(materials, Lobe.MAX_BANKS)))
+    if made.loads_tables:
+        made = replace(made, specular=replace(made.lobe, banks=min(materials, Lobe.MAX_BANKS)))
     return replace(made, materials=materials)
 
 

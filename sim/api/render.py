@@ -241,7 +241,7 @@ def _design(settings: Settings) -> ShadingPipeline:
     viewer = source.viewer if isinstance(source, Scene) else settings["viewer"]
     made, hardware = design_of(settings, max(1, len(lights))), settings["geometry"] == "hardware"
     local = viewer == "near" or any(light.position is not None for light in lights)
-    if local and (hardware or not made.takes_values):
+    if local and (hardware or not made.interpolator.serves_local):
         option, remedy = ("geometry", "use software") if hardware else ("method", "use method chord-local")
         raise settings.refuse(option, "point lights and a near viewer need the values of a span", remedy)
     return replace(made, factors=tuple(index for index, light in enumerate(lights) if light.fades))

@@ -5,12 +5,9 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Unpack
 
-from blysk.golden.cosines.chord_setup import ChordSetup
-from blysk.golden.cosines.quotient_spans import MARGIN
 from blysk.golden.frame_constants import address_table
 from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.scene import BACK_FACES
@@ -53,71 +50,13 @@ def header_of(unit: ShadingUnit) -> list[str]:
         *_several_lines(several, unit),
         _FORMATS,
     ]
-    if made.takes_values:
-        formats = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
-        lines += [
-            f"i_values: a light's three codes of N.L, {formats[0]}, and three of 1 - N.H, {formats[1]},",
-            "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
-        ]
-        if scale := getattr(made.interpolator, "scale", 0):
-            lines.append(f"1 - N.H is times {1 << scale}, and 1 at most; so it is in the table")
-        if made.factors:
-            lines += [
-                f"i_factors: three codes of the factor a, 0 to 1, in {formats[0]}, times (1 - 2^-17)^2, of "
-                f"light{'s' * (len(made.factors) > 1)} {', '.join(map(str, made.factors))}, which "
-                f"fade{'s' * (len(made.factors) == 1)};",
-                "their N.L in i_values is times a",
-            ]
-    elif made.takes_vectors and made.lights:
-        lines += _vector_lines(made)
-    elif made.interpolator.takes_line:
-        lines.append(
-            "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
-            f"in {made.interpolator.END_FORMAT}; pixels under 1/256 of it are wrong, and their spans are "
-            "counted in status_out_of_range_spans"
-        )
-    elif made.lights:
-        lines.append("i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)")
+    if made.lights:
+        lines += made.interpolator.input_lines(made.lights, made.specular is not None, made.factors)
     lines += [
         f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
         "before the first span: rst high for a cycle, then write every frame constant in any order",
     ]
     return lines
-
-
-def _vector_lines(made: ShadingPipeline) -> list[str]:
-    """How the vectors of spans are made, for a method that takes them."""
-    model = made.vector_spans
-    mirrored = ["y_k is times cos a of light k; s0 is y of light 0 times its sin a."] if model.mirror else []
-    axes = (
-        [
-            "Frame of light k, L and V unit vectors to it and to the viewer: z = (L + V)/|L + V|,",
-            "x = (L - V)/|L - V|, y = cross product z x x. So L = (sin a, 0, cos a), V = (-sin a, 0, cos a).",
-            "L = V: any x across z, sin a = 0. L = -V: x = L, any z across x, cos a = 0"
-            + ("." if model.mirror else ", specular colour 0."),
-        ]
-        if model.highlights
-        else [
-            "Frame of light 0: z = L, x and y across it. Of a further light z = L alone. L, H are not read."
-        ]
-    )
-    constants = [
-        f"constants: of L write sin a, 0, cos a, times {model.ONE}; H is not read",
-    ]
-    return [
-        *axes,
-        "v = N/W, linear on the screen over a triangle: corner normals over their W, interpolated.",
-        f"i_start: components {', '.join(model.components)} of v at the first pixel centre.",
-        *mirrored,
-        f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one factor, so",
-        f"that the largest component at an end is 1/2 to 1 - {MARGIN} 2^-17. At 1 it would wrap.",
-        "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), times",
-        "2^i_exponent. i_exponent: the largest with which i_step fits, at most ceil(log2(length - 1)) + 3.",
-        "Halve a span where |v| at its ends differs by a factor over 2, or where they are over 90 degrees",
-        "apart. Give a span of two pixels as two of one, whose step is 0. A span with a pixel of |v| under",
-        "1/128, which these cuts exclude, is wrong, and counted in status_out_of_range_spans.",
-        *(constants if model.highlights else []),
-    ]
 
 
 def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[str]:
@@ -251,12 +190,12 @@ def verilog_and_unit(
         raise OptionError("name", name, str(error), "choose another name") from None
     unit = core_of(design)
     p = design
-    lobe = p.specular if isinstance(p.specular, Lobe) else None
-    loads = lobe is not None and lobe.fixed is None
+    loads = p.loads_tables and p.lobe.fixed is None
     core = unit.framing.core if isinstance(unit, BusUnit) else unit
     renderer = core.model if isinstance(core, RendererUnit) else None
     axes = [f"axis {axis}" for axis in renderer.axes] if renderer else []
-    constants = address_table(p.lights, p.materials, p.banks, p.threshold_format, loads, p.span_members, axes)
+    counts = p.lights, p.materials, p.banks
+    constants = address_table(*counts, p.threshold_format, loads, p.interpolator.light_meanings, axes)
     if isinstance(core, GeometryUnit):
         lines = _geometry_header(core)
     else:

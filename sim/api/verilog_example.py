@@ -6,8 +6,6 @@ from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.triangle_frame import triangle_constants
 from blysk.golden.lighting.lobe import Lobe
-from blysk.golden.lighting.quotient_lobe import QuotientLobe
-from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
@@ -55,27 +53,23 @@ def example_of(design: ShadingPipeline, renderer: Renderer | None = None) -> lis
         "L = H = (0, 0, 1), white light; address: data of each write of a material",
         *("  " + ", ".join(others[k : k + _PER_LINE]) for k in range(0, len(others), _PER_LINE)),
     ]
-    if isinstance(design.specular, Lobe) and table:
-        lines += _table_lines(design.specular, table)
-        if design.has_threshold and isinstance(design.highlight_gate, ValueGate):
-            lines.append(
-                "  threshold: 2^16 times the least u from which on all values are 0, rounded up, + 1"
-            )
+    if table:
+        lines += _table_lines(design.lobe, table)
+        if design.has_threshold and (rule := design.highlight_gate.threshold_rule):
+            lines.append(f"  threshold: {rule}")
     return lines
 
 
 def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
     steps, octaves = lobe.steps, lobe.octaves
-    operand, parts, first = "u", [], "u = 1 - N.H"
-    if isinstance(lobe, QuotientLobe):
-        operand = "s"
-        first = "s = (1 - R.V)/2" if lobe.reflection.MIRROR else "s = 1 - (N.H)^2"
-        if lobe.parts == 2:
-            half = lobe.entries // 2
-            parts = [
-                f"  these are {half} values; then as many of the same highlight by c = (N.H)^2 for s, "
-                "from c = 0 on; last c = 1"
-            ]
+    first, parts = lobe.argument_text, []
+    operand = first[0]
+    if lobe.parts == 2:
+        half = lobe.entries // 2
+        parts = [
+            f"  these are {half} values; then as many of the same highlight by c = (N.H)^2 for s, "
+            "from c = 0 on; last c = 1"
+        ]
     return [
         f"Table, {len(table)} writes to address {LOBE_ADDRESS} in this order: 2^17 + bank, then "
         f"{lobe.entries + 1} values of the highlight S({operand}), {first}, times 2^17 (1 is 2^17 - 1):",

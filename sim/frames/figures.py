@@ -9,7 +9,6 @@ import numpy as np
 
 from blysk.golden.frames.compare import BORDER, Comparison
 from blysk.golden.frames.frame import Picture
-from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.scene import Scene
 from blysk.sim.frames.error_names import ERRORS
@@ -113,10 +112,9 @@ def triangle_figures(
 
 def sharp_lobes(scene: Scene, design: ShadingPipeline) -> int:
     """Number of lobes that the method ``quotient`` has over 0.25 LSB off between two entries of a table."""
-    if not isinstance(design.specular, QuotientLobe):
+    if design.specular is None:
         return 0
-    lobes = {design.highlight_parameter(material) for material in scene.materials}
-    return sum(design.specular.line_error(lobe) > 1 / 1020 for lobe in lobes)
+    return sum(map(design.specular.is_sharp, set(map(design.highlight_parameter, scene.materials))))
 
 
 def _figures(

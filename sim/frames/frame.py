@@ -16,7 +16,7 @@ from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.scene import Scene
-from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.pipeline import ShadingPipelineUnit, span_shape
 from blysk.hdl.pixel_pipelines import WidePipelinesUnit
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import SimulationError
@@ -208,13 +208,13 @@ def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
         normal_right=quantise(turned),
         material=np.arange(len(length)) // 5 % design.materials,
     )
-    if design.takes_vectors and design.lights:
-        count = len(design.vector_spans.components)
-        ends = rng.normal(size=(2, len(length), count))
+    members = span_shape(design).members
+    if "step" in members:
+        ends = rng.normal(size=(2, len(length), members["step"].length))
         # A span of two pixels has no step that fits, and one of none has none.
         vectors = SpanVectors.quantise(*ends, np.where(length > 2, length, 1))
         spans = replace(spans, vectors=vectors)
-    if design.takes_values:
+    if "values" in members:
         start, step = rng.uniform(0, 0.3, (2, 2, len(length), design.lights, 1))
         spans = replace(spans, values=SpanValues.quantise(*(start + step * (0, 0.4, 1))))
         if design.factors:

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
 from blysk.golden.pipeline import ShadingPipeline
@@ -111,13 +110,13 @@ def specialise(
     design = Specialisation(full, tuple(reductions), scenes).design
     constants = constants_of(scenes[0], design)
     prepared = [prepare(scene, design) for scene in scenes]
-    if not (exact and design.takes_vectors):
+    if not (exact and design.interpolator.lights_share_words):
         reductions += _without_highlights(design, prepared, constants)
     reductions += _with_fixed_values(design, constants, reductions)
     longest = max(int(frame.spans.length.max(initial=0)) for frame in prepared)
     reductions += _with_fewer_bits(full, scenes[0], longest)
-    if not exact and design.takes_values and design.lights:
-        reductions += _with_shorter_words(prepared, longest)
+    if not exact and design.lights:
+        reductions += _with_shorter_words(design, longest)
     return Specialisation(full, tuple(reductions), scenes)
 
 
@@ -132,10 +131,10 @@ def _without_dark_lights(
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     constants = _constants(scenes[0], full.lights, full.mirror)
     bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
-    if full.interpolator.CUT_BY_ERROR and bright.any():
+    if full.interpolator.lights_cut and bright.any():
         # Spans are cut by those of every light that is on, whether it shows or not.
         bright[: len(scenes[0].lights)] |= [light.is_on for light in scenes[0].lights]
-    if bright.all() or (exact and full.takes_vectors and bright.any()):
+    if bright.all() or (exact and full.interpolator.lights_share_words and bright.any()):
         return scenes, []
     count = int(np.count_nonzero(bright))
     kept = tuple(light for light, lit in zip(scenes[0].lights, bright, strict=False) if lit)
@@ -231,11 +230,12 @@ def _with_fewer_bits(full: ShadingPipeline, scene: Scene, longest: int) -> list[
     return found
 
 
-def _with_shorter_words(prepared: Sequence[PreparedFrame], longest: int) -> list[Reduction]:
+def _with_shorter_words(design: ShadingPipeline, longest: int) -> list[Reduction]:
     """Reduction of the differences of ``chord-local`` to the fraction bits that the longest span needs."""
-    found = []
-    bits = min(bits for bits in range(36, 47, 2) if longest <= ChordSetup(fraction_bits=bits).longest)
-    if bits < 46:
-        reason = f"differences of {bits} in place of 46 fraction bits: the longest span has {longest} pixels"
-        found.append(Reduction(reason, {"interpolator": {"fraction_bits": bits}}))
-    return found
+    method = design.interpolator
+    bits = method.shortest_words(longest)
+    if bits is None:
+        return []
+    most = max(method.word_choices)
+    reason = f"differences of {bits} in place of {most} fraction bits: the longest span has {longest} pixels"
+    return [Reduction(reason, {"interpolator": {"fraction_bits": bits}})]

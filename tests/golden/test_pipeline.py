@@ -198,7 +198,7 @@ def spans_near_a_highlight(rng, halfway, level, angle):
 
 
 # The gate of chord-local has tests of its own.
-BY_NORMALS = [name for name, of in METHODS.items() if of.serves_gate and not of.TAKES_VALUES]
+BY_NORMALS = [name for name, of in METHODS.items() if of.serves_gate and of.brings_ends]
 GATED = [(name, None) for name in BY_NORMALS] + [
     (name, "one_minus_cosine") for name in ("linear", "bisection", "quadratic")
 ]

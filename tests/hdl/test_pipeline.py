@@ -29,7 +29,7 @@ from blysk.sim.frames.testbench import pixel_beats
 from ..checks import assert_beats_equal
 from ..lists import KINDS
 
-FROM_NORMALS = [name for name, of in METHODS.items() if not (of.TAKES_VALUES or of.TAKES_VECTORS)]
+FROM_NORMALS = [name for name, of in METHODS.items() if of.brings_ends]
 
 
 def shade(unit, spans, constants, pixels=None, engine="auto", **stalls):

@@ -36,7 +36,7 @@ DESIGN = {"method": "quadratic", "model": "cosquad", "gate": False, "seed": 1, "
 
 
 def test_every_method_of_a_pixel_a_cycle_that_takes_normals():
-    expected = {name for name, method in METHODS.items() if not method.TAKES_VALUES} - {"bisection"}
+    expected = {name for name, method in METHODS.items() if not method.given_values} - {"bisection"}
     assert {method for method, _, _ in DESIGNS} == expected
 
 

@@ -295,7 +295,7 @@ def test_stated_cycles_are_a_bound_of_those_of_frames():
     """Of the baselines, which are simulated; but for bisection, which states none."""
     measured = baselines.read()
     for method in METHODS:
-        model = "blinn" if METHODS[method].TAKES_VECTORS else "cosquad"
+        model = "blinn" if METHODS[method].needs_table else "cosquad"
         for style in STYLES:
             candidate = Candidate(method, model, style=style)
             with warnings.catch_warnings():

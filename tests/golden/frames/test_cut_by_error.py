@@ -124,7 +124,7 @@ def test_cut_by_error_of_every_method(method):
     assert count > 100
     assert np.array_equal(cut.pixel, raster.pixel)
     assert (angles(cut)[cut.length > 1] <= max(map(interpolator.widest_span, EXPONENTS)) + 1e-9).all()
-    if interpolator.TAKES_VALUES:
+    if interpolator.given_values:
         return
     # Normals of the method against true ones, at every pixel, by the highlight of the first light.
     span = cut.span
@@ -150,9 +150,9 @@ def test_cut_spans_chooses():
         design = preset(method, "cosquad", lights=2, materials=len(EXPONENTS))
         found, count = cut_spans(scene, raster, design)
         widest = min(map(interpolator.widest_span, EXPONENTS))
-        if interpolator.CUT_BY_ERROR:
+        if interpolator.lights_cut:
             expected = cut_by_error(scene, raster, interpolator)
-        elif interpolator.TAKES_VECTORS:
+        elif not interpolator.brings_ends:
             expected = cut_by_ends(raster, interpolator.LARGEST_RATIO)
         else:
             expected = cut_by_angle(raster, widest)

@@ -130,7 +130,7 @@ def test_no_method_is_silently_wrong_in_any_depth(method):
         frame = model_frame(scene, design)
         assert frame.out_of_range_spans == 0
         assert errors(scene, design, frame.image).max() < PROMISED or frame.prepared.missed_spans
-        if not design.takes_values:
+        if not design.interpolator.serves_local:
             error, counts = by_hardware(scene, design)
             assert error.max() < PROMISED or any(counts.values())
 

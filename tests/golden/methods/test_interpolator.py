@@ -21,7 +21,7 @@ from blysk.golden.reference.curves import CURVES, interpolate
 
 STEP = 2.0**-17
 ONE_VALUE = float(ONE_SQUARED.values)
-FROM_NORMALS = [name for name, of in METHODS.items() if not (of.TAKES_VALUES or of.TAKES_VECTORS)]
+FROM_NORMALS = [name for name, of in METHODS.items() if of.brings_ends]
 NORMAL_METHODS = [name for name, method in METHODS.items() if isinstance(method, NormalInterpolator)]
 
 # `quantise` moves a vector by half a step along itself and by sqrt(3) steps across.
@@ -56,7 +56,7 @@ def compute(interpolator, left, right, length, direction, halfway):
 
 def end_words(interpolator, left, right):
     """Ends of spans in the format that the method takes: unit normals, or a line between two of length 1."""
-    codes = quantise_line(left, right) if interpolator.takes_line else (quantise(left), quantise(right))
+    codes = quantise_line(left, right) if interpolator.curve_is_exact else (quantise(left), quantise(right))
     return [Fixed(interpolator.END_FORMAT, end) for end in codes]
 
 

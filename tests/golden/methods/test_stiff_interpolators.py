@@ -27,8 +27,7 @@ ONE_VALUE = float(ONE_SQUARED.values)
 NAMES = [
     name
     for name, method in METHODS.items()
-    if not (method.TAKES_VALUES or method.TAKES_VECTORS)
-    and not (method.uses_chord and method.CURVE != "normalised")
+    if method.brings_ends and not (method.uses_chord and method.CURVE != "normalised")
 ]
 NORMALS = [name for name in NAMES if name not in ("angular", "recurrence")]
 ANGLES = [0, 1e-4, 1, 20, 44.9]

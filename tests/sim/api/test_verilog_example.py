@@ -62,7 +62,7 @@ def test_vectors_are_said_to_be_what_is_read():
         ("chord-local", "not read", "not read"),
     ):
         design = preset(method, "blinn")
-        lines = address_table(1, members=design.span_members)
+        lines = address_table(1, of_a_light=design.interpolator.light_meanings)
         assert [line.split(maxsplit=3)[3] for line in lines[2:4]] == [
             f"{text}, SQ(1, 17) (light 0)" for text in (direction, halfway)
         ]
