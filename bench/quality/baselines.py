@@ -80,15 +80,13 @@ def _scenes() -> dict[str, Scene]:
     }
 
 
-def cycles_of(design: ShadingPipeline, style: str = "throughput") -> dict[str, int]:
+def cycles_of(design: ShadingPipeline) -> dict[str, int]:
     """Cycles of a pipeline from the first write of a constant to the last pixel.
 
     Parameters
     ----------
     design : ShadingPipeline
         The pipeline.
-    style : str
-        See `ShadingPipelineUnit`.
 
     Returns
     -------
@@ -96,7 +94,7 @@ def cycles_of(design: ShadingPipeline, style: str = "throughput") -> dict[str, i
         ``teapot_cycles`` of a teapot of 256 triangles at 48x36, and ``square_cycles`` of a square with bent
         normals at 32x24.
     """
-    simulator = FrameSimulator(design.built(style=style), "pysim")
+    simulator = FrameSimulator(design, "pysim")
     return {f"{name}_cycles": simulator.render(scene).cycles for name, scene in _scenes().items()}
 
 
@@ -115,13 +113,13 @@ class _Pipeline:
 
     @property
     def design(self) -> ShadingPipeline:
-        return preset(self.method, self.model, gate=self.gate)
+        return preset(self.method, self.model, gate=self.gate, style=self.style)
 
     def parts(self) -> dict[str, int]:
-        return cost_of(ShadingPipelineUnit(self.design.built(style=self.style))).totals
+        return cost_of(ShadingPipelineUnit(self.design)).totals
 
     def cycles(self) -> dict[str, int]:
-        return cycles_of(self.design, self.style)
+        return cycles_of(self.design)
 
 
 def _parts_of_unit(entry: Entry) -> dict[str, int]:

@@ -139,12 +139,12 @@ def _geometry_header(unit: GeometryUnit) -> list[str]:
     return [f"blysk {version('blysk')} triangles to spans, MIT licence", _FORMATS, *_geometry_lines(unit)]
 
 
-def _descriptions(unit: ShadingUnit | RendererUnit, pipes: int) -> Mapping[str, str]:
+def _descriptions(unit: ShadingUnit | RendererUnit) -> Mapping[str, str]:
     """Descriptions of the ports of a core with pixels as output."""
     if isinstance(unit, RendererUnit):
         return triangle_descriptions(unit)
     fields = {f"i_{field}" for field in unit.i.payload.shape().members}
-    texts = port_descriptions(pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
+    texts = port_descriptions(unit.model.pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
     return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
 
 
@@ -208,5 +208,5 @@ def verilog_and_unit(
         header, descriptions = lines, triangle_descriptions(unit)
     else:
         header = [*lines, "", "Frame constants, through the write port:", *words]
-        descriptions = _descriptions(unit, p.build.pipes)
+        descriptions = _descriptions(unit)
     return emit(unit, name, header=header, descriptions=descriptions), unit
