@@ -81,7 +81,7 @@ def test_normals_are_described_as_they_are(method):
     """The ends of a true line are no unit vectors, and no port of theirs is said to have one."""
     unit = ShadingPipelineUnit(preset(method, "cosquad"))
     (line,) = (line for line in header_of(unit) if line.startswith("i_normal_*"))
-    texts = [text for port, text in descriptions_of(unit, 1).items() if port.startswith("i_normal")]
+    texts = [text for port, text in descriptions_of(unit).items() if port.startswith("i_normal")]
     assert len(texts) == 2
     if method == "renormalise":
         assert "N/W" in line
