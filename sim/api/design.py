@@ -123,11 +123,11 @@ def _check_parameter(settings: Settings, design: ShadingPipeline) -> None:
 
 
 def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
-    """A design, built by options of `BUILD`; others stay as its `Build` has them.
+    """Build a design by options of `BUILD`. The design's own `Build` has the options that are not given.
 
     Parameters
     ----------
-    design : Design
+    design : ShadingPipeline
         The design.
     given : dict
         Values by name, unchecked; ``None`` counts as not given.
@@ -135,11 +135,14 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
     Raises
     ------
     OptionError
-        If a value is not accepted, two exclude each other, or the design does not serve the core.
+        If a value is not accepted, two options exclude each other, or the design does not serve the core.
     """
     values = checked(given, BUILD)
-    hardware = values.pop("geometry", None) == "hardware"
-    if hardware and values.setdefault("top", "render") == "shader":
+    geometry = values.pop("geometry", None)
+    hardware = geometry == "hardware"
+    if geometry is not None:
+        values.setdefault("top", "render" if hardware else "shader")
+    if hardware and values["top"] == "shader":
         remedy = "leave one of them out"
         raise OptionError("top", "shader", "it takes spans, and hardware geometry triangles", remedy)
     if "coarse" in values:

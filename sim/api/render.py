@@ -197,7 +197,7 @@ def _simulator(
 
 
 def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
-    """The design, built by the settings.
+    """The design as the settings build it.
 
     Raises
     ------
@@ -212,7 +212,8 @@ def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
     if given.pop("coarse"):
         given["coarse"] = (source.width, source.height) if isinstance(source, Scene) else settings["size"]
     try:
-        return built(design, given)
+        # A design that drew another frame may bring options of its core.
+        return built(replace(design, build=design.build.shading), given)
     except OptionError as error:
         if error.option == "geometry" or (error.option == "pipes" and not hardware):
             raise

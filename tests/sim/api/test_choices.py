@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import blysk
+from blysk.golden.build import Build
+from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.reference.lobes import COPLANAR_PHONG
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import PHONG
@@ -34,6 +36,16 @@ def accepted(settings):
     except OptionError:
         return False
     return True
+
+
+def test_options_of_a_rendering_replace_the_core_of_its_design():
+    """A design that drew a frame by hardware geometry may draw another from spans."""
+    design = blysk.design(style="compact")
+    read = rendering.rendering_settings("teapot", {"geometry": "hardware", "coarse": True, "setups": 2})
+    by_triangles = rendering._built(read, design)
+    assert by_triangles.build == Build("compact", top="render", setups=2, coarse=CoarseDepth(*read["size"]))
+    plain = rendering.rendering_settings("teapot", {"pipes": 4})
+    assert rendering._built(plain, by_triangles) == design.built(pipes=4)
 
 
 def test_no_choice_of_a_rendering_is_always_refused():
