@@ -29,7 +29,7 @@ class Spans:
     values : SpanValues, optional
         Values of each light, for methods that read no normals, see `LocalChordInterpolator`.
     factors : int64 array, shape (spans, factors, 3), optional
-        For spans with values: codes of the factors of the lights in `Design.factors`, in the format of N·L.
+        For spans with values: codes of the factors of `ShadingPipeline.factors`, in the format of N·L.
     vectors : SpanVectors, optional
         Vectors at the first pixel and their step, for methods that read no normals, see
         `QuotientInterpolator`.

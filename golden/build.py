@@ -51,7 +51,7 @@ class BuildError(ValueError):
 class Build:
     """Build options of a design: they change its cost and its cycles, and no pixel.
 
-    A gate is no build option: it has a bit-accurate model, and frame constants of its own. See `Design`.
+    A gate has a bit-accurate model, and frame constants of its own. So it is a field of `ShadingPipeline`.
 
     Parameters
     ----------

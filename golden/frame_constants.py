@@ -47,7 +47,7 @@ LOBE_ADDRESS = 5
 """Address that loads tables of lobes, see `LobeTable.writes`; bit 17 of the data is ``begins``."""
 
 THRESHOLD_ADDRESS = 6
-"""Address of a material's threshold, see `Design.threshold_of`, in a pipeline that loads tables."""
+"""Address of a material's threshold, see `ShadingPipeline.threshold_of`, in a pipeline that loads tables."""
 
 BANK_ADDRESS = 7
 """Address of the bank of a material's table, in a pipeline with several banks."""
@@ -93,7 +93,7 @@ class FrameConstants:
     bank : int
         Bank of this table.
     threshold : int, optional
-        Threshold of this table, see `Design.threshold_of`, for a design with a gate.
+        Threshold of this table, see `ShadingPipeline.threshold_of`, for a design with a gate.
     axes : int array, shape (lights - 1, rows, 3), optional
         Axes of the frame of each further light, in the frame of the first light, ``SQ(1, 17)``. The rows are
         x, y, z; with highlights of R·V x, ``y cos a``, z; without highlights z alone. For a renderer of

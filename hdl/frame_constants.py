@@ -95,7 +95,7 @@ class FrameConstantsUnit(wiring.Component):
     materials : int
         Number of materials, 1 to `MAX_MATERIALS`.
     threshold : Format or None
-        Format of a threshold for each material, see `Design.threshold_of`. ``None``: there is none.
+        Format of a threshold for each material, see `ShadingPipeline.threshold_of`. ``None``: there is none.
     banks : int
         Number of tables of lobes that materials choose from.
 

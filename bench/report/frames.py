@@ -157,7 +157,7 @@ def frames(
     Parameters
     ----------
     method, model : str
-        Method and model of a `Design`.
+        Method and model of a `ShadingPipeline`.
     view : dict
         ``source`` and ``triangles`` of the mesh (see `load_mesh`; ``None`` for a file), ``digest``
         of its arrays, part of the result's key in the cache, ``width`` and ``height`` of the picture.

@@ -115,7 +115,7 @@ class Register:
 
 
 def frame_registers(keep: bool = False) -> list[Register]:
-    """Registers of the picture, for a core that takes triangles; see `Frame`.
+    """Registers of the picture, for a core that takes triangles; see `FrameSettings`.
 
     Parameters
     ----------

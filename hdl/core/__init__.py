@@ -1,1 +1,1 @@
-"""What every unit is built of: fixed-point shapes, streams, scheduled datapaths."""
+"""Parts of every unit: fixed-point shapes, streams, scheduled datapaths."""

@@ -1,4 +1,4 @@
-"""Functions of the bits of a word: its leading zeros, a choice of its shifts."""
+"""Functions of the bits of a word: its leading zeros, and the choice of a word by an index."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ def leading_zeros(code: Value) -> Value:
 
 
 def select(words: Sequence[Value], index: Value) -> Value:
-    """Word of an index, by halves; beyond the end the last one. It maps to wide multiplexers.
+    """Word of an index, by halves; the last word beyond the end. It maps to wide multiplexers.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Data-flow graphs: words of a unit and how each is computed, then built as registers of their schedule."""
+"""Data-flow graphs: words of a unit with their functions, built as registers of their schedule."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -47,14 +47,14 @@ class FunctionalUnit:
     graph : Dataflow
         Graph of the operations.
     name : str
-        Beginning of its registers' names.
+        Prefix of its registers' names.
     shapes : sequence of ShapeLike
         Shapes of the operands; each instance has a register for every operand.
     latency : int
         Registers from the operand registers to the result.
     make : callable
-        Makes an instance and returns its result; arguments are a function that makes a register (value, name)
-        and the operands.
+        Makes an instance and returns its result. Its arguments are a function that makes a register (value,
+        name), and the operands.
     """
 
     graph: "Dataflow"
@@ -70,22 +70,22 @@ class FunctionalUnit:
 
 
 class Dataflow:
-    """The words of a `PipelinedUnit` and how each is computed from others, before there is any hardware.
+    """The words of a `PipelinedUnit` and their functions of other words, before there is any hardware.
 
-    Words are described first, each after those that it is made from. Then they are placed in time and on
-    shared functional units, such as multipliers, by `place`: when a word's stage, or the number of instances,
-    is asked for the first time. `build` makes the hardware; a word that is read after its lifetime is copied.
+    Words are described first, each after its operands. The first request for a word's stage, or for the
+    number of instances, places them with `place`, in time and on shared functional units such as multipliers.
+    `build` makes the hardware. It copies a word that is read after its lifetime.
 
     Parameters
     ----------
     interval : int
         Initiation interval of the unit, at least 1.
     spaced : bool
-        Whether beats come at any distance from the interval on; see `PipelinedUnit`.
+        Whether beats come at any distance from the interval on, see `PipelinedUnit`.
     low_latency : bool
         Whether a product takes a single register, two cycles in all.
     memories : bool
-        Whether wide words that wait for long do so in memories of look-up tables, with an interval of 1.
+        Whether wide words that wait for long wait in memories of look-up tables, with an interval of 1.
 
     Raises
     ------
@@ -113,12 +113,12 @@ class Dataflow:
 
     @property
     def words(self) -> tuple[Word, ...]:
-        """The words, each after those that it is made from."""
+        """The words, each after its operands."""
         return tuple(self._words)
 
     @property
     def schedule(self) -> Schedule:
-        """The words in time and on instances; from now on no word can be added."""
+        """The words in time and on instances. After the first read no word can be added."""
         if self._schedule is None:
             self._schedule = place(self._words, self.interval, self.spaced)
         return self._schedule
@@ -131,14 +131,14 @@ class Dataflow:
         return word
 
     def input(self, name: str, read: Callable[[Any], Any], formula: str | None = None) -> Word:
-        """A word of the beat, ``read(operands)``; formulas show ``formula``, or `SYMBOLS`, or its name."""
+        """A word of the beat, ``read(operands)``. Formulas show ``formula``, or `SYMBOLS`, or its name."""
         first = 0 if self.interval == 1 else 1
         word = Word(name, (), 0, self.interval, since=first, text=formula or SYMBOLS.get(name, name))
         word.make = lambda build: read(build.operands)
         return self._add(word)
 
     def wire(self, name: str, function: Callable[[Any], Any], word: Word, formula: str | None = None) -> Word:
-        """Wiring from a word's value; a read after the word's lifetime copies the wire, not the word."""
+        """Wiring from a word's value. A copy for a later stage holds the wired value, not its source."""
         wire = Word(name, (word,), 0, word.lifetime, text=formula, trace=traced(function))
         wire.make = lambda build: function(build.at(word, wire.read))
         return self._add(wire)
@@ -158,14 +158,14 @@ class Dataflow:
         name : str
             Of the word.
         function : callable
-            Takes the values of ``words``, and returns that of the register.
+            Takes the values of ``words``, and returns the value of the register.
         *words : Word
-            Words that it is made from.
+            Operands of the register.
         since : int or Word
-            Earliest stage of the word, or the word that it comes with: a word that is read late needs no
+            Earliest stage of the word, or another word with the same stage. A word that is read late needs no
             copies before.
         formula : str or None
-            Formula in drawings; ``None``: the one read from ``function``.
+            Formula in drawings. ``None``: the formula read from ``function``.
         """
         register = Word(name, words, 1, self.interval, since=since, text=formula, trace=traced(function))
 
@@ -202,14 +202,14 @@ class Dataflow:
         name : str
             Of the word.
         words : sequence of Word
-            Words that the operands are made from.
+            Words of the operands.
         operands : callable
             Wiring from the words' values to the operands.
         result : callable
             Wiring from the functional unit's result to the word's value.
         latency : int or None
-            Registers from the operands to that value, if ``result`` reads a register before the last one;
-            ``None``: all.
+            Registers from the operands to this value, if ``result`` reads a register before the last
+            register. ``None``: all registers.
         since : int or Word
             Earliest stage of the word, as for `register`.
         formula : str or None
@@ -247,11 +247,12 @@ class Dataflow:
         a, b : Word
             Operands.
         left, right : callable
-            Wiring from the value of a word to the operand: `MULTIPLIER_BITS` bits if signed, one less if not.
+            Wiring from the value of a word to the operand, `MULTIPLIER_BITS` bits if signed, one bit less if
+            unsigned.
         since : int
             As for `use`.
         formula : str or None
-            Formula in drawings; ``None``: the product of its operands' formulas.
+            Formula in drawings. ``None``: the product of its operands' formulas.
 
         Raises
         ------
@@ -292,14 +293,14 @@ class Dataflow:
         registered: bool = False,
         formula: str | None = None,
     ) -> Word:
-        """Word of a table at an address: one cycle, or two with a register, which an FPGA's memories have.
+        """Word of a table at an address: one cycle, or two with the register that an FPGA's memories have.
 
         Parameters
         ----------
         name : str
             Of the table.
         words : sequence of int
-            Words of the table; their number is a power of two.
+            Words of the table. Their number is a power of two.
         width : int
             Bits of a word.
         address : Word
@@ -323,16 +324,16 @@ class Dataflow:
         return self._add(word)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[[Word, int], Any]:
-        """Make the hardware; the function returned gives a word's value at a stage.
+        """Make the hardware; the returned function gives a word's value at a stage.
 
         Parameters
         ----------
         m : Module
             Module that gets the registers.
         unit : PipelinedUnit
-            Unit whose beats they belong to; its initiation interval is that of the graph.
+            Unit of the beats, with the initiation interval of the graph.
         operands
-            Operands that `PipelinedUnit.datapath` of the unit gets.
+            Operands of `PipelinedUnit.datapath` of the unit.
         """
         build = _Build(self, m, unit, operands)
         for word in self._words:
@@ -344,14 +345,13 @@ class Dataflow:
 def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> Any:
     """Exact product, `MULTIPLIER_LATENCY` cycles: a register for each operand, and one for the product.
 
-    An FPGA's multipliers lie in few places, far from the multiplexers that operands come from and the adders
-    that products go to. These registers can go into the multiplier block, so that the wires to it and from it
-    have a cycle each.
+    An FPGA's multipliers lie in few places, far from the multiplexers of operands and the adders of products.
+    These registers can go into the multiplier block. So the wires to it and from it have a cycle each.
 
     Parameters
     ----------
     register : callable
-        Makes a register: from a value and its name, the register.
+        Makes a register from a value and a name.
     a, b
         Operands.
     """
@@ -386,9 +386,9 @@ def dot(
     b : Word or callable
         The other vector, or a function that makes it from the value of ``a``.
     sums : FunctionalUnit or None
-        From `shared_sums`; ``None``: the sums have registers of their own.
+        From `shared_sums`. ``None``: the sums have registers of their own.
     symbol : str or None
-        Symbol of the other vector in formulas; ``None``: that of its word, or of ``a``.
+        Symbol of the other vector in formulas. ``None``: the symbol of its word, or of ``a``.
     """
     left = a.symbol
     right = Formula(symbol) if symbol else b.symbol if isinstance(b, Word) else left
@@ -414,14 +414,14 @@ def dot(
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:
-    """An initiation interval from 1 to ``longest``, that of one multiplier for all products.
+    """An initiation interval from 1 to ``longest``, the interval of one multiplier for all products.
 
     ``None`` means ``default``, or ``longest`` without a default.
 
     Raises
     ------
     ValueError
-        If it is out of range.
+        If the interval is out of range.
     """
     if interval is None:
         return default or longest
@@ -441,7 +441,7 @@ class _Build:
         self._issued: dict[tuple[FunctionalUnit, int], list[tuple[Value | None, Sequence[Any]]]] = {}
 
     def when(self, stage: int) -> Value | None:
-        """When a register of that stage is written; always where a beat may come on every cycle."""
+        """When a register of a stage is written. It is always, if a beat may come on every cycle."""
         return self.unit.at(stage) if self.unit.initiation_interval > 1 else None
 
     def at(self, word: Word, stage: int) -> Any:
@@ -483,8 +483,8 @@ class _Build:
     def connect(self) -> None:
         """Connect each instance's operand registers, which have no enable.
 
-        No two uses meet, so their operands are gated and merged by OR: a chain of multiplexers would have one
-        for each use, and be larger.
+        No two uses meet, so their operands are gated and merged by OR. A chain with a multiplexer for each
+        use would be larger.
         """
         for key, uses in self._issued.items():
             for k, to in enumerate(self._instances[key][0]):

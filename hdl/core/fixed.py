@@ -1,8 +1,8 @@
 """Fixed-point signals: the shapes and operations of `fixed`, as hardware.
 
-``Signal(SQ(1, 17))`` is a `FixedValue`; so is a field of a layout whose shape is ``SQ(1, 17)``. The
-operations have the names, the exact growth and the result formats of `Fixed`. An assignment
-that would lose bits is refused, as is an operation with a number that carries no format.
+``Signal(SQ(1, 17))`` is a `FixedValue`. So is a field of a layout with the shape ``SQ(1, 17)``. The
+operations have the names, the exact growth and the result formats of `Fixed`. They refuse an assignment that
+would lose bits, and a number without a format.
 """
 
 from fractions import Fraction
@@ -18,7 +18,7 @@ __all__ = ["SQ", "UQ", "FixedShape", "FixedValue"]
 class FixedShape(ShapeCastable):
     """Shape of a fixed-point signal; make one with `SQ` or `UQ`, or from a `Format`.
 
-    Two shapes are equal, and hash alike, when their formats are.
+    Two shapes are equal, and hash alike, when their formats are equal.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class FixedValue(ValueCastable):
     Raises
     ------
     TypeError
-        If the width of the code is not the format's.
+        If the code has another width than the format.
     """
 
     def __init__(self, format: Format, code):
@@ -225,7 +225,7 @@ class FixedValue(ValueCastable):
         return FixedValue(format, (kept + self._code[dropped - 1])[: format.width])
 
     def saturate(self, format: Format) -> "FixedValue":
-        """Clamp to the range of ``format``, which has the same fraction bits, by testing the bits above it.
+        """Clamp to the range of ``format``, which has the same fraction bits, by a test of the bits above it.
 
         Raises
         ------

@@ -1,8 +1,8 @@
-"""Formulas of a data flow: what each word is, read from the functions that describe it.
+"""Formulas of a data flow's words, read from the functions that describe them.
 
 A word's function is called with formulas in the place of values. Exact sums, differences, products and
-components come out as text; rounding, saturation and formats leave a text as it is. A function that looks at
-bits has no formula, and its word keeps its name. Drawings show them; no hardware depends on them.
+components come out as text. Rounding, saturation and formats leave a text as it is. A function that looks at
+bits has no formula, and its word keeps its name. Only drawings use formulas.
 """
 
 import re
@@ -28,10 +28,11 @@ SYMBOLS = {
     "one_minus_cosine": "u",
     "position": "P",
 }
-"""Symbols of a beat's fields in formulas; other fields appear by their names."""
+"""Symbols of a beat's fields in formulas. Other fields appear by their names."""
 
 LONGEST = 14
-"""Largest length of a formula that other formulas repeat; a longer one they replace by its word's name."""
+"""Largest length of a formula that other formulas repeat. They replace a longer formula by its word's name.
+"""
 
 _SUM, _PRODUCT, _ATOM = range(3)
 
@@ -41,14 +42,14 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 class Formula(FixedValue):
     """Text in the place of a value, for the operations that a `FixedValue` has.
 
-    It is a `FixedValue`, so that Python calls its operator first if the left operand is one.
+    It is a `FixedValue`. So Python calls its operator first if the left operand is a `FixedValue`.
 
     Parameters
     ----------
     text : str
-        Formula; that of a vector begins with a capital letter.
+        Formula. The formula of a vector begins with a capital letter.
     binding : int
-        How tightly its outermost operation binds: a sum 0, a product 1, anything else 2.
+        Binding of its outermost operation: 0 for a sum, 1 for a product, else 2.
     """
 
     def __init__(self, text: str, binding: int = _ATOM):
@@ -59,12 +60,12 @@ class Formula(FixedValue):
 
     @classmethod
     def read(cls, text: str) -> "Formula":
-        """Formula of a text written by hand; its binding is read from the operators outside parentheses."""
+        """Formula of a text written by hand. Its binding follows from the operators outside parentheses."""
         outer = re.sub(r"\([^()]*\)", "", text)
         return cls(text, _SUM if re.search(" [+−<≤>≥=] ", outer) else _PRODUCT if "·" in outer else _ATOM)
 
     def as_value(self):
-        """Refuse: a formula has no bits.
+        """Refuse, because a formula has no bits.
 
         Raises
         ------
@@ -74,11 +75,11 @@ class Formula(FixedValue):
         raise TypeError(f"the formula {self.text} has no bits")
 
     def shape(self):
-        """Refuse: a formula has no shape; see `as_value`."""
+        """Refuse, because a formula has no shape, see `as_value`."""
         return self.as_value()
 
     def within(self, binding: int) -> str:
-        """Text as an operand of an operation that binds so tightly."""
+        """Text as an operand of an operation with this binding."""
         return self.text if self._binding >= binding else f"({self.text})"
 
     def _sum(self, sign: str, other: Any, swapped: bool = False) -> "Formula":
@@ -162,7 +163,7 @@ def component(vector: Formula, index: int) -> Formula:
 
 
 def formula_of(function: Callable[..., Any], operands: Iterable[Formula]) -> Any:
-    """Result of a function called with formulas; ``None`` if it looks at bits, or at the unit around it."""
+    """Result of a function called with formulas. ``None`` if it looks at bits, or at the unit around it."""
     try:
         return function(*operands)
     except (AttributeError, IndexError, TypeError, ValueError):

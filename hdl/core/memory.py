@@ -1,4 +1,4 @@
-"""Memories read through the output register of an FPGA's memory blocks, and FIFOs made from memories."""
+"""Memories that are read through the output register of an FPGA's memory blocks, and FIFOs of memories."""
 
 from amaranth.hdl import Cat, Module, Mux, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
@@ -27,22 +27,22 @@ LATE_FIFO_LATENCY = 4
 """Cycles that a payload takes through the empty FIFO of `connect_late_fifo`."""
 
 UNCOUNTED = 3
-"""Payloads that `connect_late_fifo` has taken and its level does not count yet."""
+"""Payloads that `connect_late_fifo` has taken, before its level counts them."""
 
 
 def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: int) -> Memory:
-    """Memory whose words come one after the other, at rising addresses; the caller adds what reads it.
+    """Memory whose words come one after the other, at rising addresses. The caller adds the read ports.
 
     Parameters
     ----------
     m : Module
         Module that gets the memory as a submodule ``name``.
     word : ValueLike
-        Word that comes.
+        The written word.
     written : Value
-        Whether it comes.
+        Whether the word is written.
     depth : int
-        Number of words inside at most, a power of two.
+        Largest number of words inside, a power of two.
     """
     word = Value.cast(word)
     m.submodules[name] = memory = Memory(shape=len(word), depth=depth, init=[])
@@ -56,19 +56,19 @@ def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: 
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:
     """Words that pass beside a unit while its beats are inside, in their order, without handshakes.
 
-    The words are in a memory with a write and a read address. No level is counted: the unit's own handshakes
-    tell when a word is there.
+    The words are in a memory with a write and a read address. The unit's own handshakes tell when a word is
+    there, so no level is counted.
 
     Parameters
     ----------
     m : Module
         Module that gets the memory as a submodule ``name``.
     word : ValueLike
-        Word of the beat that comes.
+        Word of the incoming beat.
     written, taken : Value
-        Whether a beat enters the unit, and leaves it; it is inside for two cycles or more.
+        Whether a beat enters the unit, and leaves it. A beat is inside for two cycles or more.
     depth : int
-        Beats inside at most.
+        Largest number of beats inside.
 
     Returns
     -------
@@ -98,21 +98,21 @@ def registered_read(
     """Word of a memory, two cycles after its address; both registers move by one enable.
 
     A memory gives its word late in a cycle, the register behind it early. FPGAs differ in the word read on a
-    cycle that writes to the same address: on such a cycle the registers do not move, so that no logic is
-    needed between the memory and the register.
+    cycle that writes to the same address. On this cycle the registers stand still. So no logic is needed
+    between the memory and the register.
 
     Parameters
     ----------
     m : Module
-        Module that gets the registers; the memory is its submodule.
+        Module that gets the registers. The memory is its submodule.
     memory : Memory
         The memory.
     address : Value
         Address of the word.
     wanted : Value
-        Whether the registers are to move.
+        Whether the registers should move.
     write : WritePort or None
-        Port that writes the memory; ``None``: none does.
+        Port that writes the memory. ``None``: a ROM.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def registered_read(
 
 
 def turn_of(m: Module, cycles: int) -> Signal:
-    """Address for `delayed`, which words of one delay share: it counts from 0 to ``cycles - 2``."""
+    """Address for `delayed`, which words of one delay share. It counts from 0 to ``cycles - 2``."""
     turn = Signal(range(cycles - 1), name=f"turn_{cycles}")
     m.d.sync += turn.eq(Mux(turn == cycles - 2, 0, turn + 1))
     return turn
@@ -140,13 +140,13 @@ def turn_of(m: Module, cycles: int) -> Signal:
 def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Signal:
     """A word some cycles later, from a memory of look-up tables before a register.
 
-    The cycles are those on which the module is enabled. On each the memory is read at an address, and then
-    written there. After a reset words from before it come, in any order.
+    Only cycles on which the module is enabled count. On each the memory is read at an address, and then
+    written there. After a reset words from before the reset come, in any order.
 
     Parameters
     ----------
     m : Module
-        Module that gets the register; the memory is its submodule.
+        Module that gets the register. The memory is its submodule.
     name : str
         Of both.
     value : Value
@@ -154,7 +154,7 @@ def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Sig
     cycles : int
         At least 3.
     turn : Value
-        From `turn_of` the cycles, in the same module.
+        From `turn_of` with the same cycles, in the same module.
 
     Returns
     -------
@@ -179,12 +179,13 @@ def connect_late_fifo(
 ) -> Value:
     """Connect two streams through a FIFO in a memory, between registers.
 
-    A register before the memory ends the source's handshake; behind the memory are the registers of
-    `registered_read`. The source's ready is a register that depends on the FIFO's level alone; `UNCOUNTED`
-    payloads of the depth are reserved for those that the level does not count yet. A payload takes
+    A register before the memory ends the source's handshake. Behind the memory are the registers of
+    `registered_read`. The source's ready is a register that depends on the FIFO's level alone. `UNCOUNTED`
+    payloads of the depth are reserved for payloads that the level does not count yet. A payload takes
     `LATE_FIFO_LATENCY` cycles through the empty FIFO.
 
-    Parameters and errors are those of `connect_fifo`; two payloads more than the depth can wait behind it.
+    Parameters and errors are those of `connect_fifo`. Two payloads more than the depth can wait behind the
+    memory.
 
     Returns
     -------
@@ -194,7 +195,7 @@ def connect_late_fifo(
     Raises
     ------
     ValueError
-        If the depth is `UNCOUNTED` or less: it would never have room.
+        If the depth is `UNCOUNTED` or less. The FIFO would never have room.
     """
     if depth <= UNCOUNTED:
         raise ValueError(f"depth must be over {UNCOUNTED}, not {depth}")
@@ -248,12 +249,12 @@ def connect_late_fifo(
 def connect_wide_fifo(
     m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int = 2
 ) -> None:
-    """Connect two streams through a FIFO whose payloads have no register: a wide payload costs memory alone.
+    """Connect two streams through a FIFO without registers for payloads; a wide payload costs memory alone.
 
     For a sink that takes payloads straight into registers. A payload takes `SLICE_LATENCY` cycles through the
     empty FIFO. The source's ready and the sink's valid are registers.
 
-    Parameters and errors are those of `connect_fifo`, but the depth is 2 or more, as in a register slice.
+    Parameters and errors are those of `connect_fifo`. The depth is 2 or more, as in a register slice.
     """
     require_same_shape(source.payload.shape(), sink.payload.shape())
     width = Shape.cast(source.payload.shape()).width
@@ -287,19 +288,19 @@ def connect_wide_fifo(
 def connect_headed_fifo(
     m: Module, name: str, source: stream.Interface, sink: stream.Interface, head: Value, depth: int
 ) -> Signal:
-    """Connect two streams as `connect_wide_fifo` does; some bits of the first payload are in a register.
+    """Connect two streams as `connect_wide_fifo` does, with some bits of the first payload in a register.
 
-    For a sink whose handshake depends on these bits: a payload itself is read late in a cycle. A payload
-    takes `HEADED_FIFO_LATENCY` cycles through the empty FIFO.
+    For a sink whose handshake depends on these bits. The payload is read late in a cycle. A payload takes
+    `HEADED_FIFO_LATENCY` cycles through the empty FIFO.
 
     Parameters
     ----------
     m, name, source, sink
         As for `connect_fifo`.
     head : Value
-        Bits of the source's payload, or made from it.
+        Bits of the source's payload, or bits made from it.
     depth : int
-        Words of the memory, a power of two from 4 on; all but one of them hold payloads.
+        Words of the memory, a power of two from 4 on. All but one of them hold payloads.
 
     Returns
     -------

@@ -9,10 +9,10 @@ __all__ = ["SteppedMultiplier"]
 
 
 class SteppedMultiplier:
-    """Multiplier with registers for its operands and its product, which the steps of a sequence share.
+    """Multiplier, shared by the steps of a sequence, with registers for its operands and its product.
 
-    Operands that are given at a step are in their registers one cycle later, the exact product two cycles
-    later. Between steps the operands stay.
+    One cycle after a step its operands are in their registers, two cycles after it the exact product. Between
+    steps the operands stay.
 
     Parameters
     ----------
@@ -44,5 +44,5 @@ class SteppedMultiplier:
 
     @property
     def free(self) -> Value:
-        """Whether the present step issues no operands, so that others can be loaded on this cycle."""
+        """Whether the present step issues no operands. Others can then be loaded on this cycle."""
         return ~Cat(self._step == at for at in self._taken).any()

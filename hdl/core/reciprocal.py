@@ -18,7 +18,7 @@ def checked_length_bits(length_bits: int) -> int:
     Raises
     ------
     ValueError
-        If they are not 2 to 12.
+        If the bits are not 2 to 12.
     """
     if length_bits not in range(2, LENGTH_BITS + 1):
         raise ValueError(f"length_bits must be 2 to {LENGTH_BITS}, not {length_bits!r}")
@@ -26,14 +26,14 @@ def checked_length_bits(length_bits: int) -> int:
 
 
 def reciprocal_codes(length_bits: int = LENGTH_BITS, table: Fixed | None = None) -> list[int]:
-    """Codes of the table for lengths of ``length_bits`` bits: the words of the whole table that they read.
+    """Codes of the table for lengths of ``length_bits`` bits, a part of the whole table.
 
     Parameters
     ----------
     length_bits : int
         Bits of the length, 2 to 12.
     table : Fixed or None
-        The whole table; ``None``: that of `reciprocal_table` in its own format.
+        The whole table. ``None``: `reciprocal_table` in its own format.
 
     Returns
     -------
@@ -53,8 +53,8 @@ def reciprocal_words(
 ) -> tuple[Word, Word]:
     """``dt = 1/(m - 1) = 2 reciprocal 2^-shift``, by the address and shift of `reciprocal_address`.
 
-    Five cycles: m - 1, its leading one, the address, the table and its register. With fewer bits of the
-    length the table has ``2^(length_bits - 1)`` words.
+    The words take five cycles: m - 1, its leading one, the address, the table and its register. With fewer
+    bits of the length the table has ``2^(length_bits - 1)`` words.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ def reciprocal_words(
     length : Word
         m, 1 to ``2^length_bits - 1``; 1 counts as 2.
     table : Fixed or None
-        A table of `reciprocal_table`; ``None``: that in its own format.
+        A table of `reciprocal_table`. ``None``: the table in its own format.
     length_bits : int
         Bits of the length, 2 to 12.
     since : int or Word
-        First stage that may hold m - 1, or the word that it comes with.
+        First stage that may hold m - 1, or a word with the same stage.
 
     Returns
     -------

@@ -1,15 +1,15 @@
-"""The scheduler: operations of a unit placed in time and on shared functional units, before any hardware.
+"""The scheduler, which places operations of a unit in time and on shared functional units.
 
-It knows neither words' widths nor Amaranth, only operations: the operands and the latency of each.
-`blysk.hdl.core.dataflow` describes the operations and makes registers of the schedule.
+It knows only operations, with the operands and the latency of each. It knows no widths of words and no
+Amaranth. `blysk.hdl.core.dataflow` describes the operations and makes registers of the schedule.
 
-What it guarantees, for every schedule that it returns:
+The scheduler guarantees, for every schedule:
 
-- an operation reads its operands when all of them are there, and not before its ``since``;
-- two uses of an instance of a functional unit never meet, in any two beats that the interval allows;
-- a functional unit has as few instances as the interval allows, ``ceil(uses / interval)``, unless beats come
-  at any distance and operations depend on each other: then as few as the search finds;
-- the same operations in the same order give the same schedule.
+- An operation reads its operands when all of them are there, and not before its ``since``.
+- Two uses of an instance of a functional unit never meet, in any two beats that the interval allows.
+- A functional unit has as few instances as the interval allows, ``ceil(uses / interval)``. If beats come at
+  any distance and operations depend on each other, it has as few as the search finds.
+- The same operations in the same order give the same schedule.
 
 Source: docs/theory/scheduling.md.
 """
@@ -34,18 +34,18 @@ class Operation:
     name : str
         Of the result.
     operands : tuple of Operation
-        Operations whose results it takes, all on the same cycle.
+        Operations whose results it reads, all on the same cycle.
     latency : int
-        Cycles from that one to the first on which its result can be read: 0 for wiring.
+        Cycles from this cycle to the first cycle on which its result can be read. 0 for wiring.
     lifetime : int or None
-        Cycles on which the result can be read, before the next beat's result replaces it; ``None`` for
-        wiring: that of its operand.
+        Cycles on which the result can be read, before the next beat's result replaces it. ``None`` for
+        wiring: the lifetime of its operand.
     resource : hashable or None
-        Functional unit that serves it: equal instances of hardware, shared by its uses. ``None``: hardware of
+        Functional unit that serves it, equal instances of hardware that its uses share. ``None``: hardware of
         its own.
     since : int or Operation
-        Earliest stage of the result: a number, or the stage of another operation's result. A result that is
-        read late needs no copies before.
+        Earliest stage of the result, as a number, or as the stage of another operation's result. A result
+        that is read late needs no copies before.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Placement:
     Parameters
     ----------
     read : int
-        Enabled cycles from the input of a beat to that on which the operands are read.
+        Enabled cycles from the input of a beat to the read of the operands.
     instance : int
         Number of the functional unit's instance; 0 without a functional unit.
     """
@@ -98,19 +98,19 @@ class Schedule:
 
 
 def place(operations: Sequence[Operation], interval: int, spaced: bool = False) -> Schedule:
-    """Place operations: each at the earliest stage at which its operands and a slot are free.
+    """Place each operation at the earliest stage with its operands and a free slot.
 
     Beats come a whole multiple of the interval apart, so an instance has as many slots as the interval has
-    cycles. In a *spaced* schedule beats come at any distance from the interval on: then the uses of an
-    instance lie within as many stages as the interval has cycles.
+    cycles. In a *spaced* schedule beats come at any distance from the interval on. The uses of an instance
+    then lie within as many stages as the interval has cycles.
 
-    Then operations with hardware of their own move to the latest stage that needs no copy of their operands:
-    they can move where other operations read the same operands later.
+    Then operations with hardware of their own move to the latest stage that needs no copy of their operands.
+    They can move if other operations read the same operands later.
 
     Parameters
     ----------
     operations : sequence of Operation
-        Operations, each after those whose results it takes.
+        Operations, each after its operands.
     interval : int
         Initiation interval, at least 1.
     spaced : bool
@@ -140,7 +140,7 @@ def _earliest(operation: Operation, placements: dict) -> int:
 
 
 def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Schedule:
-    """Each use at the first free slot; another instance if no slot is free within two intervals."""
+    """Each use at the first free slot. If no slot is free within two intervals, another instance."""
     placements: dict[Operation, Placement] = {}
     instances: dict[Hashable, list[set[int]]] = {}
     for resource in (o.resource for o in operations if o.resource is not None):
@@ -182,7 +182,7 @@ def _size(schedule: Schedule) -> tuple[int, int]:
 def _shared(
     operations: Sequence[Operation], interval: int, resources: Sequence[Hashable]
 ) -> Iterator[Schedule]:
-    """Schedules for beats at any distance with few instances; none if there are too many ways.
+    """Schedules for beats at any distance with few instances; empty if there are too many ways.
 
     The uses of a functional unit, sorted by their earliest stage, are divided into runs of neighbours. Each
     run has an instance; its first uses wait until all uses of the run lie within the interval.
@@ -216,7 +216,7 @@ def _shared(
 
 
 def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
-    """Sizes of the runs of neighbours: with the fewest runs first, then with one or two more."""
+    """Sizes of the runs of neighbours, with the fewest runs first, then with one or two more."""
 
     def parts(left: int, count: int) -> Iterator[tuple[int, ...]]:
         if count == 0:
@@ -236,7 +236,7 @@ def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
 def _windows(
     operations: Sequence[Operation], interval: int, run_of: dict[Operation, tuple]
 ) -> dict[Operation, Placement] | None:
-    """Placements in which the uses of each run lie within an interval; ``None`` if there are none."""
+    """Placements in which the uses of each run lie within an interval; ``None`` if there is no placement."""
     starts: dict[tuple, int] = dict.fromkeys(run_of.values(), 0)
     for _ in range(2 * len(operations)):
         placements: dict[Operation, Placement] = {}

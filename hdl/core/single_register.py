@@ -1,4 +1,4 @@
-"""Streams behind one register: half the registers of a slice, for half its rate or a path of readies."""
+"""Streams behind one register: half the registers of a slice, at half its rate or with a path of ready."""
 
 from amaranth.hdl import Module, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
@@ -9,7 +9,7 @@ __all__ = ["connect_register", "hold_output"]
 
 
 def connect_register(m: Module, name: str, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through one register, which takes a payload each two cycles at most.
+    """Connect two streams through one register, which takes at most a payload in two cycles.
 
     The source's ready and the sink's valid depend on a register alone.
 
@@ -40,10 +40,10 @@ def connect_register(m: Module, name: str, source: stream.Interface, sink: strea
 
 
 def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
-    """Drive a stream from a register that stands until it is taken; return whether it may change.
+    """Drive a stream from a register that stands until its payload is taken; return whether it may change.
 
-    `skid_buffer` without the spare register: what is behind sees the sink's ready on the same cycle, and
-    costs nothing. The parameters are those of `skid_buffer`.
+    This is `skid_buffer` without the spare register. So logic behind it sees the sink's ready on the same
+    cycle. The parameters are those of `skid_buffer`.
     """
     m.d.comb += [output.valid.eq(valid), Value.cast(output.payload).eq(Value.cast(payload))]
     return ~Value.cast(valid) | output.ready

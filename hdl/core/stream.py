@@ -1,4 +1,4 @@
-"""What every streaming unit shares: connections, outputs that wait, and the pipeline with one enable."""
+"""Parts of streaming units: connections, outputs that wait, and the pipeline with one enable."""
 
 from collections.abc import Mapping
 
@@ -35,12 +35,12 @@ SLICE_LATENCY = 1
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
     """Refuse two payload shapes that differ in a field, a width, a sign or a fixed-point format.
 
-    Amaranth compares payloads by width alone, so that a moved binary point would pass.
+    Amaranth compares payloads by width alone. So a moved binary point would pass.
 
     Raises
     ------
     TypeError
-        If the shapes differ, naming the field.
+        If the shapes differ. The message names the field.
     """
     if isinstance(a, data.StructLayout) and isinstance(b, data.StructLayout):
         if list(a.members) != list(b.members):
@@ -126,16 +126,16 @@ def connect_fifo(
 
 
 def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
-    """Skid buffer: drive a stream from registers; a spare register holds a beat that is not accepted.
+    """Skid buffer: drive a stream from registers, with a spare register for a beat that is not accepted.
 
     The result, *advance*, tells whether the registers of ``valid`` and ``payload`` take their next values on
-    this cycle. It is itself a register, so that no path leads from the ready of one unit to that of the one
-    before it, in a chain of any length. A beat that is not accepted on its first cycle moves into the spare
-    register; the beat behind it moves into the output registers and waits there.
+    this cycle. It is a register. So in a chain of any length no path leads from the ready of a unit to the
+    ready of the unit before. A beat that is not accepted on its first cycle moves into the spare register.
+    The beat behind it moves into the output registers and waits there.
 
-    This costs a register and a multiplexer for each bit of the payload, and no cycle of latency or of
-    throughput: a beat is on the output on the cycle on which ``valid`` rises. The payload is held while it
-    waits. Reset empties the spare register.
+    This costs a register and a multiplexer for each bit of the payload, and no cycle: a beat is on the output
+    on the cycle on which ``valid`` rises. The payload is held while it waits. Reset empties the spare
+    register.
 
     Parameters
     ----------
@@ -144,9 +144,9 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     output : stream.Interface
         Stream to drive.
     valid : ValueLike
-        Whether there is a payload; a register that changes only while ``advance``.
+        Whether there is a payload. This is a register that changes only while ``advance`` is high.
     payload : ValueLike
-        The payload, likewise.
+        The payload, a register that changes only while ``advance`` is high.
 
     Returns
     -------
@@ -170,7 +170,8 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
 def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload: ValueLike) -> Value:
     """Drive a stream from registers that stop with every beat until it is accepted, for one cycle at least.
 
-    For units whose beats are some cycles apart: `skid_buffer` without the spare register and its multiplexer.
+    For units whose beats are some cycles apart. It is `skid_buffer` without the spare register and its
+    multiplexer.
 
     Parameters
     ----------
@@ -179,14 +180,14 @@ def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload:
     output : stream.Interface
         Stream to drive.
     coming : ValueLike
-        Whether there is a payload after this cycle, if it is one on which registers take their next values.
+        Whether there is a payload after this cycle, if registers take their next values on this cycle.
     payload : ValueLike
-        The payload; a register that changes only while the result is high.
+        The payload, a register that changes only while the result is high.
 
     Returns
     -------
     Value
-        Whether registers take their next values: itself a register.
+        Whether registers take their next values. This is a register.
     """
     moves = Signal(name="moves", init=1)
     m.d.sync += moves.eq(Mux(moves, ~Value.cast(coming), output.ready))
@@ -195,7 +196,7 @@ def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload:
 
 
 def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through registers that hold two payloads; one takes `SLICE_LATENCY` cycles.
+    """Connect two streams through registers for two payloads; a payload takes `SLICE_LATENCY` cycles.
 
     The source's ready follows from registers alone.
 
@@ -227,7 +228,7 @@ def moving(
     last: ValueLike = 1,
     dropped: ValueLike = 0,
 ) -> Value:
-    """Whether payloads are between two streams: more went in than came out.
+    """Whether payloads are between two streams, because more went in than came out.
 
     Parameters
     ----------
@@ -236,9 +237,9 @@ def moving(
     name : str
         Of the counter.
     source, sink : stream.Interface
-        Where payloads go in and come out.
+        Streams at which payloads go in and come out.
     last : ValueLike
-        Whether the beat that comes out is the last, or only, part of a payload.
+        Whether the outgoing beat is the last, or only, part of a payload.
     dropped : ValueLike
         Whether a payload ends between the two.
     """
@@ -251,7 +252,7 @@ def moving(
 def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[Signal, Signal]:
     """Count the pixels of spans, one on each cycle on which ``advance`` is high.
 
-    A span is taken in while ``valid & advance & ends``.
+    A span is taken in while ``valid & advance & ends`` is high.
 
     Parameters
     ----------
@@ -267,8 +268,8 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
     Returns
     -------
     active, ends : Signal
-        Whether there is a pixel; whether the next span may begin, as there is no pixel or it is the last one.
-        Both are registers.
+        ``active``: whether there is a pixel. ``ends``: whether the next span may begin, because there is no
+        pixel or the last pixel. Both are registers.
     """
     active, ends = Signal(name="active"), Signal(name="ends", init=1)
     remaining = Signal(len(length), name="remaining")
@@ -285,15 +286,15 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
 class PipelinedUnit(wiring.Component):
     """A unit with a fixed latency and initiation interval, moved on by one common enable.
 
-    A beat that is accepted on one cycle is on the output ``latency`` cycles later, unless the output is
-    stalled: then the whole unit is disabled, from the cycle after the first on which a beat was not accepted,
-    and holds its payloads (`skid_buffer`). As long as a beat is inside, the next is accepted a whole multiple
-    of ``initiation_interval`` enabled cycles after it; in a *spaced* unit any number of enabled cycles from
+    A beat is on the output ``latency`` cycles after it was accepted. If the output is stalled, the whole unit
+    is disabled and holds its payloads (`skid_buffer`), from the cycle after the first on which a beat was not
+    accepted. While a beat is inside, the next is accepted a whole multiple of ``initiation_interval`` enabled
+    cycles after it. In a *spaced* unit it is accepted any number of enabled cycles from
     ``initiation_interval`` on. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset
     empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
-    from the *stage* of a beat: `at` tells whether a beat was accepted so many enabled cycles ago.
+    from the *stage* of a beat: `at` tells whether a beat was accepted a number of enabled cycles ago.
 
     Parameters
     ----------
@@ -302,8 +303,8 @@ class PipelinedUnit(wiring.Component):
     latency : int
         Cycles from input to output, at least 1.
     initiation_interval : int
-        Cycles from an input to the next. With 1, `datapath` gets the input itself, and registers it;
-        with more, it gets a register that holds the input on stages 1 to ``initiation_interval``.
+        Cycles from an input to the next. With 1, `datapath` gets the input, and registers it. With more, it
+        gets a register that holds the input on stages 1 to ``initiation_interval``.
     constants : ShapeLike or None
         Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     spaced : bool
@@ -311,9 +312,9 @@ class PipelinedUnit(wiring.Component):
     ports : mapping of str to Member, optional
         Further members, by name.
     skid : bool
-        Whether a spare register holds a beat that is not accepted (`skid_buffer`); without it the unit is
-        disabled while a beat is on the output, for one cycle at least (`stop_output`), so that without stalls
-        a beat comes every ``initiation_interval + 1`` cycles.
+        Whether a spare register holds a beat that is not accepted (`skid_buffer`). Without the spare register
+        the unit is disabled while a beat is on the output, for one cycle at least (`stop_output`). So without
+        stalls a beat comes every ``initiation_interval + 1`` cycles.
 
     Members
     -------
@@ -327,7 +328,7 @@ class PipelinedUnit(wiring.Component):
     Attributes
     ----------
     advance : Signal
-        The common enable, from `elaborate` on: for logic of the unit outside its data path.
+        The common enable, from `elaborate` on, for logic of the unit outside its data path.
     latency, initiation_interval, skid
         As given.
     """
@@ -366,10 +367,10 @@ class PipelinedUnit(wiring.Component):
 
     @staticmethod
     def register(m: Module, value, name: str, *, when: Value | None = None):
-        """A register that takes ``value`` on every enabled cycle, or only on those of ``when``.
+        """A register that takes ``value`` on every enabled cycle, or only while ``when`` is high, too.
 
-        It has no reset: it holds data, and `at` tells which data counts. A multiplier's own registers can
-        take its place.
+        It holds data and has no reset; `at` tells which data counts. A multiplier's own registers can take
+        its place.
         """
         register = Signal(value.shape(), name=name, reset_less=True)
         if when is None:
@@ -409,7 +410,7 @@ class PipelinedUnit(wiring.Component):
         return m
 
     def _wait(self, m: Module, advance: Value, accept: Value) -> Value:
-        """Whether a beat may come: ``initiation_interval`` enabled cycles after the last one, or more.
+        """Whether a beat may come, ``initiation_interval`` enabled cycles after the last beat or later.
 
         A register, computed a cycle ahead.
         """
@@ -424,7 +425,7 @@ class PipelinedUnit(wiring.Component):
         return ready
 
     def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
-        """Whether a beat may come: shared parts serve beats of several stages in fixed slots.
+        """Whether a beat may come, as shared parts serve beats of several stages in fixed slots.
 
         A register, computed a cycle ahead.
         """

@@ -24,9 +24,9 @@ class Word(Operation):
     make : callable
         Makes its hardware.
     text : str or None
-        Its formula, if it is not read from its function.
+        Its formula, if the function does not give it.
     trace : callable
-        Takes the symbols of the operands; returns the word's formula, or ``None``, and the formulas of the
+        Takes the symbols of the operands. Returns the word's formula, or ``None``, and the formulas of the
         operands of its functional unit.
     """
 
@@ -42,18 +42,18 @@ class Word(Operation):
 
     @property
     def given(self) -> Sequence[Any]:
-        """Formulas of the operands of its functional unit, if they have any."""
+        """Formulas of the operands of its functional unit, if there are any."""
         return self._found[1]
 
     @property
     def formula(self) -> Formula | None:
-        """Formula of the word in the symbols of its operands; ``None`` if it has none."""
+        """Formula of the word in the symbols of its operands; ``None`` without a formula."""
         found = self._found[0]
         return found if isinstance(found, Formula) else None
 
     @property
     def symbol(self) -> Formula:
-        """Symbol of the word in formulas of others: its own formula if that is short, else its name.
+        """Symbol of the word in formulas of other words: its own formula if it is short, else its name.
 
         A name of one or two letters is a symbol of its own.
         """
@@ -64,12 +64,12 @@ class Word(Operation):
 
     @property
     def stage(self) -> int:
-        """Enabled cycles from the input of a beat to the first on which the word can be read."""
+        """Enabled cycles from the input of a beat to the first cycle on which the word can be read."""
         return self.graph.schedule.stage(self)
 
     @property
     def read(self) -> int:
-        """Enabled cycles from the input of a beat to that on which its operands are read."""
+        """Enabled cycles from the input of a beat to the read of its operands."""
         return self.graph.schedule.placements[self].read
 
 

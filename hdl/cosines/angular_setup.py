@@ -26,13 +26,13 @@ __all__ = ["AngularSetupUnit"]
 class AngularSetupUnit(PipelinedUnit):
     """Angles ``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` of a span and a fixed vector.
 
-    `AngularSetup` is the bit-accurate model; it has equations, tables, formats and the error bound.
+    `AngularSetup`, the bit-accurate model, has equations, tables, formats and the error bound.
 
     A beat needs 26 multiplications: five dot products of three, six of the half chord, two more
     interpolations, x, y and the step. They share ``ceil(26/I)`` multipliers, I the initiation interval
     (`dataflow`). With ``angle="arccos"`` the pipelined arccos unit, which has two multipliers, takes the
-    place of the half chord; one multiplication, which converts psi to turns, takes the place of six. There
-    are then ``2 + ceil(21/I)`` multipliers. Results do not depend on I.
+    place of the half chord. One multiplication, which converts psi to turns, takes the place of six. There
+    are then ``2 + ceil(21/I)`` multipliers. Results are the same for every I.
 
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
@@ -44,15 +44,15 @@ class AngularSetupUnit(PipelinedUnit):
     =================== == == == == == ==
 
     There are four tables: two of 512 words of 36 bits (by arccos one), one of 512 words of 34 bits, one of
-    2048 words of 17 bits. CORDIC is unrolled to 22 steps of three adders, as is the sum that divides by its
-    gain.
+    2048 words of 17 bits. CORDIC is unrolled to 22 steps of three adders. The sum that divides by its gain is
+    unrolled, too.
 
     Parameters
     ----------
     model : AngularSetup
         Bit-accurate model: the method of psi (``angle``), tables and formats.
     initiation_interval : int or None
-        Cycles from an input to the next, 1 to 26, by arccos 1 to 21; ``None``: 6.
+        Cycles from an input to the next, 1 to 26, by arccos 1 to 21. ``None``: 6.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class AngularSetupUnit(PipelinedUnit):
         Unit vectors of three components ``SQ(1, 17)``; length 1 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
         ``angle`` UQ(0, 36), ``phase`` SQ(0, 40), ``step`` UQ(0, 40), all in turns; ``cos_beta`` UQ(1, 25);
-        ``length``; ``out_of_range``: the span is over 150 degrees, and its plane is inaccurate.
+        ``length``. ``out_of_range``: the span is over 150 degrees, and its plane is inaccurate.
 
     Source: docs/theory/interpolation.md#angular-method; [T] 3.1.
     """

@@ -16,14 +16,14 @@ __all__ = ["ArccosUnit"]
 class ArccosUnit(PipelinedUnit):
     """``arccos x = c0 + x (c1 + c2 x)`` in five segments; below 0 ``pi - arccos(-x)``.
 
-    `Arccos` is the bit-accurate model of both forms; it has tables, formats and error bounds.
+    `Arccos`, the bit-accurate model of both forms, has tables, formats and error bounds.
 
-    Sequential, as published: c0 is loaded into the accumulator and ``c2 x`` into a register; then
-    ``(c2 x) x`` and ``c1 x`` are added. Latency 15 cycles, initiation interval 4; one multiplier of 18 x 17
-    bits.
+    *Sequential*, as published: c0 is loaded into the accumulator and ``c2 x`` into a register. Then
+    ``(c2 x) x`` and ``c1 x`` are added. The latency is 15 cycles, the initiation interval 4. There is one
+    multiplier of 18 x 17 bits.
 
-    Pipelined: Horner's order, with results equal to the bit because ``c1 + c2 x`` is exact. Latency 14
-    cycles, initiation interval 1; two multipliers of 18 x 17 bits.
+    *Pipelined*: Horner's order. The results are equal to the bit, because ``c1 + c2 x`` is exact. The latency
+    is 14 cycles, the initiation interval 1. There are two multipliers of 18 x 17 bits.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class ArccosUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(SQ(2, 16)))`
         Cosine.
     o : :py:`Out(stream.Signature(StructLayout({"angle": UQ(2, 16), "outside": 1})))`
-        Angle in radians; ``outside``: the cosine was outside [-1, 1] and has been clamped.
+        Angle in radians. ``outside``: the cosine was outside [-1, 1] and has been clamped.
 
     Raises
     ------

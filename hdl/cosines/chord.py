@@ -31,9 +31,9 @@ def chord(
     a : Word
         A unit vector.
     b : Word or callable
-        The other unit vector; or a function that gives one that is constant while beats are inside.
+        The other unit vector, or a function that gives a unit vector that is constant while beats are inside.
     symbol : str or None
-        Symbol of the other vector in formulas; ``None``: that of its word.
+        Symbol of the other vector in formulas. ``None``: the symbol of its word.
     """
     differences = data.ArrayLayout(FixedShape(COMPONENT - COMPONENT), 3)
 
@@ -69,8 +69,8 @@ def chord(
 class ChordUnit(PipelinedUnit):
     """Half the squared chord ``u = |a - b|^2 / 2`` of two unit vectors; `Chord` is the bit-accurate model.
 
-    Latency 8 cycles (difference, operand, two for the product, two sums, alignment, saturation),
-    initiation interval 1. Three multipliers of 18x18 bits.
+    The latency is 8 cycles (difference, operand, two for the product, two sums, alignment, saturation), the
+    initiation interval 1. The unit has three multipliers of 18x18 bits.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def span_values_shape(lights: int, highlights: bool = True) -> data.ArrayLayout:
 
 
 def span_factors_shape(factors: int) -> data.ArrayLayout:
-    """Shape of the factors of the lights that fade, at the same three pixels, in the format of N·L."""
+    """Shape of the factors of fading lights, at the same three pixels, in the format of N·L."""
     return data.ArrayLayout(data.ArrayLayout(FixedShape(ChordSetup.DIFFUSE_FORMAT), 3), factors)
 
 
@@ -64,7 +64,7 @@ def span_operands_shape(
 def chord_differences_shape(
     lights: int, highlights: bool = True, model: ChordSetup | None = None, factors: int = 0
 ) -> data.StructLayout:
-    """Shape of a span's differences: of N·L and u for each light, of the factors; and ``out_of_range``."""
+    """Shape of a span's differences, of N·L and u for each light and of the factors, and ``out_of_range``."""
     format = (model or ChordSetup()).format
     names = ("diffuse", "highlight") if highlights else ("diffuse",)
     differences = data.StructLayout({"first": FixedShape(format), "second": FixedShape(format)})
@@ -77,13 +77,13 @@ def chord_differences_shape(
 class ChordSetupUnit(PipelinedUnit):
     """Differences of ``f = N·L`` and ``u = |N - H|^2 / 2`` along a span, from three values of each.
 
-    `ChordSetup` is the bit-accurate model; it has formats and error bounds.
+    `ChordSetup`, the bit-accurate model, has formats and error bounds.
 
     A span has one product for its step, 3 for each u (with highlights), 2 for each f and 2 for each factor.
-    They share multipliers of 18x18 bits: 2 for one light and an initiation interval of 3; the attribute
-    ``multipliers`` is their number.
-    Beats come at any distance from the interval on. A table of ``2^(length_bits - 1)`` words of 17 bits holds
-    the reciprocals. The attribute ``latency`` depends on how the products share the multipliers.
+    They share multipliers of 18x18 bits, 2 for one light and an initiation interval of 3. The attribute
+    ``multipliers`` is their number. Beats come at any distance from the interval on. A table of
+    ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The attribute ``latency`` depends on how
+    the products share the multipliers.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class ChordSetupUnit(PipelinedUnit):
     initiation_interval : int
         Cycles from an input to the next, at least 1.
     length_bits : int
-        Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
+        Bits of the length, 2 to 12. Spans have at most ``2^length_bits - 1`` pixels.
     highlights : bool
         Whether there are differences of u.
     factors : int
@@ -108,9 +108,9 @@ class ChordSetupUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
-        Spans; the length is at least 1. With factors also ``factors``, `span_factors_shape`.
+        Spans of length 1 or more. With factors also ``factors``, `span_factors_shape`.
     o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights, model, factors)))`
-        Differences; ``out_of_range``: P or G does not fit its word, and the differences are invalid.
+        Differences. ``out_of_range``: P or G outgrows its word, and the differences are invalid.
 
     Source: docs/theory/chord.md#differences; [Lyon93].
     """
@@ -289,7 +289,7 @@ def difference_words(
     steps : tuple of Word
         Words of `step_words`.
     has_low : bool
-        Whether P has more bits than a multiplier's operand, and is multiplied in two words.
+        Whether P has more bits than a multiplier's operand, and is multiplied as two words.
     model : ChordSetup
         Bit-accurate model, with the formats.
 

@@ -17,12 +17,12 @@ __all__ = ["HalfChordUnit", "half_chord_words", "normalised_words"]
 class HalfChordUnit(PipelinedUnit):
     """Angle ``psi = 2 arcsin(|N_r - N_l|/2)`` in turns, from the squared chord.
 
-    `HalfChord` is the bit-accurate model; it has table, coefficients, formats and the error bound.
+    `HalfChord`, the bit-accurate model, has table, coefficients, formats and the error bound.
 
     Each beat needs six multiplications of 18 x 17 bits: the interpolation of the root, four Horner steps and
-    the last product. They share ``ceil(6/I)`` multipliers, I the initiation interval (`dataflow`); by default
-    one multiplier, which is busy in every cycle. Results do not depend on I. The table has 512 words of 36
-    bits, one block RAM.
+    the last product. They share ``ceil(6/I)`` multipliers, I the initiation interval (`dataflow`). By default
+    there is one multiplier, which is busy in every cycle. Results are the same for every I. The table has 512
+    words of 36 bits, one block RAM.
 
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
@@ -36,7 +36,7 @@ class HalfChordUnit(PipelinedUnit):
     model : HalfChord
         Bit-accurate model, with table and coefficients.
     initiation_interval : int or None
-        Cycles from an input to the next, 1 to 6; ``None``: 6.
+        Cycles from an input to the next, 1 to 6. ``None``: 6.
 
     Raises
     ------
@@ -46,7 +46,7 @@ class HalfChordUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"chord_squared": UQ(2, 34), "supplement": 1})))`
-        ``|N_r - N_l|^2`` and 0; beyond 90 degrees ``|N_r + N_l|^2`` and 1.
+        ``|N_r - N_l|^2`` and 0. Beyond 90 degrees ``|N_r + N_l|^2`` and 1.
     o : :py:`Out(stream.Signature(UQ(0, 36)))`
         Angle in turns, 0 to 1/2.
 

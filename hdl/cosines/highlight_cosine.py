@@ -30,13 +30,13 @@ def highlight_shape() -> data.StructLayout:
 class HighlightCosineUnit(wiring.Component):
     """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, one pixel a cycle.
 
-    `HighlightCosine` is the bit-accurate model; it has table, formats and error bounds.
+    `HighlightCosine`, the bit-accurate model, has table, formats and error bounds.
 
     The first value of a span comes 12 cycles after the span is accepted (accumulator, folding, table and its
-    register, rise, sum, operand, product, alignment, rounding, sum, saturation), the values of the other
-    pixels in the following cycles, unless the output is stalled. The next span is accepted early enough that
-    there is no gap. A span of length 0 takes one cycle and has no value. Two multipliers: one of 17 x 17 bits
-    and, with interpolation, one of 14 x 14.
+    register, rise, sum, operand, product, alignment, rounding, sum, saturation). The values of the other
+    pixels come in the following cycles, unless the output is stalled. The next span is accepted early enough
+    to leave no gap. A span of length 0 takes one cycle and has no value. The unit has a multiplier of 17 x 17
+    bits and, with interpolation, a multiplier of 14 x 14.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def pixel_words_shape(spans: QuotientSpans) -> data.StructLayout:
     Parameters
     ----------
     spans : QuotientSpans
-        Which words there are.
+        The words of a span: lights, highlights, mirror.
     """
     square, line = (FixedShape(format) for format in (spans.square_format, spans.LINE_FORMAT))
     members = {"rest": square, "line": data.ArrayLayout(line, spans.lights), "span": 1}
@@ -38,12 +38,12 @@ def pixel_words_shape(spans: QuotientSpans) -> data.StructLayout:
 
 
 def quotients_shape(model: Quotient) -> data.StructLayout:
-    """Shape of N·L and a place for each light, of ``out_of_range``, and of the bit that passes.
+    """Shape of N·L and a place for each light, ``out_of_range``, and the bit that passes.
 
     Parameters
     ----------
     model : Quotient
-        Formats.
+        Bit-accurate model, with the formats.
     """
     light = {"cosine": FixedShape(model.COSINE_FORMAT)}
     if model.spans.highlights:
@@ -57,12 +57,12 @@ class QuotientUnit(PipelinedUnit):
 
     `Quotient`, the bit-accurate model, has formats, table and error bounds.
 
-    One product makes r from the table, one r^2; each light has one for N·L and one for s. Without highlights
-    there is no r^2, and no s. With an initiation interval of 1 each product has a multiplier. With a longer
-    one they share ``ceil((2 + 2 lights) / initiation_interval)``, without highlights
-    ``ceil((1 + lights) / initiation_interval)``. The latency follows from the graph. At intervals of 1 to 5
-    it is 16, 22, 21, 24, 25 cycles with one light, and 16, 22, 22, 23, 21 with two; without highlights 10 at
-    an interval of 1.
+    One product makes r from the table, and one makes r^2. Each light has a product for N·L and a product for
+    s. Without highlights there is no r^2, and no s. With an initiation interval of 1 each product has a
+    multiplier. With a longer interval the products share ``ceil((2 + 2 lights) / initiation_interval)``
+    multipliers, without highlights ``ceil((1 + lights) / initiation_interval)``. The latency follows from the
+    graph. At intervals of 1 to 5 it is 16, 22, 21, 24, 25 cycles with one light, and 16, 22, 22, 23, 21 with
+    two. Without highlights it is 10 at an interval of 1.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class QuotientUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(pixel_words_shape(model.spans)))`
         Words of a pixel.
     o : :py:`Out(stream.Signature(quotients_shape(model)))`
-        Operands of each light. ``out_of_range``: q is too small, and they are invalid.
+        Operands of each light. ``out_of_range``: q is too small, and the operands are invalid.
 
     Source: docs/theory/quotient.md#pixel.
     """

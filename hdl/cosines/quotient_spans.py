@@ -1,4 +1,4 @@
-"""Spans of the quotient method: vectors in, m, w, l and z of a pixel out on every cycle."""
+"""Spans of the quotient method: from vectors of spans to m, w, l and z of a pixel on every cycle."""
 
 import itertools
 from collections.abc import Callable
@@ -24,7 +24,7 @@ def vectors_shape(model: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.
     Parameters
     ----------
     model : QuotientSpans
-        Which components there are.
+        The components of a span: lights, highlights, mirror.
     length_bits : int
         Bits of the length.
     """
@@ -43,25 +43,25 @@ def line_directions_shape(model: QuotientSpans) -> data.ArrayLayout:
 class QuotientSpansUnit(wiring.Component):
     """Words of every pixel of spans, first pixel first; `QuotientSpans` is the bit-accurate model.
 
-    *Setup.* The multipliers make ``v·v``, ``v·d`` and ``d·d`` of a span in turns, three cycles in all; a span
-    of one pixel needs ``v·v`` alone, one cycle. Every component that is squared has a multiplier, and every l
-    two: 5 for a light with highlights of N·H, 6 of R·V, 4 more a further light. Without highlights there are
-    3. Differences wait in registers behind the shifts, starts in a memory of `DEPTH` words. So the
-    differences of a span pass the starts of those before it.
+    *Setup.* The multipliers make ``v·v``, ``v·d`` and ``d·d`` of a span in turns, three cycles in all. A span
+    of one pixel needs ``v·v`` alone, one cycle. Every squared component has a multiplier, and every l two
+    multipliers: 5 for a light with highlights of N·H, 6 with highlights of R·V, 4 more a further light.
+    Without highlights there are 3. Differences wait in registers behind the shifts, starts in a memory of
+    `DEPTH` words. So the differences of a span pass the starts of the spans before it.
 
-    *Serial setup.* One multiplier makes all products of a span one by one: those of second differences, of
-    first ones, of the start; each turn once the words of its kind before were taken. With P products a turn,
-    two a line and one a square, a span takes 3 P cycles, or ``P + 6`` if it has one pixel. All sums have
-    one shift, and a start waits in registers.
+    *Serial setup.* One multiplier makes all products of a span one by one, in three turns: for second
+    differences, for first differences, for the start. Each turn waits until the words of its kind from the
+    span before were taken. With P products a turn, two a line and one a square, a span takes 3 P cycles, or
+    ``P + 6`` if it has one pixel. All sums have one shift, and a start waits in registers.
 
-    *Accumulators.* Second differences are taken while the last three pixels of a span leave, first ones with
-    the last two, the start with the last. So a span follows the other without a gap: a run
-    of n spans with p pixels takes p cycles, if no more than a third of them have two pixels. A second
-    difference comes as its half into the first addition, and whole into the others: ``D1 = 2 v·d + d·d``
-    takes no adder.
+    *Accumulators.* Second differences are taken while the last three pixels of a span leave, first
+    differences with the last two, the start with the last. So spans follow each other without a gap: a run of
+    n spans with p pixels takes p cycles, if at most a third of them have two pixels. A second difference
+    comes as its half into the first addition, and whole into the others. So ``D1 = 2 v·d + d·d`` takes no
+    adder.
 
-    The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span,
-    or `short_latency` cycles if the span has one pixel. Payloads are registers.
+    The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span. For
+    a span of one pixel these are `short_latency` cycles. Payloads are registers.
 
     Parameters
     ----------
@@ -75,20 +75,21 @@ class QuotientSpansUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(vectors_shape(model, length_bits)))`
-        Spans of length 1 or more. A span is accepted with its last turn: one of two pixels or more waits.
-        Payload and constants have to stay from the first cycle on which it is valid; valid may fall.
+        Spans of length 1 or more. A span is accepted with its last turn, so a span of two pixels or more
+        waits. Payload and constants have to stay from the first cycle on which the span is valid. Valid may
+        fall.
     o : :py:`Out(stream.Signature(pixel_words_shape(model)))`
         Words of pixels, and a bit that alternates from span to span, 1 in the first.
     constants : :py:`In(line_directions_shape(model))`
-        ``sin a`` and ``cos a`` of each light, constant while spans are inside; only with highlights.
+        Only with highlights: ``sin a`` and ``cos a`` of each light, constant while spans are inside.
     begun : :py:`Out(1)`
-        Whether words of the span that is offered were taken already.
+        Whether words of the offered span were taken already.
 
     Source: docs/theory/quotient.md#span.
     """
 
     DEPTH = 16
-    """Starts that wait at most."""
+    """Largest number of waiting starts."""
 
     _SUMS, _SHIFTED = 3, 5
     """Stages of the sums, and of the shifted differences."""
@@ -115,7 +116,7 @@ class QuotientSpansUnit(wiring.Component):
 
     @property
     def _products(self) -> int:
-        """Products of a turn of the serial setup; without highlights those of lines are with a constant."""
+        """Products of a turn of the serial setup. Without highlights lines have products with a constant."""
         p = self.model
         return sum(len(names) for names in p.squares) + p.lights * (2 if p.highlights else 1)
 

@@ -19,20 +19,20 @@ _COPIES = ("diffuse", "highlight")
 class RecurrenceUnit(wiring.Component):
     """Cosines ``x(k) = A cos(phase - k d)`` along a span, one for the diffuse and one for the specular term.
 
-    `Recurrence` is the bit-accurate model; it has forms, formats and the error bound. Both cosines share the
+    `Recurrence`, the bit-accurate model, has forms, formats and the error bound. Both cosines share the
     register of the coefficient and the counter, which marks the last pixel of a span.
 
-    With ``interleave`` 1 every pixel depends on the one before it, so that the registers of the loop cannot
-    hold other pixels meanwhile: ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift,
-    sums), ``direct`` every 3 (product, sum, saturation). After a span of m pixels the next is accepted
+    With ``interleave`` 1 every pixel depends on the pixel before it. So the registers of the loop cannot hold
+    other pixels meanwhile. ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift, sums),
+    ``direct`` every 3 (product, sum, saturation). After a span of m pixels the next is accepted
     ``4 (m - 1) + 1`` (``3 (m - 1) + 1``) cycles later.
 
-    With ``interleave`` 4 every pixel depends on the fourth before it. The four phases follow each other
-    through the four registers of the loop, so that there is a pixel in every cycle. A span takes m cycles,
-    and the next one follows without a gap.
+    With ``interleave`` 4 every pixel depends on the fourth pixel before it. The four phases follow each other
+    through the four registers of the loop. So there is a pixel in every cycle. A span takes m cycles, and the
+    next span follows without a gap.
 
-    In both cases the first pixel comes 3 cycles after its span is accepted, and a span of length 0 takes one
-    cycle and has no pixel. Two multipliers, one for each cosine; with the defaults of 18 x 18 bits.
+    In both cases the first pixel comes 3 cycles after its span is accepted. A span of length 0 takes one
+    cycle and has no pixel. There are two multipliers, one for each cosine, by default of 18 x 18 bits.
 
     Parameters
     ----------
@@ -43,10 +43,10 @@ class RecurrenceUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse", "highlight", "coefficient", "shift", "length"})))`
         For each cosine ``first`` and ``second`` in `Recurrence.state_format`: x(0), and x(1) - x(0) in
-        ``reinsch``, x(1) in ``direct``; if interleaved, arrays of four, see `Recurrence.start`. Coefficient;
-        shift, in ``reinsch`` only; length 0 to 4095.
+        ``reinsch``, x(1) in ``direct``. If interleaved, they are arrays of four, see `Recurrence.start`.
+        Coefficient; shift, in ``reinsch`` only; length 0 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "highlight", "last"})))`
-        Both cosines in `Recurrence.result_format`; whether this is the last pixel of its span.
+        Both cosines in `Recurrence.result_format`. ``last``: the last pixel of its span.
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5.
     """

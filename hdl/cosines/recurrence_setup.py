@@ -19,7 +19,7 @@ _SHIFT_BITS = 6
 
 
 def recurrence_starts_shape(model: RecurrenceSetup, lights: int) -> data.StructLayout:
-    """Shape of a prepared span: start values for L and H of each light; coefficient, shift; length; flag."""
+    """Shape of a prepared span: start values for L and H of each light, coefficient, shift, length, flag."""
     r = model.recurrence
     words = data.ArrayLayout(FixedShape(r.state_format), r.interleave)
     start = data.StructLayout(dict.fromkeys(("first", "second"), words))
@@ -35,12 +35,11 @@ def recurrence_starts_shape(model: RecurrenceSetup, lights: int) -> data.StructL
 class RecurrenceSetupUnit(PipelinedUnit):
     """Start values of the four phases of ``N . L`` and ``N . H`` along a span, for each light.
 
-    `RecurrenceSetup` is the bit-accurate model; it has equations, formats and the error bound.
+    `RecurrenceSetup`, the bit-accurate model, has equations, formats and the error bound.
 
     The 14 products of a span and the 32 of each light share ``ceil((14 + 32 lights) / I)`` multipliers of
-    18x18 bits, I the initiation interval. 14 products of a light are the seven steps of the recurrence for L
-    and for H. There are 18 shifts a light, which share ``ceil(18 lights / I)`` shifters of 48 bits. For one
-    light:
+    18x18 bits, I the initiation interval. 14 of a light's products are the seven steps of the recurrence for
+    L and for H. The 18 shifts of a light share ``ceil(18 lights / I)`` shifters of 48 bits. For one light:
 
     =================== === === === === ===
     initiation interval 1   2   4   8   46
@@ -72,8 +71,8 @@ class RecurrenceSetupUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Spans of length 1 to 4095.
     o : :py:`Out(stream.Signature(recurrence_starts_shape(model, lights)))`
-        Start values; K of a step of four pixels and its shift; the length; ``out_of_range``: the span is
-        over 90 degrees, and its words are invalid.
+        Start values; K of a step of four pixels and its shift; the length. ``out_of_range``: the span is over
+        90 degrees, and its words are invalid.
     constants : :py:`In(light_vectors_shape(lights))`
         Unit vectors L and H, constant while beats are inside.
 

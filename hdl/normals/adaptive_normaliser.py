@@ -20,7 +20,7 @@ from blysk.hdl.normals.bisection import BisectionUnit
 __all__ = ["AdaptiveNormaliserUnit"]
 
 SEGMENT_CYCLES = 14
-"""Cycles from the preparation of a segment to that of the next."""
+"""Cycles from the preparation of a segment to the preparation of the next."""
 
 
 class AdaptiveNormaliserUnit(wiring.Component):
@@ -28,31 +28,35 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     `AdaptiveNormaliser`, the bit-accurate model, has formats, choice of k and error bounds.
 
-    Three parts work at once, each on a span of its own. The first bisects, level by level (`BisectionUnit`),
-    and counts the levels. The second computes start, step and length of every segment, one in 14 cycles (3
-    for a segment without a pixel), and puts them into a FIFO. The last gives a normal in every cycle, from a
-    span's first to its last, unless the output waits; it begins a span when the FIFO has all of its segments.
-    `preparation` is the number of cycles from a span to its first normal, if all parts are free: 63 for k =
-    0, 77 for k = 1, 142 for k = 2. Spans follow each other in `interval` cycles, if they have that many
-    pixels or fewer: 33 for k = 0, 42 for k = 1, 70 for k = 2. Spans of one pixel and of two count as of k =
-    0, those of three as of k = 1 at most. A span of length 0 takes one cycle and gives nothing.
+    Three parts work at once, each on a span of its own.
 
-    Three multipliers: two in the bisection unit, and one for the square of q and for the segments. A memory
-    of ``2^(depth + 2)`` words of 54 bits holds the segment ends of two spans, a FIFO of ``2^(depth + 1)`` the
-    segments, and a table of 2048 words of 17 bits the reciprocals.
+    1. The first bisects, level by level (`BisectionUnit`), and counts the levels.
+    2. The second computes start, step and length of every segment, and puts them into a FIFO. A segment takes
+       14 cycles, or 3 without a pixel.
+    3. The last gives a normal in every cycle, from a span's first to its last, unless the output waits. It
+       begins a span when the FIFO has all of its segments.
+
+    `preparation` is the number of cycles from a span to its first normal, if all parts are free: 63 for k =
+    0, 77 for k = 1, 142 for k = 2. Spans with at most `interval` pixels follow each other in `interval`
+    cycles: 33 for k = 0, 42 for k = 1, 70 for k = 2. Spans of one or two pixels count as k = 0, spans of
+    three pixels as k = 1 at most. A span of length 0 takes one cycle and gives nothing.
+
+    The unit has three multipliers: two in the bisection unit, and one for the square of q and for the
+    segments. A memory of ``2^(depth + 2)`` words of 54 bits holds the segment ends of two spans. A FIFO of
+    ``2^(depth + 1)`` words holds the segments, and a table of 2048 words of 17 bits the reciprocals.
 
     Parameters
     ----------
     model : AdaptiveNormaliser
-        Bit-accurate model, which knows threshold and factor.
+        Bit-accurate model, with threshold and factor.
 
     Members
     -------
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Unit normals, three components ``SQ(1, 17)`` each; pixels.
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range": 1, "last": 1})))`
-        Normals, three components ``SQ(1, 17)``; ``out_of_range``: the span is wider than the bisection's
-        ``max_angle``; ``last``: the last normal of its span.
+        Normals, three components ``SQ(1, 17)``. ``out_of_range``: the span is wider than the bisection's
+        ``max_angle``. ``last``: the last normal of its span.
 
     Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7.
     """
@@ -81,10 +85,10 @@ class AdaptiveNormaliserUnit(wiring.Component):
         return self.counting(levels) + 2 + SEGMENT_CYCLES * ((1 << levels) + 1)
 
     def interval(self, levels: int) -> int:
-        """Cycles from a span to the next, if both have so many levels and ``2^levels + 1`` pixels.
+        """Cycles from a span to the next, if both have this number of levels and ``2^levels + 1`` pixels.
 
-        The longer one of the first two parts decides. Between spans of different levels the first part may
-        wait up to 6 cycles for the multiplier.
+        The slower of the first two parts decides. Between spans of different levels the first part may wait
+        up to 6 cycles for the multiplier.
         """
         return max(self.counting(levels), SEGMENT_CYCLES * ((1 << levels) + 1))
 

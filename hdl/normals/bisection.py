@@ -23,8 +23,8 @@ def coefficient(model: Bisection, power: int, first_step: Value) -> FixedValue:
     power : int
         Power of the coefficient.
     first_step : Value
-        Whether it is from the polynomial of the first step, for spans of 45 to 90 degrees; not read if the
-        model has none.
+        Whether the polynomial is that of the first step, for spans of 45 to 90 degrees. A model without a
+        first step ignores it.
     """
     codes = []
     for first in (False, True):
@@ -38,12 +38,11 @@ def coefficient(model: Bisection, power: int, first_step: Value) -> FixedValue:
 class BisectionUnit(PipelinedUnit):
     """Normal half-way between two: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 N_a . N_b``.
 
-    `Bisection`, the bit-accurate model, has formats, variants, error bounds and the flag of spans that are
-    too wide.
+    `Bisection`, the bit-accurate model, has formats, variants, error bounds and the flag of too wide spans.
 
-    ``s + 6`` multiplications: three of the dot product, s Horner steps, three scalings. With an initiation
-    interval I, ``ceil((s + 6) / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The results do not
-    depend on I.
+    A beat needs ``s + 6`` multiplications: three of the dot product, s Horner steps, three scalings. With an
+    initiation interval I, ``ceil((s + 6) / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The
+    results are the same for every I.
 
     Latency and multipliers by interval:
 
@@ -58,7 +57,7 @@ class BisectionUnit(PipelinedUnit):
     Parameters
     ----------
     model : Bisection
-        Bit-accurate model, which knows degree, widest span and coefficients.
+        Bit-accurate model, with degree, widest span and coefficients.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to ``s + 6``. ``None``: ``s + 3``.
 
@@ -72,8 +71,8 @@ class BisectionUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"normal_a": ..., "normal_b": ...})))`
         Unit normals, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
-        ``normal_middle``, three components ``SQ(1, 17)``; ``one_minus_cosine`` of the two normals,
-        ``SQ(2, 17)``; ``out_of_range``: they are further apart than ``max_angle``, and the middle is
+        ``normal_middle``, three components ``SQ(1, 17)``. ``one_minus_cosine`` of the two normals,
+        ``SQ(2, 17)``. ``out_of_range``: they are further apart than ``max_angle``, and the middle is
         undefined.
 
     Source: docs/theory/interpolation.md#bisection; [T] 2.1, figure 2.6.

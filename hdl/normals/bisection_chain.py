@@ -24,21 +24,22 @@ class BisectionChainUnit(wiring.Component):
 
     `BisectionChain`, the bit-accurate model, has formats and error bound.
 
-    Sequential: one span at a time. With s Horner steps of the bisection's factor, a span gives its normal
-    ``17 + k (3 s + 8)`` cycles after it was taken in (`latency`); the next is taken in a cycle after that at
-    the earliest. Four multipliers: three in the dot product, used once, and one for all other products.
+    The unit is sequential, one span at a time. With s Horner steps of the bisection's factor, a span gives
+    its normal ``17 + k (3 s + 8)`` cycles after it was taken in (`latency`). The next span is taken in a
+    cycle after the normal at the earliest. The unit has four multipliers: three in the dot product, used
+    once, and one for all other products.
 
     Parameters
     ----------
     model : BisectionChain
-        Bit-accurate model, which knows the factor.
+        Bit-accurate model, with the factor.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "level": 4})))`
         Unit normals, three components ``SQ(1, 17)`` each; k, 1 to 15 (0 counts as 16).
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range": 1})))`
-        The normal, three components ``SQ(1, 17)``; ``out_of_range``: the span is wider than the bisection's
+        The normal, three components ``SQ(1, 17)``. ``out_of_range``: the span is wider than the bisection's
         ``max_angle``, and its normal undefined.
 
     Source: docs/theory/interpolation.md#bisection; [T] 2.1.
@@ -68,7 +69,7 @@ class BisectionChainUnit(wiring.Component):
         )
 
     def latency(self, level: int) -> int:
-        """Cycles from input to output of a span of that level."""
+        """Cycles from input to output of a span of a level."""
         return 17 + level * (3 * self.model.bisection.steps + 8)
 
     def elaborate(self, platform):

@@ -16,16 +16,16 @@ __all__ = ["AccumulatorUnit", "DifferenceAccumulatorUnit"]
 
 
 class AccumulatorUnit(wiring.Component):
-    """Quadratics of a span by forward differences, a value of each in every cycle, first pixel first.
+    """Quadratics of a span by forward differences, with a value of each in every cycle, first pixel first.
 
     `DifferenceAccumulator`, the bit-accurate model of each quadratic, has formats, rounding and bounds.
 
-    A span of m pixels gives its first values 3 cycles after it was accepted and others in each of the m - 1
-    cycles that follow, unless the output waits. The next span is accepted early enough to leave no gap. A
-    span of length 0 takes one cycle and gives nothing. No multipliers.
+    A span of m pixels gives its first values 3 cycles after it was accepted. It gives the others in the next
+    m - 1 cycles, unless the output waits. The next span is accepted early enough to leave no gap. A span of
+    length 0 takes one cycle and gives nothing. The unit has no multipliers.
 
-    The accumulators load the words of a span a cycle after it was accepted, so that a register drives the
-    enables of all of them.
+    The accumulators load the words of a span a cycle after it was accepted. So a register drives all of their
+    enables.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ class AccumulatorUnit(wiring.Component):
     ports : mapping of str to Member, optional
         Further members, by name.
 
-    A subclass may carry further words of a span to its pixels; see `carried`. The words of a span may come
-    from elsewhere, a cycle after the length; see `hold`.
+    A subclass may carry further words of a span to its pixels, see `carried`. The words of a span may come
+    from elsewhere, a cycle after the length, see `hold`.
 
     Members
     -------
@@ -67,7 +67,7 @@ class AccumulatorUnit(wiring.Component):
         raise NotImplementedError
 
     def carried(self, values: ValueCastable) -> Iterator[tuple[Value, Value]]:
-        """Words of the span, and elements of ``values`` that have them at each of its pixels."""
+        """Words of the span, and elements of ``values`` that hold them at each of its pixels."""
         yield from ()
 
     @property
@@ -76,7 +76,7 @@ class AccumulatorUnit(wiring.Component):
         return self._span
 
     def hold(self, m: Module, load: Value) -> None:
-        """Keep the words of a span that is accepted, for the cycle on which they are taken in.
+        """Keep the words of an accepted span, for the cycle on which they are taken in.
 
         Parameters
         ----------
@@ -91,12 +91,12 @@ class AccumulatorUnit(wiring.Component):
 
     @classmethod
     def begin(cls, model: DifferenceAccumulator, start: FixedValue) -> FixedValue:
-        """First value of an accumulator: the start, and half a step of the result, so that cutting rounds."""
+        """First value of an accumulator, the start and half a step of the result; a cut then rounds."""
         return start + FixedValue.constant(model.format, model.result_format.step / 2)
 
     @classmethod
     def rounded(cls, model: DifferenceAccumulator, value: FixedValue) -> FixedValue:
-        """The value that the result is cut from: here ``value`` itself."""
+        """The value before the cut of the result, here ``value``."""
         return value
 
     def elaborate(self, platform):

@@ -35,10 +35,10 @@ class DifferenceSetupUnit(PipelinedUnit):
 
     `DifferenceSetup`, the bit-accurate model, has formats and error bound.
 
-    Seven multiplications: the square of dt, three products with P and three with G. With an initiation
-    interval I, ``ceil(7 / I)`` multipliers share them (`blysk.hdl.core.dataflow`), each with its own shifter;
-    by default one does all. The results do not depend on I. A table of ``2^(length_bits - 1)`` words of 17
-    bits holds the reciprocals.
+    A span needs seven multiplications: the square of dt, three products with P and three with G. With an
+    initiation interval I, ``ceil(7 / I)`` multipliers share them (`blysk.hdl.core.dataflow`), each with its
+    own shifter. By default one multiplier does all. The results are the same for every I. A table of
+    ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals.
 
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
@@ -47,7 +47,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     multipliers 7  4  3  2  2  2  1
     =========== == == == == == == ==
 
-    For a straight line, `order` 1, there are three products alone, those with P:
+    For a straight line, `order` 1, there are only the three products with P:
 
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
@@ -68,15 +68,15 @@ class DifferenceSetupUnit(PipelinedUnit):
     Parameters
     ----------
     model : DifferenceSetup
-        Bit-accurate model, which knows the order of the products.
+        Bit-accurate model, with the order of the products.
     initiation_interval : int or None
-        Cycles from an input to the next, 1 to 7, or to 9 in the order of [T]. ``None``: as many as there are
+        Cycles from an input to the next, 1 to 7, or to 9 in the order of [T]. ``None``: the number of
         products.
     order : int
-        Degree of the curve: 2; or 1 for a straight line, with G = 0 and no port for it, and a second
-        difference of 0.
+        Degree of the curve, 2 or 1. A straight line, 1, has G = 0 without a port, and a second difference of
+        0.
     length_bits : int
-        Bits of the length, 2 to 12: spans have at most ``2^length_bits - 1`` pixels.
+        Bits of the length, 2 to 12. Spans have at most ``2^length_bits - 1`` pixels.
 
     Raises
     ------

@@ -14,14 +14,15 @@ __all__ = ["DotProductUnit"]
 class DotProductUnit(PipelinedUnit):
     """Exact dot product ``a0 b0 + a1 b1 + a2 b2``.
 
-    The sum keeps every bit (``SQ(4, 34)`` for unit vectors): no rounding, no overflow.
+    The sum keeps every bit (``SQ(4, 34)`` for unit vectors), without rounding and overflow.
 
-    The latency is 3 cycles (products, first sum, second sum), the initiation interval 1. Three multipliers.
+    The latency is 3 cycles (products, first sum, second sum), the initiation interval 1. The unit has three
+    multipliers.
 
     Parameters
     ----------
     model : DotProduct
-        Bit-accurate model, which knows the number formats.
+        Bit-accurate model, with the number formats.
 
     Members
     -------

@@ -19,12 +19,12 @@ _MULTIPLICATIONS = 9
 class MiddleNormalUnit(PipelinedUnit):
     """Middle normal ``N_c = h(r) (N_l + N_r)``, ``h = 1/sqrt(2 (1 + r))`` as a polynomial.
 
-    `MiddleNormal`, the bit-accurate model, has formats, fits (the default is exact at angle 0), error bound
-    and flag.
+    `MiddleNormal`, the bit-accurate model, has formats, fits, error bound and flag. The default fit is exact
+    at angle 0.
 
-    Nine multiplications: three of the dot product, three Horner steps, three scalings. With an initiation
-    interval I, ``ceil(9 / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The results do not depend
-    on I.
+    A span needs nine multiplications: three of the dot product, three Horner steps, three scalings. With an
+    initiation interval I, ``ceil(9 / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The results are
+    the same for every I.
 
     =========== == == == == == == == == ==
     interval    1  2  3  4  5  6  7  8  9
@@ -36,7 +36,7 @@ class MiddleNormalUnit(PipelinedUnit):
     Parameters
     ----------
     model : MiddleNormal
-        Bit-accurate model, which knows the fit of h.
+        Bit-accurate model, with the fit of h.
     initiation_interval : int or None
         Cycles from an input to the next, 1 to 9. ``None``: 6.
 
@@ -50,7 +50,7 @@ class MiddleNormalUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"normal_left": ..., "normal_right": ...})))`
         Unit normals of the span's ends, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
-        The same two normals, ``normal_middle`` in ``SQ(1, 19)``, and ``out_of_range``: the span is wider than
+        The same two normals, and ``normal_middle`` in ``SQ(1, 19)``. ``out_of_range``: the span is wider than
         45 degrees, and its middle normal undefined.
 
     Source: docs/theory/interpolation.md#middle-normal; [T] 2.2.

@@ -25,21 +25,21 @@ class QuadraticEvaluatorUnit(wiring.Component):
     `QuadraticEvaluator`, the bit-accurate model, has formats, rounding and error bound. The table of
     reciprocals holds 2048 words of 18 bits.
 
-    ``direct`` (figure 2.9 a): seven multipliers, t^2 once and two products a component (the figure draws one
-    component, with three). The first normal comes 14 cycles after its span was taken in, then one in every
-    cycle.
+    ``direct`` (figure 2.9 a) has seven multipliers, for t^2 once and two products a component. (The figure
+    draws one component, with three.) The first normal comes 14 cycles after its span was taken in, then a
+    normal in every cycle.
 
-    ``horner`` (figure 2.9 b): one multiplier, one adder and multiplexers a component, three multipliers in
-    all. The first normal comes 17 cycles after its span, then one every two cycles.
+    ``horner`` (figure 2.9 b) has one multiplier, one adder and multiplexers a component, three multipliers in
+    all. The first normal comes 17 cycles after its span, then a normal every two cycles.
 
-    The step of the next span is prepared while this one runs. Spans are taken in at least 7 cycles apart, and
-    there is no gap between their pixels if they have 7 pixels (``horner``: 4) or more. A span of length 0
-    gives nothing.
+    The step of the next span is prepared while this span runs. Spans are taken in at least 7 cycles apart. If
+    they have 7 pixels (``horner``: 4) or more, there is no gap between their pixels. A span of length 0 gives
+    nothing.
 
     Parameters
     ----------
     model : QuadraticEvaluator
-        Bit-accurate model, which knows the form.
+        Bit-accurate model, with the form.
 
     Members
     -------

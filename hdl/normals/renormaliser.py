@@ -1,4 +1,4 @@
-"""Renormaliser: a vector of any length divided by its length, one in every cycle."""
+"""Renormaliser: a vector of any length divided by its length, with a result in every cycle."""
 
 from typing import ClassVar
 
@@ -27,8 +27,9 @@ class RenormaliserUnit(PipelinedUnit):
     `Renormaliser`, the bit-accurate model, has segments, formats, error bounds and flag.
 
     The latency is 16 cycles (leading one, its place, two for the shift, dot product 3, octave, table, four
-    for the polynomial, product, rounding, saturation), the initiation interval 1. Eight multipliers: three
-    squares, two in the polynomial, three products with the factor. The table holds 64 words of 48 bits.
+    for the polynomial, product, rounding, saturation). The initiation interval is 1. The unit has eight
+    multipliers: three squares, two in the polynomial, three products with the factor. The table holds 64
+    words of 48 bits.
 
     Parameters
     ----------
@@ -40,8 +41,8 @@ class RenormaliserUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"vector": vector_shape(), "span": 1})))`
         Vectors, with a bit that passes through.
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range", "span"})))`
-        Unit vector, ``SQ(1, 17)``; ``out_of_range``: the vector is too short, and the normal invalid; the
-        bit.
+        Unit vector, ``SQ(1, 17)``. ``out_of_range``: the vector is too short, and the normal invalid. The bit
+        that passes.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
