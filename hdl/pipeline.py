@@ -161,7 +161,7 @@ class ShadingPipelineUnit(wiring.Component):
     def _make_units(self) -> None:
         """Units from spans to colours, and the times that follow from them."""
         p = self.model
-        compact, setup_interval, product_interval = p.build.style == "compact", p.build.setup_interval, 1
+        compact, setup_interval, product_interval = p.build.compact, p.build.setup_interval, 1
         method = unit_of(p.interpolator)
         if compact:
             # A pixel takes a cycle a channel at least.
@@ -181,7 +181,7 @@ class ShadingPipelineUnit(wiring.Component):
         )
         self.setup_interval = self._interpolator.setup_interval
         self._shortest_interval = self._interpolator.shortest_interval
-        self._lights = self._light_units(compact)
+        self._lights = self._light_units()
         self._intensity = (CompactIntensityUnit if compact else IntensityUnit)(p.intensity)
         slowest = max(self._lights, key=lambda light: light.latency)
         chain = (self._interpolator, slowest, self._intensity, self._assembler)
@@ -198,10 +198,11 @@ class ShadingPipelineUnit(wiring.Component):
             self._intensity.initiation_interval,
         )
 
-    def _light_units(self, compact: bool) -> list:
+    def _light_units(self) -> list:
         """Light units, or diffuse units without specular light; and the slopes or tables that they share."""
         p = self.model
-        exponent, diffuse = p.build.exponent, Diffuse(p.interpolator.COSINE_FORMAT)
+        compact, exponent = p.build.compact, p.build.exponent
+        diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
         if p.specular is None:
             return [DiffuseUnit(diffuse) for _ in range(p.lights)]
         kind = kind_of(p.specular)

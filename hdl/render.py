@@ -135,7 +135,7 @@ class RendererUnit(wiring.Component):
         design, geometry = self.model.design, self.model.geometry
         self.geometry = GeometryUnit(geometry, design.build)
         self.pipeline = ShadingPipelineUnit(design)
-        self._adapters(design.build.compact_geometry)
+        self._adapters()
         coarse, bits = self.model.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
         self.depth = DepthTesterUnit(*bits, size, clears)
@@ -234,13 +234,10 @@ class RendererUnit(wiring.Component):
         ]
         return m
 
-    def _adapters(self, compact: bool) -> None:
+    def _adapters(self) -> None:
         """Units for the components of vectors that geometry does not have, and the shape before them."""
-        span, rows, lights = (
-            self.pipeline.i.payload.shape(),
-            self.model.rows,
-            self.model.design.lights,
-        )
+        span, rows, design = self.pipeline.i.payload.shape(), self.model.rows, self.model.design
+        compact, lights = design.build.compact_geometry, design.lights
         self._lights = self._mirror = None
         self._span = span
         if not (rows or self.model.mirrors):

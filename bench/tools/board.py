@@ -117,7 +117,7 @@ def design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator
         f"{len(drawing.presets)} presets"
     )
     design = drawing.renderer.design
-    style = "compact" if board.compact else "fast"
+    style = "compact" if design.build.compact_geometry else "fast"
     lights = "1 light" if design.lights == 1 else f"{design.lights} lights"
     yield f"{'shading':<12}{design.method}, {design.model}, {lights}, {style} geometry"
     bits = "".join(map(str, buffer.colour_bits))
