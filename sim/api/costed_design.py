@@ -1,4 +1,4 @@
-"""A design as Python gives it: with its cost."""
+"""The design of the Python interface, with its cost."""
 
 from dataclasses import dataclass, fields, replace
 from statistics import median
@@ -13,20 +13,20 @@ __all__ = ["Design", "DesignCost"]
 
 @dataclass(frozen=True)
 class DesignCost:
-    """What a pipeline costs: counted in its netlist, and placed on an FPGA if that is committed.
+    """Cost of a pipeline, counted in its netlist; with parts of an FPGA, if its placement is committed.
 
     Parameters
     ----------
     multipliers : int
-        Multipliers of two words that are no constants, of any width.
+        Multipliers of two words of any width, neither of them a constant.
     multiplier_widths : dict of (int, int) to int
-        Their number by the widths of their operands, the wider first.
+        Number of multipliers by the widths of their operands; the wider operand is first.
     register_bits, memory_bits : int
-        Bits of flip-flops, and of memories, before technology mapping.
+        Bits of flip-flops and of memories, before technology mapping.
     cycles_per_pixel : int
         Cycles of a pixel of a long span.
     setup_interval : int
-        A span of n pixels takes max(``cycles_per_pixel`` n, this) cycles at most.
+        A span of n pixels takes at most max(``cycles_per_pixel`` n, ``setup_interval``) cycles.
     latency : int
         Cycles from a span to its first pixel.
     luts, flip_flops, block_rams : int or None
@@ -68,7 +68,7 @@ class DesignCost:
 
 
 class Design(pipeline.ShadingPipeline):
-    """A design of the golden layer, equal to that, with `cost`."""
+    """A design of the golden layer with `cost`; it equals the design without."""
 
     @classmethod
     def of(cls, design: pipeline.ShadingPipeline) -> "Design":
@@ -76,9 +76,9 @@ class Design(pipeline.ShadingPipeline):
         return cls(**{field.name: getattr(design, field.name) for field in fields(design)})
 
     def cost(self) -> DesignCost:
-        """Multipliers, bits and cycles, from the unit; parts of an FPGA where they are committed.
+        """Multipliers, bits and cycles from the unit, and parts of an FPGA if they are committed.
 
-        The netlist is written and counted each time: seconds.
+        Each call writes and counts the netlist, which takes seconds.
         """
         # The hardware's description takes a second to import.
         from blysk.hdl.emit.cost import cost_of
@@ -98,7 +98,7 @@ class Design(pipeline.ShadingPipeline):
         )
 
     def placed(self) -> dict[str, Any]:
-        """Figures of `DesignCost` from the committed placement of this very design; empty without one."""
+        """Figures of `DesignCost` from the committed placement of exactly this design; else empty."""
         shading = replace(self, build=self.build.shading)
         for entry in read_store():
             words = design_of(entry["design"])

@@ -32,19 +32,19 @@ def design(
     Parameters
     ----------
     lights, materials : int
-        How many it serves: 1 to 16 lights, and 1 to 1024 materials.
+        Numbers of lights and materials that it serves: 1 to 16 and 1 to 1024.
     factors : int
-        Number of lights, counted from the first, that fade by distance or as spots; ``chord-local`` only.
+        Number of lights that fade by distance or as spots; these come first. ``chord-local`` only.
     method : str
-        Interpolation along a span: one of `METHODS`, by default that of `default_method`: ``"quotient"``.
+        Method of interpolation along a span: one of `METHODS`; by default see `default_method`.
     model : str
-        Reflection model: one of `MODELS` or `LOBES`, by default ``"blinn"``; or the curve of a file.
+        Reflection model: one of `MODELS` or `LOBES`, or the curve of a file; by default ``"blinn"``.
     operand : {"cosine", "one_minus_cosine"}
-        Operand of the specular unit, for methods that interpolate normals.
+        Operand of the specular unit, for methods that compute normals.
     gate : bool
         Whether there is a highlight gate.
     setup_interval : int
-        Least cycles from one span to the next, for methods that have that choice.
+        Minimum cycles from one span to the next, for methods with this choice.
     style : {"throughput", "compact"}
         One pixel a cycle, or few multipliers.
 
@@ -101,7 +101,7 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
 
 
 def _check_interval(settings: Settings, design: ShadingPipeline) -> None:
-    """Refuse a setup interval that the method's hardware is not built for."""
+    """Refuse a setup interval that the method's hardware does not have."""
     # The hardware's description takes a second to import.
     from blysk.hdl.methods.interpolator import spelled
     from blysk.hdl.methods.registry import unit_of
@@ -169,7 +169,7 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
 
 @contextmanager
 def refused_counts(design: ShadingPipeline | None) -> Iterator[None]:
-    """Turn the refusal of a scene by the caller's own design, if there is one, into an `OptionError`."""
+    """If the caller's own design refuses a scene, raise an `OptionError` instead."""
     try:
         yield
     except ValueError as error:

@@ -15,16 +15,16 @@ LightsLike = Light | Mapping[str, Any] | str | Sequence[Any]
 
 
 class Lights(Value):
-    """Lights: each a `Light`, a table of its parts, or numbers as on the command line.
+    """Lights. Each is a `Light`, a table of its parts, or numbers as on the command line.
 
     Parameters
     ----------
     numbers : Vector
         Numbers of a light on the command line.
     fields : tuple of str
-        Fields of `Light` that the numbers fill in turn.
+        Fields of `Light` that the numbers fill, in this order.
     remedy : str
-        What to give in place of refused numbers.
+        Text that says which numbers to give instead of refused numbers.
     """
 
     name = "lights"
@@ -43,7 +43,7 @@ class Lights(Value):
 
     @property
     def in_python(self) -> str:
-        """A light or several, in any form."""
+        """One or several lights, in any form."""
         return (
             f'give a Light, a dict with direction or position, numbers, or "{self.numbers.name}"; or a list '
             "of these"

@@ -16,7 +16,7 @@ _NAME = re.compile(r"pipeline ([\w-]+), ([\w-]+), 1 light(?:, (cosine|one_minus_
 def design_of(name: str) -> tuple[str, ...] | None:
     """Method, model and perhaps operand of a pipeline, from its name in ``blysk fpga``.
 
-    ``None`` for more than one light, another style, and names that are no pipeline's.
+    ``None`` for several lights, another style, and names that do not belong to a pipeline.
     """
     found = _NAME.fullmatch(name)
     return tuple(word for word in found.groups() if word) if found else None

@@ -29,22 +29,22 @@ __all__ = ["RenderedFrame"]
 
 @dataclass(frozen=True)
 class RenderedFrame:
-    """A frame of a simulated pipeline; a notebook shows its picture and its figures.
+    """A frame of a simulated pipeline. A notebook shows its picture and its figures.
 
     Parameters
     ----------
     scene : Scene
-        What was drawn.
+        The scene that was drawn.
     design : Design
-        The pipeline; if it was specialised, the full pipeline.
+        The pipeline; for a specialised pipeline, the full pipeline.
     simulated : SimulatedFrame or SimulatedTriangleFrame
-        The hardware's frame, by spans or by triangles.
+        The hardware's frame, from spans or from triangles.
     name : str
         Name of the mesh.
     details : dict
         ``ignored`` and ``counts`` of `LoadedMesh`, ``seconds`` of its parts, perhaps ``specialisation``.
     files : RunFiles
-        The files that were read, which `save` does not replace.
+        Files that were read. `save` does not replace them.
     """
 
     scene: Scene
@@ -66,15 +66,15 @@ class RenderedFrame:
 
     @property
     def total_error(self) -> FrameErrors:
-        """Errors against exact shading by the exact model: a lobe's own, else Blinn's power, see `target_of`.
+        """Errors against exact shading by the exact model: a lobe's own, else Blinn's power (`target_of`).
 
-        That of the reflection model is in it; with a lobe it is `error`.
+        This includes the error of the reflection model. With a lobe it equals `error`.
         """
         return self.comparison.total_error
 
     @cached_property
     def error_map(self) -> np.ndarray:
-        """Largest error of the channels of each pixel, as in `error`, LSB; float64, shape (height, width)."""
+        """Largest error of each pixel's channels in LSB, as in `error`; float64, shape (height, width)."""
         return error_map(self.image, self.comparison.golden)
 
     @property
@@ -84,12 +84,12 @@ class RenderedFrame:
 
     @property
     def spans(self) -> int:
-        """Number of spans that went into the shading pipeline."""
+        """Number of spans that entered the shading pipeline."""
         return self.simulated.spans
 
     @property
     def pixels(self) -> int:
-        """Number of pixels that came out of it, hidden ones included."""
+        """Number of pixels that left it, with hidden pixels."""
         return self.simulated.pixels
 
     @property
@@ -99,7 +99,7 @@ class RenderedFrame:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """The golden frame, and the errors against three references; by triangles against two."""
+        """The golden frame, and the errors against three references; with triangles, against two."""
         if isinstance(self.simulated, SimulatedTriangleFrame):
             drawn = self.simulated
             return compare_triangles(self.scene, Renderer(self.design), drawn.sent, drawn.image)
@@ -121,12 +121,12 @@ class RenderedFrame:
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the picture; the suffix chooses the format.
+        """Write the picture. The suffix chooses the format.
 
         Raises
         ------
         InputError
-            If the suffix names no picture format, or the file cannot be written, or was read for the frame.
+            If the suffix names no picture format, or the file cannot be written or was read for the frame.
         """
         with self.files.active():
             write_image(path, self.image)

@@ -29,49 +29,49 @@ __all__ = ["load", "scene", "scenes_of"]
 def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     """A scene with the defaults of the command line.
 
-    The mesh is scaled by a power of two, and camera and lights with it, so that no product of its coordinates
-    overflows; the picture is the same to the bit. Colours are ``"#rrggbb"``, one number or three; each option
-    takes the text of the command line, too: ``size="640x480"``.
+    The mesh, the camera and the lights are scaled by the same power of two, so that no product of coordinates
+    overflows. The picture is the same to the bit. Colours are ``"#rrggbb"``, one number or three. Each option
+    also takes the text of the command line: ``size="640x480"``.
 
     Parameters
     ----------
     source : str or path or Mesh or trimesh.Trimesh or trimesh.Scene or arrays
-        ``"teapot"``, a mesh file (see `load_mesh`), a scene file (``.toml``), a mesh, also of trimesh, or
-        ``(vertices, faces)`` or ``(vertices, faces, normals)`` (see `given_mesh`).
+        ``"teapot"``, a mesh file (see `load_mesh`), a scene file (``.toml``), a mesh (also of trimesh), or
+        arrays ``(vertices, faces)`` or ``(vertices, faces, normals)`` (see `given_mesh`).
     size : two ints
         Width and height in pixels, 1 to 4095; by default 640 and 480.
     background, ambient_light, back_faces
         See `Scene`; by default ``"#1a1c20"``, 1 and ``"flip"``.
     triangles : int
-        Number of triangles of the teapot, about; by default 10,000.
+        Approximate number of triangles of the teapot; by default 10,000.
     crease : float
-        Angle in degrees over which an edge is sharp, in a mesh file without normals; by default 40.
+        Edges over this angle are sharp in a mesh file without normals; degrees, by default 40.
     materials : {"file", "one"}
-        Whether to use the mesh file's materials, or one for all faces; by default ``"file"``.
+        Use the mesh file's materials, or one material for all faces; by default ``"file"``.
     projection : {"perspective", "orthographic"}
         Projection of the camera; by default perspective.
     view : three floats or str
         Direction from the mesh to the viewer, or ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``,
-        ``"bottom"``; the camera shows all of the mesh. By default (0.4, 0.5, 1) along right, up and front.
-        Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z; right is the cross product of up and front.
+        ``"bottom"``. The camera shows the whole mesh. The default is (0.4, 0.5, 1) along right, up and front.
+        Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z. Right is the cross product of up and front.
     position, target : three floats
-        The camera, in place of ``view``, and the point in the middle of its picture, by default the middle of
-        the mesh; in the mesh's units.
+        Position of the camera, which replaces ``view``, and the point in the middle of its picture. Without
+        ``target`` this is the middle of the mesh. Both are in the mesh's units.
     up : three floats or {"x", "y", "z"}
-        Upright in the picture, by default y for all formats; many STL files have z.
+        Direction that points up in the picture, by default y for all formats. STL files often need z.
     field_of_view : float
         See `Camera`; by default 30.
     viewer : {"distant", "near"}
-        See `Scene`; by default distant; ``"near"`` needs the method ``chord-local``.
+        See `Scene`; by default ``"distant"``. ``"near"`` needs the method ``chord-local``.
     lights : Light or dict or numbers or str, or a sequence of these
-        At most 16; by default one from (-0.5, 0.8, 0.7). A dict has fields of `Light`; numbers are a
-        direction, or direction and colour. Lights with a position need the method
-        ``chord-local``; they may fade by distance or be spots. Lights of colour 0 are off, and left out.
+        At most 16; by default one light from (-0.5, 0.8, 0.7). A dict has fields of `Light`. Numbers are a
+        direction, or direction and colour. Lights with a position need the method ``chord-local``. They may
+        fade by distance or be spots. Lights of colour 0 are off, and left out.
     point_lights, spot_lights
-        Further lights in the same forms, where numbers are those of ``--point-light`` and ``--spot-light``.
+        More lights in the same forms. Their numbers are those of ``--point-light`` and ``--spot-light``.
     ambient, diffuse, specular, exponent, roughness, fresnel
         See `Material`; by default the values of the mesh file's materials, else copper and exponent 50. An
-        exponent given here also replaces a file's roughness.
+        exponent that is given here also replaces the roughness of a file.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     Warns
     -----
     RuntimeWarning
-        If the mesh file has contents that change the picture and are not read; see `LoadedMesh`.
+        If the mesh file has contents that change the picture but are not read; see `LoadedMesh`.
     """
     settings = read_settings(source, options, SCENE)
     with settings.located():
@@ -98,7 +98,7 @@ def load(settings: Settings) -> LoadedMesh:
     Raises
     ------
     InputError
-        As `load_mesh`; if a scene file names the mesh, the error names that file and key.
+        As `load_mesh`. If a scene file names the mesh, the error names this file and its key.
     """
     source = settings.source
     if isinstance(source, Mesh | Scene):
@@ -116,14 +116,14 @@ def load(settings: Settings) -> LoadedMesh:
 
 
 def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:
-    """The scene of a mesh, or the scenes of a turntable, which differ in the camera only.
+    """The scene of a mesh, or the scenes of a turntable, which differ only in the camera.
 
     Parameters
     ----------
     loaded : LoadedMesh
         The mesh.
     settings : Settings
-        All options of `scene`; or with a scene as source, which is then the first.
+        All options of `scene`. If the source is a scene, it is the first.
     count : int
         Number of frames of a turntable.
 
@@ -146,7 +146,7 @@ def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Sc
 
 
 def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, list[Camera]]:
-    """The first scene, and the cameras of all."""
+    """The first scene, and the cameras of all scenes."""
     mesh = loaded.mesh
     # The camera frames the mesh whatever its unit is; products of huge or tiny coordinates would overflow.
     shift = -int(np.frexp(np.abs(mesh.vertices).max())[1])
@@ -166,7 +166,7 @@ def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, li
 
 
 def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
-    """The file's materials, with the coefficients that options give in place of the file's."""
+    """The file's materials. Coefficients from options replace those of the file."""
     default = Material(*(settings[name] for name in COEFFICIENTS))
     return surfaces(loaded.materials, default, settings.given.intersection(COEFFICIENTS))
 
@@ -197,7 +197,7 @@ def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -
 
 
 def _framing(vertices: np.ndarray, settings: Settings, count: int) -> list[Camera]:
-    """Cameras that show all of the mesh."""
+    """Cameras that show the whole mesh."""
     width, height = settings["size"]
     view, up = settings["view"], settings["up"]
     # The first direction is the same to the bit, however many there are.

@@ -35,8 +35,8 @@ class SceneFile:
     path : str
         The file.
     values : dict
-        The values that the file sets, by the names of the options, in their types; and ``mesh``: ``teapot``
-        or a path, where a relative path of the file is joined to the scene file's folder.
+        Values that the file sets, by the names of the options and in their types. ``mesh`` is ``teapot`` or a
+        path; a relative path of the file is joined to the folder of the scene file.
     keys : dict
         The key of each value, for messages: ``material.exponent``.
     """
@@ -50,7 +50,7 @@ Reader = TypeVar("Reader", bound=Callable[..., SceneFile])
 
 
 def _with_rendering(function: Reader) -> Reader:
-    """Put the keys of `RENDERING` with their defaults and helps into a docstring, as comments."""
+    """Put the keys of `RENDERING` into a docstring as comments, with their defaults and helps."""
     if function.__doc__:
         before, _, after = function.__doc__.partition("{rendering}")
         indent, column, lines = before.rpartition("\n")[2], 36, []
@@ -66,7 +66,7 @@ def _with_rendering(function: Reader) -> Reader:
 def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
     """Read a scene file.
 
-    These are the keys; only ``mesh.file`` is required::
+    These are the keys. Only ``mesh.file`` is required::
 
         size = [640, 480]
         background = "#1a1c20"              # or [r, g, b], or one number, each 0 to 1
@@ -76,32 +76,32 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
         [mesh]
         file = "teapot"                     # or a mesh file, from this file's folder
         triangles = 10000                   # of the teapot
-        crease = 40                         # degrees, of a mesh without normals
-        materials = "file"                  # those of the mesh file, or "one"
+        crease = 40                         # degrees; for a mesh without normals
+        materials = "file"                  # the materials of the mesh file, or "one"
 
         [camera]
         projection = "perspective"          # "orthographic"
-        view = [0.4, 0.5, 1]                # from the mesh to the viewer: the camera shows all of the mesh
+        view = [0.4, 0.5, 1]                # from the mesh to the viewer; the camera shows the whole mesh
         # or "front", "back", "left", "right", "top", "bottom"
         up = [0, 1, 0]                      # or "x", "y", "z"
         field_of_view = 30                  # degrees, vertical, 1 to 179
-        # position, target                  # in place of view, in the mesh's own units
-        viewer = "distant"                  # "near": highlights as seen from a perspective camera
+        # position, target                  # replace view; in the mesh's own units
+        viewer = "distant"                  # "near": highlights seen from a perspective camera
 
-        [[lights]]                          # one table a light, none: lights = []
+        [[lights]]                          # a table for each light; without lights: lights = []
         direction = [-0.5, 0.8, 0.7]        # to the light
-        # position                          # of a point light, in place of direction, in the mesh's own units
+        # position                          # of a point light, replaces direction; in the mesh's own units
         color = [1, 1, 1]                   # or "#rrggbb"; may exceed 1
         # attenuation = [1, 0, 0]           # of a point light: 1/(k0 + k1 d + k2 d^2), at most 1; d: distance
         # spot = [0, -1, 0]                 # a point light that shines along this
-        # cone = [20, 30]                   # degrees from there: in full up to, not at all from
+        # cone = [20, 30]                   # degrees: in full up to the first, not at all from the second
 
         [material]
         ambient = [0.08, 0.05, 0.03]        # colours, as background
         diffuse = [0.75, 0.42, 0.2]
         specular = 0.6
         exponent = 50
-        # roughness = 0.2                   # of ggx and beckmann, over 0, up to 1; default: by the exponent
+        # roughness = 0.2                   # of ggx and beckmann, over 0, up to 1; default: from the exponent
         # fresnel                           # F_0 of Schlick's reflection, a colour; by default none
 
         [pipeline]
@@ -109,23 +109,23 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
         model = "blinn"
         style = "throughput"                # "compact"
         gate = false                        # the highlight gate, of other methods
-        # operand = "cosine"                # "one_minus_cosine", of methods that find unit normals
-        # setup_interval = 4                # of methods with that choice
+        # operand = "cosine"                # "one_minus_cosine"; for methods that compute unit normals
+        # setup_interval = 4                # for methods with this choice
         {rendering}
 
-    The values' ranges are those of the command line. Its texts serve, too: ``size = "640x480"``.
-    Neither the mesh file nor conflicts between values are checked.
+    The values have the ranges of the command line, and may be its texts: ``size = "640x480"``.
+    This function checks neither the mesh file nor conflicts between values.
 
     Parameters
     ----------
     path : path
-        The file, in UTF-8, at most 100,000 bytes, and 256 dots in a line.
+        The file, in UTF-8, with at most 100,000 bytes, and at most 256 dots in a line.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is not TOML, has an unknown key, a value of another type or out of range,
-        or names no mesh. The message names the file and the key.
+        If the file cannot be read, is not TOML, or names no mesh; also if a key is unknown, or a value has
+        another type or is out of range. The message names the file and the key.
     """
     values: dict[str, Any] = {}
     keys: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Values of options: a caller's replace a scene file's, which replace the defaults."""
+"""Values of options. Values of the caller override a scene file, which overrides the defaults."""
 
 import os
 from collections.abc import Collection, Iterator, Mapping
@@ -49,19 +49,19 @@ class Settings:
         return self.values[name]
 
     def refuse(self, name: str, reason: str, remedy: str, value: object = None) -> OptionError:
-        """The error of a value; without a ``value``, the option's own is shown."""
+        """The error of a value. Without ``value`` the message shows the option's own."""
         return OptionError(name, self.values[name] if value is None else value, reason, remedy)
 
     @property
     def lights(self) -> tuple[Light, ...]:
-        """Lights of the scene, or those of the options that are on: a light that is off needs no hardware."""
+        """Lights of the scene or of the options, without lights that are off: those need no hardware."""
         if isinstance(self.source, Scene):
             return self.source.lights
         return tuple(light for light in self["lights"] if light.is_on)
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """Within the block, the error of a value that a scene file gives names file and key."""
+        """Within the block, the error of a value from a scene file names file and key."""
         try:
             yield
         except OptionError as error:
@@ -71,7 +71,7 @@ class Settings:
 
     @contextmanager
     def mesh_located(self) -> Iterator[None]:
-        """Within the block, the error of a mesh that a scene file names has that file and key, too."""
+        """Within the block, the error of a mesh from a scene file also names file and key."""
         try:
             yield
         except InputError as error:
@@ -81,7 +81,7 @@ class Settings:
 
 
 def checked(options: Mapping[str, Any], table: Mapping[str, Option]) -> dict[str, Any]:
-    """Values of options, checked and converted by their types; options that are ``None`` are left out.
+    """Values of options, checked and converted by their types. Options that are ``None`` are left out.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def checked(options: Mapping[str, Any], table: Mapping[str, Option]) -> dict[str
 def read_settings(
     source: Source | Scene, options: Mapping[str, Any], table: Mapping[str, Option], **defaults: Any
 ) -> Settings:
-    """Settings of a caller's options; missing ones are those of the scene file, if any, or the defaults.
+    """Settings from a caller's options. Missing values come from the scene file or the defaults.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def check_engine(engine: str) -> None:
 
 
 def check_mesh(settings: Settings) -> None:
-    """Refuse a mesh file that is not there, or of an unknown type; it is not opened.
+    """Refuse a mesh file that does not exist or has an unknown type, without opening it.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def check_mesh(settings: Settings) -> None:
 
 
 def _one_list_of_lights(given: dict[str, Any]) -> dict[str, Any]:
-    """The options with ``lights`` alone, for lights of all kinds."""
+    """The options, with lights of all kinds in ``lights``."""
     kinds = [name for name in LIGHTS if isinstance(given.get(name), tuple)]
     lights = tuple(light for name in kinds for light in given[name])
     if len(lights) > MAX_LIGHTS:
@@ -203,10 +203,10 @@ def _one_list_of_lights(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _turn_view(values: dict[str, Any], given: Collection[str]) -> None:
-    """Replace a word for the view by vectors, and turn the default view with another upright.
+    """Replace a word for the view by vectors, and turn the default view with another ``up``.
 
-    The front of a mesh is along z, or along -y if its upright is z. Right is the cross product of upright and
-    front. Seen from the top, the front is at the bottom of the picture; seen from the bottom, at its top.
+    The front of a mesh is along z, or along -y if ``up`` is z. Right is the cross product of up and front.
+    Seen from the top, the front is at the bottom of the picture; seen from the bottom, at its top.
     """
     view, up = values["view"], np.array(values["up"], dtype=np.float64)
     if not isinstance(view, str) and ("view" in given or "up" not in given):

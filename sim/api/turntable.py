@@ -1,4 +1,4 @@
-"""Turntables: the camera goes once round the mesh, about its upright."""
+"""Turntables: the camera goes once around the mesh, about the axis that points up."""
 
 import os
 import tempfile
@@ -27,14 +27,14 @@ __all__ = ["Turntable", "turntable"]
 
 @dataclass(frozen=True)
 class Turntable(Sequence[RenderedFrame]):
-    """Frames of a turntable, each drawn when it is asked for, and not kept.
+    """Frames of a turntable. Each frame is drawn on request, and not kept.
 
     Parameters
     ----------
     ready : Rendering
         The pipeline and the scenes.
     files : RunFiles
-        The files that were read, which `save` does not replace.
+        Files that were read. `save` does not replace them.
     """
 
     ready: Rendering
@@ -66,21 +66,21 @@ class Turntable(Sequence[RenderedFrame]):
     def save(
         self, path: str | os.PathLike[str], milliseconds: int = 50, progress: Progress | None = None
     ) -> None:
-        """Draw all frames, and write them as an animated GIF that repeats for ever.
+        """Draw all frames, and write them as an animated GIF that repeats forever.
 
         Parameters
         ----------
         path : path
-            The file; its suffix is ``.gif``.
+            The file, with the suffix ``.gif``.
         milliseconds : int
             Time that each frame is shown, in steps of 10.
         progress : callable, optional
-            Called after each frame with the number of frames so far and in all.
+            Called after each frame with the number of frames drawn, and of all frames.
 
         Raises
         ------
         InputError
-            If the name has another suffix, or the file cannot be written, or was read for the frames.
+            If the name has another suffix, or the file cannot be written or was read for the frames.
         """
         if Path(path).suffix.lower() != ".gif":
             raise InputError(os.fspath(path), "the animation is a GIF", "use a name that ends in .gif")
@@ -104,10 +104,10 @@ def turntable(
     engine: Engine = "auto",
     **options: Unpack[RenderOptions],
 ) -> Turntable:
-    """Frames of a camera that goes once round a mesh, in equal steps; the first is that of `render`.
+    """Frames of a camera that goes once around a mesh in equal steps. The first frame is that of `render`.
 
-    The lights do not move. ``blysk render --frames`` draws on several processes or machines; this function
-    draws in the calling process::
+    The lights do not move. This function draws in the calling process. ``blysk render --frames`` draws in
+    several processes or on several machines::
 
         blysk.turntable("teapot", 24, size="320x240").save("teapot.gif")
 
@@ -118,17 +118,17 @@ def turntable(
     frames : int
         Number of frames, 1 to 9999.
     **options
-        Those below, as for `render`.
+        Options below, as for `render`.
 
     Returns
     -------
     Turntable
-        A sequence of `RenderedFrame`, each drawn when it is asked for, with `Turntable.save`.
+        A sequence of `RenderedFrame`, each drawn on request, with `Turntable.save`.
 
     Raises
     ------
     InputError, SimulationError
-        As `render`; if the camera looks along the axis that it would turn about.
+        As `render`; also if the camera looks along its axis of rotation.
     """
     count = checked({"frames": frames}, {"frames": Option(Whole(1, MAX_FRAMES), 36, "")})["frames"]
     files = RunFiles.current()

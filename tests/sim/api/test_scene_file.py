@@ -16,9 +16,7 @@ from blysk.sim.api.options import DESIGN, RENDERING, SCENE
 from blysk.sim.api.scene_file import MAX_BYTES, read_scene_file
 from blysk.sim.errors import InputError
 
-EXAMPLE = textwrap.dedent(
-    read_scene_file.__doc__.partition("::\n\n")[2].partition("    The values' ranges")[0]
-)
+EXAMPLE = textwrap.dedent(read_scene_file.__doc__.partition("::\n\n")[2].partition("    The values have")[0])
 MESH = '[mesh]\nfile = "teapot"\n'
 EXAMPLES = sorted((Path(__file__).parents[3] / "examples").glob("*.toml"))
 
