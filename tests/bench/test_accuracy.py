@@ -33,9 +33,8 @@ def test_measures_every_exponent():
         (0, {}),
         (1, {"model": "phong"}),
         (2, {"method": "renormalise"}),
-        (3, {"method": "renormalise"}),
-        (4, {"method": "quadratic", "operand": "one_minus_cosine"}),
-        (5, {"method": "quadratic", "model": "cosquad"}),
+        (3, {"method": "quadratic", "operand": "one_minus_cosine"}),
+        (4, {"method": "quadratic", "model": "cosquad"}),
     ],
     ids=str,
 )
