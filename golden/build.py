@@ -1,4 +1,4 @@
-"""How a design is built: options that change cost and cycles, and no pixel."""
+"""Build options of a design, which change its cost and its cycles, and no pixel."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -34,9 +34,9 @@ class BuildError(ValueError):
     Parameters
     ----------
     option : str
-        Field of `Build` that does not suit the others.
+        Field of `Build` that contradicts another field.
     reason, remedy : str
-        Why, and an action that mends it.
+        Reason of the conflict, and an action that mends it.
     """
 
     def __init__(self, option: str, reason: str, remedy: str):
@@ -49,7 +49,7 @@ class BuildError(ValueError):
 
 @dataclass(frozen=True)
 class Build:
-    """Build options of a design: they change its cost and its cycles, and no pixel.
+    """Build options of a design.
 
     A gate has a bit-accurate model, and frame constants of its own. So it is a field of `ShadingPipeline`.
 
@@ -66,7 +66,7 @@ class Build:
     pipes : {1, 2, 4, 8}
         Number of pipelines, see `PixelPipelines`.
     merged : bool
-        Whether several pipelines give one stream of pixels in place of one each.
+        Whether several pipelines give one stream of pixels in place of a stream each.
     top : {"shader", "geometry", "render"}
         The core: spans to pixels, triangles to spans, or triangles to pixels.
     setups : {1, 2}
@@ -81,7 +81,7 @@ class Build:
     Raises
     ------
     ValueError
-        If a value is unknown or out of range. Of two options that exclude each other it is a `BuildError`.
+        If a value is unknown or out of range. If two options exclude each other, it is a `BuildError`.
     """
 
     style: Style = "throughput"
@@ -105,7 +105,7 @@ class Build:
         self._check_pairs()
 
     def _check_pairs(self) -> None:
-        """Refuse options that exclude each other: none is ignored."""
+        """Refuse options that exclude each other."""
         if self.takes_triangles and self.pipes > 1:
             raise BuildError("pipes", "triangles go to one pipeline", "leave out pipes, or use spans")
         if self.bus != "native" and self.pipes > 1:
@@ -122,12 +122,12 @@ class Build:
 
     @property
     def shading(self) -> "Build":
-        """The options that one shading pipeline reads; the others at their defaults."""
+        """The options of one shading pipeline, with all others at their defaults."""
         return Build(self.style, self.setup_interval, self.exponent)
 
     @property
     def takes_triangles(self) -> bool:
-        """Whether triangles go into the core; else spans do."""
+        """Whether triangles go into the core, in place of spans."""
         return self.top != "shader"
 
     @property
@@ -149,4 +149,4 @@ _CHOICES = {
     "geometry_style": (None, *STYLES),
     "bus": PORTS,
 }
-"""Values of the fields that have few."""
+"""Values of the fields with few values."""

@@ -242,8 +242,8 @@ class ShadingPipeline:
         Raises
         ------
         ValueError
-            If a code is out of range, the constants are for another number of lights or materials, or spans
-            lack the values that the method takes.
+            If a code is out of range, or spans lack the values that the method takes. If the constants are
+            for another number of lights or materials.
         """
         constants = by_material(constants)
         self._check(spans, constants)

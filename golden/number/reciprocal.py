@@ -66,7 +66,7 @@ def step_words(length: np.ndarray) -> tuple[Fixed, np.ndarray, Fixed, np.ndarray
     """Bit-accurate ``dt = 1/(m - 1) = 2 reciprocal 2^-shift`` and ``dt^2 = 4 square 2^-square_shift``.
 
     The square of the reciprocal is shifted up by one bit where it is under 1/2, and rounded half up. The
-    relative error of dt is at most 2^-17, that of dt^2 at most ``2^-16 + 2^-17 + 2^-34``.
+    relative error of dt is at most 2^-17, and of dt^2 at most ``2^-16 + 2^-17 + 2^-34``.
 
     Parameters
     ----------

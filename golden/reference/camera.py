@@ -33,7 +33,7 @@ class Camera:
     field_of_view : float
         Vertical angle of the picture in degrees, greater than 0 and less than 180, perspective only.
     near : float
-        Depth of the near plane, greater than 0: nothing nearer is drawn, in either projection.
+        Depth of the near plane, greater than 0. In both projections nearer points are not drawn.
 
     Raises
     ------

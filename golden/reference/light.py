@@ -107,7 +107,7 @@ class Light:
         - a number is not finite;
         - a direction is 0;
         - a channel or a coefficient is negative;
-        - both or none of direction and position are given;
+        - direction and position are both given, or both missing;
         - the cone's angles are not ``0 <= inner < outer <= 180``;
         - a directional light has an attenuation or a spot;
         - a cone has no axis.

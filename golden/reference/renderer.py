@@ -107,9 +107,9 @@ class Thresholds:
 def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.ndarray:
     """Triangles that ``adaptive`` shades by Gouraud's method; the mean is their share ([T] appendix В).
 
-    Every two vertices of such a triangle differ by less than the thresholds in N, N·H and N·L. A light with
-    ``L = -V`` has no H and no highlight, and only its N·L counts. A change of N·H by e changes ``(N·H)^n`` by
-    up to ``n e``: with large exponents the default thresholds allow visible errors.
+    Every two vertices of one of these triangles differ by less than the thresholds in N, N·H and N·L. A light
+    with ``L = -V`` has no H and no highlight, and only its N·L counts. A change of N·H by e changes
+    ``(N·H)^n`` by up to ``n e``: with large exponents the default thresholds allow visible errors.
 
     The listing of [T] appendix В returns Phong if the normals are close, as docs/theory/errata.md describes.
     Here the test is corrected.
@@ -119,7 +119,7 @@ def gouraud_triangles(scene: Scene, thresholds: Thresholds | None = None) -> np.
     scene : Scene
         Mesh, lights and viewer.
     thresholds : Thresholds, optional
-        Thresholds; by default those of the document.
+        Thresholds, by default from the document.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def render(
     - ``flat``: the intensity of each triangle's own normal, in its middle;
     - ``gouraud``: the intensity at the three vertices, saturated there, interpolated perspective-correctly;
     - ``quadratic_gouraud``: the second-degree polynomial through the intensities, saturated, at the three
-      vertices and at the middles of the three edges ([T] appendix Д), where the normal is
+      vertices and at the middles of the three edges ([T] appendix Д). The normal of a middle is
       ``(N_a + N_b)/|N_a + N_b|``, as for ``phong``. In the perspective-correct barycentric coordinates l the
       polynomial is ``sum_i l_i (2 l_i - 1) I_i + sum_{i<j} 4 l_i l_j I_ij``. Two triangles that share an edge
       and its normals have equal intensities along it. Between the six points the polynomial may leave their
@@ -170,8 +170,8 @@ def render(
       GPU does: the reference image;
     - ``slerp``: normals on the great circle between the ends of each span, linear in screen space ([T] 2.1).
 
-    With point lights or a near viewer L and V are those of the shaded point. This is a fragment's point of
-    the surface, a vertex, or the middle of an edge.
+    With point lights or a near viewer L and V belong to the shaded point. This is a fragment's point of the
+    surface, a vertex, or the middle of an edge.
 
     Parameters
     ----------
