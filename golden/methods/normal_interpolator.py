@@ -28,7 +28,7 @@ __all__ = ["EndNormalInterpolator", "NormalInterpolator", "difference_rounding"]
 def difference_rounding(pixel: int) -> float:
     """Bound of the rounding error of a normal by forward differences, of the result and of both differences.
 
-    ``sqrt(3) (2^-18 + 2^-42 (k + k^2/2))`` at pixel k, as derived in `DifferenceSetup`.
+    ``sqrt(3) (2^-18 + 2^-42 (k + k^2/2))`` at pixel k, see `DifferenceSetup` and `DifferenceAccumulator`.
 
     Parameters
     ----------
