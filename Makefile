@@ -68,7 +68,6 @@ coverage: $(VENV)/.installed-test
 bench: $(VENV)/.installed-bench
 	$(BIN)/blysk bench report
 	$(BIN)/python -m blysk.bench.speed.engines
-	$(BIN)/python -m blysk.bench.speed.throughput
 	$(BIN)/python -m blysk.bench.speed.renderer
 	$(BIN)/python -m blysk.bench.report.gate
 	$(BIN)/python -m blysk.bench.quality.sweep
