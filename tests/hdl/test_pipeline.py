@@ -19,7 +19,7 @@ from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.unit_vector import quantise
 from blysk.golden.pipeline import Spans
-from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.golden.presets import METHODS, MODELS, PUBLISHED, preset
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -224,10 +224,12 @@ def test_gate_spares_the_compact_style_cycles():
 
 
 def pairs():
-    """Every method with a model of each kind of specular unit, and renormalise with every model."""
+    """Every method with a model of each kind of specular unit; renormalise with every model; as published."""
     for method in FROM_NORMALS:
         for model in MODELS if method == "renormalise" else KINDS:
             yield method, model
+    for method in PUBLISHED:
+        yield method, "cosquad"
 
 
 @pytest.mark.long
