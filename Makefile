@@ -70,7 +70,6 @@ bench: $(VENV)/.installed-bench
 	$(BIN)/python -m blysk.bench.speed.engines
 	$(BIN)/python -m blysk.bench.speed.renderer
 	$(BIN)/python -m blysk.bench.report.gate
-	$(BIN)/python -m blysk.bench.quality.sweep
 
 pages: $(VENV)/.installed
 	mkdir -p build/pages

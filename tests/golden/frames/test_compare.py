@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from blysk.bench.accuracy import scene_for
 from blysk.golden.frames.compare import (
     BORDER,
     border_mask,
@@ -15,7 +16,7 @@ from blysk.golden.frames.compare import (
     target_of,
 )
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.presets import preset
+from blysk.golden.presets import MODELS, preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
@@ -23,6 +24,7 @@ from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX, Tabulate
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import BLINN, COSQUAD, REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
+from blysk.sim.meshes.teapot import teapot
 
 METHODS = ("chord-local", "renormalise")
 GREY = Material((0.05,) * 3, (0.02,) * 3, (0.98,) * 3, 20)
@@ -56,6 +58,20 @@ def test_steady_errors_keep_the_bound(method, model, name):
         assert found.method_error.steady_lsb <= found.bound_lsb
         largest = max(largest, found.method_error.steady_lsb)
     assert largest > 0.45
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("method", ["quotient", "renormalise"])
+def test_every_exponent_and_model_is_within_an_lsb(method):
+    """An exponent in thirteen of the method's first model, and some of the others."""
+    models = ["blinn", "phong"] if method == "quotient" else ["cosquad", *MODELS]
+    exponents = range(1, 1001, 13)
+    for model in dict.fromkeys(models):
+        for exponent in exponents if model == models[0] else (1, 3, 10, 100, 1000):
+            scene = scene_for(teapot(992), exponent, 320, 240)
+            design = made(method, model, scene)
+            found = compare(scene, design, model_frame(scene, design))
+            assert found.method_error.steady_lsb <= 1.0, f"{model}, {exponent}"
 
 
 def test_pixels_at_the_border_are_counted_apart():
