@@ -1,1 +1,1 @@
-"""Speeds, each as a ratio of two runs: engines, pipelines, the golden renderer; cycles of frames by a model."""
+"""Speeds of engines, pipelines and the golden renderer, and cycles of frames by a model."""

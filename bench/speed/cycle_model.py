@@ -1,22 +1,13 @@
-"""Cycles of a frame from the lengths of its spans: for pictures that take long to simulate.
+"""Cycles of a frame from the lengths of its spans: for pictures that take long to simulate."""
 
-``python -m blysk.bench.speed.cycle_model`` prints, for every method, the cycles of simulated frames beside
-those of the model.
-"""
-
-import sys
 import warnings
-from collections.abc import Sequence
 
-import click
 import numpy as np
 from amaranth.hdl import UnusedElaboratable
 
-from blysk.bench.accuracy import model_of, scene_for
-from blysk.bench.command import run
+from blysk.bench.accuracy import scene_for
 from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import ShadingPipeline, Spans
-from blysk.golden.presets import METHODS, preset
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import FrameSimulator
@@ -113,19 +104,3 @@ def compare(design: ShadingPipeline, triangles: int, size: tuple[int, int]) -> t
     frame = FrameSimulator(design).render(scene)
     writes = sum(len(of.writes()["data"]) for of in constants_of(scene, design))
     return frame.cycles, frame_cycles(unit_of(design), prepare(scene, design).spans, writes)
-
-
-@click.command()
-@click.option("--method", "methods", multiple=True, help="Methods; every one, if not given.")
-def command(methods: Sequence[str]) -> int:
-    """Print simulated cycles and the model's."""
-    for method in methods or METHODS:
-        for triangles, size in ((992, (160, 120)), (8000, (160, 120)), (300, (320, 240))):
-            simulated, modelled = compare(preset(method, model_of(method)), triangles, size)
-            share = modelled / simulated - 1
-            click.echo(f"{method:<18}{triangles:>6}{simulated:>9}{modelled:>9}{share:>8.2%}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(run(command, "blysk.bench.speed.cycle_model", None))

@@ -5,6 +5,7 @@ import contextlib
 import io
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,13 +21,17 @@ from PIL import Image
 from blysk.bench.cli.bench import command
 from blysk.bench.report import frames, points
 from blysk.bench.report.section import Drawing, Section, Table
-from blysk.bench.speed.web_speed import OPTIONS, find_chromium
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
 from blysk.sim.cli.main import main
 
 DESIGNS = [*points.DESIGNS[:10], ("renormalise", "exp"), ("renormalise", "blinn_product"), points.DESIGNS[-1]]
 EXPONENTS = [10, 100]
+BROWSER = (
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+)
+"""Options of the browser."""
 
 
 @pytest.fixture
@@ -49,11 +54,12 @@ def refused(capsys, tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def browser():
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = find_chromium()
+    names = "chromium", "chromium-browser", "google-chrome"
+    chromium = next(filter(None, map(shutil.which, names)), None)
     if chromium is None:
         pytest.skip("no Chromium on this machine")
     with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=chromium, args=list(OPTIONS))
+        browser = tools.chromium.launch(executable_path=chromium, args=list(BROWSER))
         yield browser
         browser.close()
 
