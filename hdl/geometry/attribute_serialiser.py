@@ -12,7 +12,7 @@ from blysk.hdl.core.stream import skid_buffer
 __all__ = ["AttributeSerialiserUnit", "corner_attributes_shape", "serial_attribute_shape"]
 
 _GIVES = 8
-"""Step at which the first attribute goes to the output: from then on the bound is known."""
+"""Step at which the first attribute goes to the output. From this step on the bound is known."""
 
 
 def corner_attributes_shape() -> data.StructLayout:
@@ -33,17 +33,17 @@ def serial_attribute_shape() -> data.StructLayout:
 
 
 class AttributeSerialiserUnit(wiring.Component):
-    """The four attributes of each triangle, one after the other: `AttributeSerialiser` is the model.
+    """The four attributes of each triangle, one after the other. `AttributeSerialiser` is the model.
 
     The first attribute is offered 9 cycles after the triangle is taken in, the others on the next three
-    cycles, unless the output waits. The next triangle is taken in on the cycle of the last attribute: the
+    cycles, unless the output waits. The next triangle is taken in on the cycle of the last attribute. So the
     initiation interval is 12 cycles. Without a skid buffer attributes come every second cycle, and the
-    interval is 15. No multipliers.
+    interval is 15. The unit has no multipliers.
 
     Parameters
     ----------
     skid : bool
-        Whether the output has a skid buffer; else a register that stands until it is taken.
+        Whether the output has a skid buffer. Else it has a register that stands until its payload is taken.
 
     Members
     -------

@@ -1,4 +1,4 @@
-"""Coarse depth test: spans that are hidden for their whole length, by a bound of the depths of each block."""
+"""Coarse depth test, which finds hidden spans by a bound of the depths of each block."""
 
 from operator import and_
 
@@ -28,17 +28,17 @@ def deep_span_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 
 
 class CoarseDepthUnit(wiring.Component):
-    """Tells which spans are hidden for their whole length: `CoarseDepth` is the bit-accurate model.
+    """Tells spans that are hidden for their whole length. `CoarseDepth` is the bit-accurate model.
 
-    A span takes as many cycles as it has blocks: one block a cycle. The answer for a span of one block is on
-    the output 8 cycles after the span was taken in. The word of a block is read, compared and written; words
-    of the last three blocks, which the memory does not have yet, are forwarded. No multipliers: products with
-    a number of pixels are sums of shifts.
+    A span takes a cycle for each of its blocks. The answer for a span of one block is on the output 8 cycles
+    after the span was taken in. The word of a block is read, compared and written. Words of the last three
+    blocks, which the memory does not have yet, are forwarded. Products with a number of pixels are sums of
+    shifts, without multipliers.
 
-    A span whose ``picture`` differs from that of the span before begins the next picture: it waits until all
-    words of the spans before it are written, and `CoarseDepth.swept` words are cleared, one a cycle. After a
-    reset ``picture`` counts as 0 and all words are cleared, unless no span came in since power-up, when the
-    memory is clear.
+    A span with another ``picture`` than the span before begins the next picture. It waits until all words of
+    the spans before it are written, and `CoarseDepth.swept` words are cleared, one a cycle. After a reset
+    ``picture`` counts as 0 and all words are cleared. At power-up the memory is clear. If no span came in
+    since then, no word is cleared.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class CoarseDepthUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(deep_span_shape(x_bits, y_bits)))`
-        Spans of one pixel or more. One that goes out of the largest picture is kept, and bounds nothing.
+        Spans of one pixel or more. A span that goes out of the largest picture is kept, and bounds nothing.
     o : :py:`Out(stream.Signature(1))`
         For each span, in order, 1 if it is hidden.
 

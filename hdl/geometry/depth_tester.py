@@ -1,4 +1,4 @@
-"""Depth test: the depth of every pixel of spans, and which of them are in front of what came before."""
+"""Depth test: the depth of every pixel of spans, and whether it is in front of the pixels before it."""
 
 from itertools import pairwise
 
@@ -32,14 +32,14 @@ def deep_pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 
 
 def drawn_pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
-    """Shape of a pixel that is to be written: place, colour and depth."""
+    """Shape of a pixel to write: place, colour and depth."""
     members = dict(pixel_shape(x_bits, y_bits).members)
     del members["last"]
     return data.StructLayout(members | {"depth": unsigned(DEPTH.width)})
 
 
 def picture_shape(x_bits: int, y_bits: int) -> data.StructLayout:
-    """Shape of what is told of a picture: its size, and a number that changes from one to the next."""
+    """Shape of a picture's words: its size, and a number that changes from one picture to the next."""
     return data.StructLayout({"number": 1, "width": x_bits + 1, "height": y_bits + 1})
 
 
@@ -52,11 +52,11 @@ def is_inside(place: data.View, size: tuple[int, int]) -> Value:
 
 
 class DepthMemory(wiring.Signature):
-    """Port to a memory of depths, one word a pixel; a word that is read is there on the next cycle.
+    """Port to a memory of depths, one word a pixel. The word of a read comes on the next cycle.
 
-    A read and a write of the same place on the same cycle give the read the old word. ``read_data`` keeps its
-    value while ``read_enable`` is low. Before each picture every word is `DepthTester.CLEARED`:
-    `DepthTesterUnit` writes that where it clears, and else the owner of the memory.
+    If the same place is read and written on the same cycle, the read gets the old word. ``read_data`` keeps
+    its value while ``read_enable`` is low. Before each picture every word is `DepthTester.CLEARED`. A
+    `DepthTesterUnit` that clears writes these words, else the owner of the memory.
 
     Parameters
     ----------
@@ -79,15 +79,15 @@ class DepthMemory(wiring.Signature):
 
 
 class DepthTesterUnit(wiring.Component):
-    """Drops pixels behind what was drawn before: `DepthTester` is the bit-accurate model.
+    """Drops pixels behind the pixels drawn before. `DepthTester` is the bit-accurate model.
 
-    The initiation interval is 1, the latency, `latency`, of a pixel that is drawn 3 cycles, or 4 with a
-    memory outside, whose words go through a register first. A pixel is also compared with those of the last
-    two or three cycles at the same place, which the memory does not have yet. No multipliers.
+    The initiation interval is 1. The latency of a drawn pixel, `latency`, is 3 cycles. A memory outside gives
+    its words through a register, and the latency is 4. A pixel is also compared with the pixels of the last
+    two or three cycles at the same place, which the memory does not have yet. The unit has no multipliers.
 
     A unit that clears writes `DepthTester.CLEARED` to each place of the picture, one a cycle, when the first
-    pixel comes after a reset, and after each change of ``picture.number``; pixels wait. A unit that does not
-    is right for one picture: clear the memory outside between pictures.
+    pixel comes after a reset, and after each change of ``picture.number``. Pixels wait meanwhile. A unit
+    without ``clears`` is right for one picture. Clear its memory outside between pictures.
 
     Parameters
     ----------
@@ -95,8 +95,8 @@ class DepthTesterUnit(wiring.Component):
         Bits of a column and of a scanline.
     size : (int, int) or None
         Width and height of a memory inside the unit, at most 2^x_bits and 2^y_bits, which is clear at
-        power-up; ``None``: the memory is outside, at the port ``memory``. A pixel outside a memory inside the
-        unit changes no depth; it is compared with the last ones at its place alone.
+        power-up. A pixel outside this memory changes no depth, and is compared only with the last pixels at
+        its place. ``None``: the memory is outside, at the port ``memory``.
     clears : bool
         Whether the unit clears the memory.
 
@@ -105,14 +105,14 @@ class DepthTesterUnit(wiring.Component):
     i : :py:`In(stream.Signature(deep_pixel_shape(x_bits, y_bits)))`
         Pixels.
     o : :py:`Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits)))`
-        Pixels that are drawn.
+        Drawn pixels.
     status : :py:`Out(counters_shape("pixels", "hidden"))`
-        Number of pixels, and number of those that were dropped, since the reset.
+        Number of pixels, and number of dropped pixels among them, since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
-        Depths so far; only if ``size`` is ``None``.
+        Depths so far. Only if ``size`` is ``None``.
     picture : :py:`In(picture_shape(x_bits, y_bits))`
         Size of the picture, constant while pixels come, and a number that changes before the first pixel of
-        each next picture; only if the unit clears.
+        each next picture. Only if the unit clears.
 
     Attributes
     ----------

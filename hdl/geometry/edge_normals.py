@@ -24,14 +24,15 @@ def true_spans_shape() -> data.StructLayout:
 
 
 class EdgeNormalsUnit(wiring.Component):
-    """Normalises the ends of a piece one after the other: `EdgeNormals` is the model.
+    """Normalises the ends of a piece one after the other. `EdgeNormals` is the model.
 
-    A piece of one pixel takes one cycle, of more two: one for each normal. The span of one pixel is offered
-    `latency` cycles, 20, after its piece is taken in, and others one cycle later. Six multipliers, those of
-    `VectorNormaliserUnit`.
+    A piece of one pixel takes one cycle, a longer piece two, one for each normal. The span of one pixel is
+    offered `latency` cycles, 20, after its piece is taken in, a longer span one cycle later. The six
+    multipliers are those of `VectorNormaliserUnit`.
 
-    In the *compact* style a normal takes `COMPACT_INTERVAL` cycles and the latency is 32; three multipliers,
-    those of `SharedVectorNormaliserUnit`. The other words of a span stay in a FIFO until the span is taken.
+    In the *compact* style a normal takes `COMPACT_INTERVAL` cycles and the latency is 32. The three
+    multipliers are those of `SharedVectorNormaliserUnit`. The other words of a span stay in a FIFO until the
+    span is taken.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ class EdgeNormalsUnit(wiring.Component):
     o : :py:`Out(stream.Signature(true_spans_shape()))`
         The same with unit normals.
     status : :py:`Out(counters_shape("repaired"))`
-        Normals that took the place of lost ones, since the reset; each is counted on the cycle after it.
+        Normals that took the place of lost normals, since the reset. Each is counted one cycle later.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """

@@ -18,7 +18,7 @@ _DIVISORS = (0, "divisor"), (1, "triple")
 """For k in 0 and 1 the name of a register: a divisor, and three times it with 2 k bits more."""
 
 ALONG_BITS = 9
-"""Bits of `Edges.along`, 0 to 511: in `EdgeSetup` n is 2 only where b is over 0."""
+"""Bits of `Edges.along`, 0 to 511, as in `EdgeSetup` n is 2 only where b is over 0."""
 
 
 def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
@@ -56,13 +56,13 @@ class _Ages:
 
 
 class EdgeSetupUnit(PipelinedUnit):
-    """Quotients, remainders and starts of three edges: `EdgeSetup` is the bit-accurate model.
+    """Quotients, remainders and starts of three edges. `EdgeSetup` is the bit-accurate model.
 
-    For each edge a non-restoring division of the difference in x by the height gives quotient and remainder;
-    then the start is summed up from them, bit by bit. The division of the long edge goes on for the 32 bits
-    of the fraction. Three dividers work on the edges of a triangle side by side; with one divider the edges
+    For each edge a non-restoring division of the difference in x by the height gives quotient and remainder.
+    Then the start is summed up from them, bit by bit. The division of the long edge goes on for the 32 bits
+    of the fraction. Three dividers work on the edges of a triangle side by side. With one divider the edges
     take turns. The latency, `latency`, is 32 cycles with three dividers of two bits, 50 with one of two bits
-    and 80 with one of one bit (1/256 pixel). No multipliers.
+    and 80 with one of one bit (1/256 pixel). The unit has no multipliers.
 
     Parameters
     ----------
@@ -73,8 +73,9 @@ class EdgeSetupUnit(PipelinedUnit):
     bits_per_cycle : int
         Quotient bits that a divider finds in a cycle: 1 or 2.
     initiation_interval : int or None
-        Least number of cycles from a triangle to the next. ``None``: the least possible, `least_interval`,
-        16 with three dividers of two bits, 37 with one of two bits, 67 with one of one bit (1/256 pixel).
+        Least number of cycles from a triangle to the next. ``None``: the least possible, `least_interval`.
+        This is 16 with three dividers of two bits, 37 with one of two bits, 67 with one of one bit (1/256
+        pixel).
     skid : bool
         As in `PipelinedUnit`.
 

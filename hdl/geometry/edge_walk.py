@@ -13,7 +13,7 @@ __all__ = ["EdgeWalkUnit", "rows_shape", "walk_shape"]
 
 
 def walk_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of what is walked: three edges, scanlines, and the tag."""
+    """Shape of the input of the walk: three edges, scanlines, and the tag."""
 
     def three(shape):
         return data.ArrayLayout(shape, 3)
@@ -49,19 +49,19 @@ def rows_shape() -> data.StructLayout:
 
 
 class EdgeWalkUnit(wiring.Component):
-    """Two edges walked side by side, a scanline a cycle: those of `EdgeWalk`, the bit-accurate model.
+    """Walks two edges side by side, a scanline a cycle. `EdgeWalk` is the bit-accurate model.
 
-    The first scanline of a triangle is offered `latency` cycles, 2, after the triangle is taken in, the
-    others on the cycles that follow, unless the output waits. Triangles follow each other without a gap: one
-    of n scanlines takes n cycles. Scanlines above the picture are walked, those below are not. No
-    multipliers.
+    The first scanline of a triangle is offered `latency` cycles, 2, after the triangle is taken in. The
+    others follow on the next cycles, unless the output waits. Triangles follow each other without a gap: a
+    triangle of n scanlines takes n cycles. Scanlines above the picture are walked, scanlines below it are
+    left out. The unit has no multipliers.
 
     Parameters
     ----------
     grid : Grid
         Fraction bits of the coordinates.
     skid : bool
-        Whether the output has a skid buffer; else a scanline takes two cycles.
+        Whether the output has a skid buffer. Else a scanline takes two cycles.
 
     Members
     -------
@@ -70,7 +70,7 @@ class EdgeWalkUnit(wiring.Component):
     o : :py:`Out(stream.Signature(rows_shape()))`
         Scanlines.
     constants : :py:`In(frame_shape())`
-        The frame, of which ``bottom`` is read; stays while triangles are inside.
+        The frame, of which the unit reads ``bottom``. Constant while triangles are inside.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """

@@ -9,19 +9,19 @@ __all__ = ["DiffuseUnit"]
 
 
 class DiffuseUnit(PipelinedUnit):
-    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated; bit-accurate model `Diffuse`.
+    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated. `Diffuse` is the bit-accurate model.
 
     The latency is ``latency`` cycles: one for rounding, one for saturation, one more to take the operand in
-    where the initiation interval is over 1, and a delay for the rest, so that the term leaves together with
-    that of a longer unit beside it. The delay is a memory of look-up tables where the interval is 1, and
-    else a register for each interval. No multipliers.
+    if the initiation interval is over 1, and a delay for the rest. So the term leaves together with the term
+    of a longer unit beside it. If the interval is 1, the delay is a memory of look-up tables. Else it is a
+    register for each interval. The unit has no multipliers.
 
     Parameters
     ----------
     model : Diffuse
         Bit-accurate model: format of the operand.
     latency : int or None
-        At least 2, or 3 where the initiation interval is over 1; ``None``: the least.
+        At least 2, or 3 if the initiation interval is over 1. ``None``: the least.
     initiation_interval : int
         Cycles from an input to the next, at least 1.
 

@@ -1,4 +1,4 @@
-"""Highlight gate: which spans can hold a visible highlight; [T] figure 4.10."""
+"""Highlight gate, which stops spans without a visible highlight ([T] figure 4.10)."""
 
 from amaranth.hdl import Cat, Const, Mux, Value, unsigned
 from amaranth.lib import data
@@ -16,14 +16,14 @@ __all__ = ["HighlightGateUnit"]
 
 
 class HighlightGateUnit(PipelinedUnit):
-    """Whether a span may be lit; 0 only where every pixel of it has a specular term of 0.
+    """Whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
 
     Comparisons, formats and proof are those of the bit-accurate model `HighlightGate`.
 
     There are fifteen multiplications: three for each of ``N_l . N_r``, ``N_l . H`` and ``N_r . H``, and six
     products for the comparisons: ``T u``, ``a b``, ``u w``, ``max(a, b)^2``, ``max(a, b) u`` and ``d^2``.
-    With an initiation interval I they share ``ceil(15/I)`` multipliers (`dataflow`); the decisions are the
-    same. Every further light has twelve multiplications more.
+    With an initiation interval I they share ``ceil(15/I)`` multipliers (`dataflow`). The decisions are the
+    same for every I. Every further light has twelve multiplications more.
 
     =================== == == == == == == == == == == == == == == ==
     initiation interval 1  2  3  4  5  6  7  8  9  10 11 12 13 14 15
@@ -43,9 +43,9 @@ class HighlightGateUnit(PipelinedUnit):
     initiation_interval : int or None
         Cycles from an input to the next, 1 to the number of multiplications. ``None``: 6.
     exponent : int or None
-        Exponent that is fixed at build time, 1 to 1000: no PROM. ``None``: the exponent is a port.
+        Exponent, 1 to 1000, fixed at build time, without a PROM. ``None``: the exponent is a port.
     takes_threshold : bool
-        Whether T is a port in place of the exponent: no PROM, as for the tables of a `Lobe`.
+        Whether T is a port in place of the exponent, without a PROM, as for the tables of a `Lobe`.
 
     Raises
     ------
@@ -59,8 +59,8 @@ class HighlightGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light, the first lowest.
     constants : :py:`In(StructLayout({"halfway": ArrayLayout(..., lights), "exponent": 10}))`
-        Unit vectors H, and the exponent, 1 to 1000, where it is a port, or ``threshold``, T of F bits;
-        constant while beats are inside.
+        Unit vectors H, and as a port the exponent, 1 to 1000, or ``threshold``, T of F bits. All are constant
+        while beats are inside.
 
     Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.
     """

@@ -49,28 +49,28 @@ def _constants_shape(model: Intensity) -> data.StructLayout:
 class IntensityUnit(PipelinedUnit):
     """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, saturated to 255, rounded half up.
 
-    Formats and error are those of the bit-accurate model `Intensity`. Nothing wraps: the sum grows by a bit
-    at each level of the adder tree.
+    Formats and error are those of the bit-accurate model `Intensity`. The sum grows by a bit at each level of
+    the adder tree, so nothing wraps.
 
     The latency is ``5 + ceil(log2(2 lights + 1))`` cycles (terms, factors, products, adder tree, rounding,
-    saturation); the initiation interval is 1. Each multiplier has registers of its own for its operands and
+    saturation). The initiation interval is 1. Each multiplier has registers of its own for its operands and
     its product, as in `registered_product`. There are six multipliers of 17 by 17 bits for each light.
     Without specular terms there are three for each light, and ``lights`` stands for ``2 lights`` in the
-    latency; with one channel there is a third of the multipliers.
+    latency. With one channel there is a third of the multipliers.
 
     Parameters
     ----------
     model : Intensity
-        Bit-accurate model: number of lights, at least 1; whether there are specular terms; channels.
+        Bit-accurate model: number of lights, at least 1; specular terms or not; channels.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse": ..., "specular": ...})))`
-        A term of each kind for each light, ``UQ(0, 17)``; ``specular`` only if there are specular terms.
+        A term of each kind for each light, ``UQ(0, 17)``. ``specular`` only if there are specular terms.
     o : :py:`Out(stream.Signature(pixel_color_shape()))`
         Channels.
     constants : :py:`In(StructLayout({"ambient", "diffuse", "specular"}))`
-        Colour operands: one ``ambient``, and the other two for each light; constant while beats are inside.
+        Colour operands, constant while beats are inside: one ``ambient``, and the other two for each light.
 
     Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
     """
@@ -132,13 +132,13 @@ class IntensityUnit(PipelinedUnit):
 
 
 class CompactIntensityUnit(wiring.Component):
-    """The sum of an `IntensityUnit` on one multiplier of 17 by 17 bits, which skips the terms that are 0.
+    """The sum of an `IntensityUnit` on one multiplier of 17 by 17 bits, without the terms that are 0.
 
     The results are those of `IntensityUnit`. A pixel takes ``c = 3 max(1, T)`` cycles, T the number of its
-    diffuse and specular terms that are not 0 (`Intensity.cycles`): with one light 3 cycles without and 6 with
-    a highlight, 3 in the dark. The next pixel is taken c cycles after it, and the pixel leaves after
-    ``c + 5`` (input, operands, product, sum, rounding, saturation), cycles of stall not counted. With one
-    light the unit has 233 register bits, against 652 of `IntensityUnit`; with 16 lights 811, against 9008.
+    diffuse and specular terms that are not 0 (`Intensity.cycles`). With one light these are 3 cycles without
+    and 6 with a highlight, 3 in the dark. The next pixel is taken c cycles later. The pixel leaves after
+    ``c + 5`` cycles (input, operands, product, sum, rounding, saturation), without cycles of stall. With one
+    light the unit has 233 register bits, and `IntensityUnit` 652. With 16 lights these are 811 and 9008.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ class CompactIntensityUnit(wiring.Component):
         return m
 
     def _issue(self, m: Module, advance: Value) -> tuple[Signal, Signal, Sequence[Value], Signal, Signal]:
-        """Take pixels in, and give one product after the other to the multiplier.
+        """Take pixels in, and give their products one by one to the multiplier.
 
         Returns
         -------

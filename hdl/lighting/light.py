@@ -32,15 +32,15 @@ class SpecularKind(NamedTuple):
     Parameters
     ----------
     unit : callable
-        Makes the unit, of latency ``latency``, from its bit-accurate model and the options
-        ``initiation_interval``, ``exponent`` (fixed at build time, or ``None``) and ``shares_slope``
-        (or, of a lobe, its memory).
+        Makes the unit from its bit-accurate model and the options ``initiation_interval``, ``exponent``
+        (fixed at build time, or ``None``) and ``shares_slope`` (for a lobe, its memory). The unit has an
+        attribute ``latency``.
     compact_interval : callable
         Gives the initiation interval at which one multiplier is enough, from the model and the fixed exponent
         or ``None``.
     slope_unit : callable or None
-        Makes, from the model, the unit of the words that depend on the exponent alone; it serves all lights.
-        ``None``: there is no such unit.
+        Makes, from the model, the unit of the words that depend on the exponent alone. This unit serves all
+        lights. ``None``: no words depend on the exponent alone.
     """
 
     unit: Callable[..., PipelinedUnit]
@@ -89,22 +89,22 @@ def kind_of(model: HighlightOperand) -> SpecularKind:
 class LightUnit(wiring.Component):
     """``max(N . L, 0)`` and the reflection model of ``N . H``, for one light.
 
-    A beat is dark where the light is behind the surface, or a highlight gate tells that the span has no
+    A beat is dark if the light is behind the surface, or if a highlight gate tells that the span has no
     highlight.
 
-    With an initiation interval of 1 the diffuse and the specular unit run in lockstep: their latencies are
-    equal, and they accept and give the same beats on the same cycles, so that one handshake serves both. With
-    a longer one, dark beats bypass the specular unit: they wait beside it in order, and take two
-    cycles each.
+    With an initiation interval of 1 the diffuse and the specular unit run in lockstep. Their latencies are
+    equal, and they accept and give the same beats on the same cycles. So one handshake serves both. With a
+    longer interval dark beats bypass the specular unit. They wait beside it in order, and take two cycles
+    each.
 
-    The latency, the initiation interval and the multipliers are those of the specular unit, for beats that
-    are not dark; with a longer interval the latency is a cycle longer. For a light that fades a
-    `FactorUnit` follows, with two cycles and a multiplier more; the factor passes beside the units before it.
+    For beats that are not dark, the latency, the initiation interval and the multipliers are those of the
+    specular unit. With a longer interval the latency is a cycle longer. For a light that fades a `FactorUnit`
+    follows, with two cycles and a multiplier more. The factor passes beside the units before it.
 
     Parameters
     ----------
     model : Specular or Power or Lobe
-        Reflection model, and whether ``highlight`` is ``N . H`` or one minus it.
+        Reflection model, and kind of ``highlight``: ``N . H`` or ``1 - N . H``.
     diffuse : Diffuse
         Format of ``N . L``.
     initiation_interval : int
@@ -113,7 +113,7 @@ class LightUnit(wiring.Component):
         Exponent that is fixed at build time; see `SpecularUnit`.
     shares_slope : bool
         Whether slope and boundary come from a `SlopeUnit` outside, or tables from a `LobeMemory` outside.
-        `Power` needs none.
+        `Power` needs neither.
     gated : bool
         Whether there is a highlight gate.
     fades : bool or None

@@ -24,12 +24,12 @@ _FINE = 2
 
 
 def lobe_write_shape() -> data.StructLayout:
-    """Shape of a write, 18 bits: a value, or the bank whose values come next. See `LobeTable.writes`."""
+    """Shape of a write, 18 bits: a value, or the bank of the next values. See `LobeTable.writes`."""
     return data.StructLayout({"value": Lobe.VALUE_FORMAT.width, "begins": 1})
 
 
 def lobe_read_signature(model: Lobe) -> wiring.Signature:
-    """Read port: the word of an ``address`` is there two cycles with ``enable`` later.
+    """Read port, which gives the word of an ``address`` two cycles with ``enable`` later.
 
     Without ``enable`` the word stays; it may also stay on a cycle that writes to the address.
     """
@@ -43,38 +43,38 @@ def lobe_read_signature(model: Lobe) -> wiring.Signature:
 
 
 class LobeMemory(wiring.Component):
-    """Tables of `Lobe` in one memory, with a read port for each unit that it serves.
+    """Tables of `Lobe` in one memory, with a read port for each served unit.
 
-    ``banks (E + 1) M`` words of 35 bits: up to 512 in a block RAM of 512 by 36. Where two units, of two
-    lights, read the same tables, Yosys makes a copy for each port if the tables are written. Tables that are
-    fixed at build time need no copy: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
+    There are ``banks (E + 1) M`` words of 35 bits, up to 512 in a block RAM of 512 by 36. If two units, of
+    two lights, read the same written tables, Yosys makes a copy for each port. Tables that are fixed at build
+    time need no copy: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
 
     A write is taken on every cycle. The first write of a table, with ``begins``, tells its bank. The values
-    follow in order: each but the first makes the word of the value before it, which is in the memory two
-    cycles after the write was taken. Values beyond the end of a table are lost, and so are all those of a
-    bank that does not exist. A table that is not completed keeps the other words of the one before. Reset
-    ends a table, and clears no word. A bank must not be written while a unit reads it.
+    follow in order. Each value but the first makes the word of the value before it. This word is in the
+    memory two cycles after the write was taken. Values beyond the end of a table are lost, and all values of
+    a missing bank. An incomplete table keeps the other words of the table before. Reset ends a table, and
+    clears no word. Write a bank only while no unit reads it.
 
     Parameters
     ----------
     model : Lobe
         Size of the tables, and their number.
     tables : sequence of LobeTable or None
-        Tables fixed at build time, one for each bank. ``None``: they are written.
+        Tables fixed at build time, one for each bank. ``None``: the tables are written.
     ports : int
         Read ports, at least 1.
 
     Members
     -------
     write : :py:`In(stream.Signature(lobe_write_shape()))`
-        Writes, unless the tables are fixed; always ready.
+        Writes, unless the tables are fixed. Always ready.
     reads : :py:`In(lobe_read_signature(model)).array(ports)`
         Read ports.
 
     Raises
     ------
     ValueError
-        If there are not as many tables as banks, or one has another size.
+        If there are not as many tables as banks, or a table has another size.
 
     Source: docs/theory/units.md#lobe.
     """
@@ -135,16 +135,16 @@ class LobeMemory(wiring.Component):
 
 
 class LobeUnit(PipelinedUnit):
-    """A lobe of 1 - N·H by its table, 0 for a dark beat and where N·H is not positive.
+    """A lobe of 1 - N·H by its table. 0 for a dark beat and where N·H is not positive.
 
     Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
 
     With an initiation interval of 1 the latency is 10 cycles: one minus, saturation, leading one, two for the
     shift, two for the word, operands, product, sum. With the operand ``place`` it is 8: choice, three for the
-    word, and the same from there on. A longer interval takes 2 more: the input has a register,
-    and so have the multiplexers before the multiplier. At every interval there is one multiplier of 18 by 18
-    bits. A beat that is dark, or whose N·H is not positive, works as if its argument
-    were 0: from one to the next nothing toggles but the input and the first registers.
+    word, operands, and so on. A longer interval takes 2 cycles more, for a register at the input and for the
+    multiplexers before the multiplier. At every interval there is one multiplier of 18 by 18 bits. A beat
+    that is dark, or whose N·H is not positive, works as if its argument were 0. From one of these beats to
+    the next only the input and the first registers toggle.
 
     Parameters
     ----------
@@ -153,29 +153,29 @@ class LobeUnit(PipelinedUnit):
     initiation_interval : int
         Cycles from an input to the next, at least 1.
     tables : sequence of LobeTable or None
-        Tables fixed at build time, one for each bank. ``None``: they are written.
+        Tables fixed at build time, one for each bank. ``None``: the tables are written.
     shares_memory : bool
-        Whether a `LobeMemory` outside has the tables. Else the unit has its own.
+        Whether a `LobeMemory` outside has the tables, in place of a memory in the unit.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
-        ``N·H`` in ``SQ(4, 34)``, ``1 - N·H`` in ``UQ(1, B)`` or a place in `quotient.place_format`; whether
+        ``N·H`` in ``SQ(4, 34)``, ``1 - N·H`` in ``UQ(1, B)`` or a place in `quotient.place_format`. ``dark``:
         the beat is dark.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"bank": ...}))`
-        Only with several banks: the number of the bank, constant while beats are inside.
+        Number of the bank, constant while beats are inside. Only with several banks.
     write : :py:`In(stream.Signature(lobe_write_shape()))`
-        Only if the unit has a memory of its own that is not fixed; see `LobeMemory`.
+        Only if the unit has a memory of its own that is written; see `LobeMemory`.
     table : :py:`Out(lobe_read_signature(model))`
         Only if the memory is outside.
 
     Raises
     ------
     ValueError
-        If the interval is out of range, tables are given for a memory outside, there are not as many as
-        banks, or one has another size.
+        If the interval is out of range, or tables are given for a memory outside. If there are not as many
+        tables as banks, or a table has another size.
 
     Source: docs/theory/units.md#lobe.
     """
@@ -211,7 +211,7 @@ class LobeUnit(PipelinedUnit):
         )
 
     def elaborate(self, platform):
-        """The pipeline, and the memory beside it, which is written whether the pipeline moves or not."""
+        """The pipeline, and the memory beside it, which is written while the pipeline stands, too."""
         m = super().elaborate(platform)
         m.d.comb += self._read.enable.eq(self.advance)
         if self.shares_memory:

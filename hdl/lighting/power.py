@@ -17,13 +17,14 @@ __all__ = ["PowerUnit"]
 
 
 class PowerUnit(PipelinedUnit):
-    """``max(cos gamma, 0)^n``, 0 for a dark beat; ports as those of `SpecularUnit`.
+    """``max(cos gamma, 0)^n``, 0 for a dark beat, with the ports of `SpecularUnit`.
 
     Method, formats and error bound are those of the bit-accurate model `Power`.
 
     The pipelined form has a latency of 32 cycles (difference from 1, saturation, three for each bit of the
     exponent), an initiation interval of 1 and 18 multipliers. The sequential form has one multiplier for nine
-    squares and ten products: latency 44 cycles, initiation interval 42. All are 17 by 17 bits.
+    squares and ten products. Its latency is 44 cycles, its initiation interval 42. All multipliers have 17 by
+    17 bits.
 
     Parameters
     ----------
@@ -35,11 +36,11 @@ class PowerUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
-        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``; whether the beat is dark.
+        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``. ``dark``: the beat is dark.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))`
-        Exponent, 1 to 1000; constant while beats are inside.
+        Exponent, 1 to 1000, constant while beats are inside.
 
     Raises
     ------

@@ -23,7 +23,7 @@ _SHIFT_BITS = 4
 
 
 def highlight_shape(model: HighlightOperand) -> data.StructLayout:
-    """Shape of a unit's input: the operand, and whether the beat is dark, so that its term is 0."""
+    """Shape of a unit's input: the operand, and a flag of a dark beat, whose term is 0."""
     return data.StructLayout({"operand": FixedShape(model.operand_format), "dark": unsigned(1)})
 
 
@@ -46,14 +46,14 @@ def one_minus(model: HighlightOperand, operand: FixedValue) -> FixedValue:
 
 
 class SlopeUnit(wiring.Component):
-    """Slope ``k = K 2^s`` and boundary of the cutoff: words of a `SpecularUnit` that the exponent determines.
+    """Slope ``k = K 2^s`` and boundary of the cutoff, words of a `SpecularUnit` that the exponent determines.
 
     The bit-accurate models are `Specular.scale` and `Specular.boundaries`. ``slope`` follows the exponent
     after two cycles, the boundary after three.
 
-    One unit serves all lights. The slope costs a multiplier by a constant, no multiplier for
-    ``k = n / 2^j``, and a table of 1024 words of 27 bits for ``cosquad_q`` and the models by equal integrals.
-    The PROM has 1024 words of 17 bits; as published there is none.
+    One unit serves all lights. The slope costs a multiplier by a constant, no multiplier for ``k = n / 2^j``,
+    and a table of 1024 words of 27 bits for ``cosquad_q`` and the models by equal integrals. The PROM has
+    1024 words of 17 bits. The unit as published has no PROM.
 
     Parameters
     ----------
@@ -116,15 +116,16 @@ class SlopeUnit(wiring.Component):
 class SpecularUnit(PipelinedUnit):
     """``max(1 - k (1 - cos gamma), 0)^2`` or a higher power, 0 for a dark beat.
 
-    Models, formats, PROM and error bound are those of the bit-accurate model `Specular`. A beat is dark where
-    the light is behind the surface, or a highlight gate tells that its span has no highlight. A dark beat has
-    the argument 0, so that from one dark beat to the next only the input and the first register toggle.
+    Models, formats, PROM and error bound are those of the bit-accurate model `Specular`. A beat is dark if
+    the light is behind the surface, or if a highlight gate tells that its span has no highlight. A dark beat
+    has the argument 0. So from one dark beat to the next only the input and the first register toggle.
 
     With an initiation interval I of 1 the latency is 7 cycles (difference from 1, saturation, shift,
-    saturation, product, base, square), and each of M products has a multiplier: 17 by 17 bits, 17 by 11 and
-    14 by 11 in the chords of ``coscos``, 13 by 11 in those of ``exp``. With a longer interval the products
-    share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles more, for its
-    operands and the registers around the multiplier (`registered_product`), and the cycles until its slot.
+    saturation, product, base, square). Each of M products has a multiplier of 17 by 17 bits. In the chords of
+    ``coscos`` it has 17 by 11 and 14 by 11 bits, in the chords of ``exp`` 13 by 11. With a longer interval
+    the products share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles more, for
+    its operands and the registers around the multiplier (`registered_product`), and the cycles until its
+    slot.
 
     ============= = ===== == == == == =====================================================
     model         M I = 1 2  3  4  6  beside slope and square
@@ -147,27 +148,27 @@ class SpecularUnit(PipelinedUnit):
     initiation_interval : int
         Cycles from an input to the next, at least 1.
     exponent : int or None
-        Exponent that is fixed at build time, 1 to 1000: no PROM, a constant shift, and the slope's multiplier
-        is one by a constant, so that M is one less. ``None``: the exponent is a port.
+        Exponent, 1 to 1000, fixed at build time. There is then no PROM, the shift is constant, and the
+        slope's multiplier multiplies by a constant, so M is one less. ``None``: the exponent is a port.
     shares_slope : bool
-        Whether slope and boundary come from a `SlopeUnit` outside. Else the unit has its own, where
-        ``exponent`` is ``None``.
+        Whether slope and boundary come from a `SlopeUnit` outside. Else, if ``exponent`` is ``None``, the
+        unit has a `SlopeUnit` of its own.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
-        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``; whether the beat is dark.
+        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``. ``dark``: the beat is dark.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))` or :py:`In(slope_shape())`
-        Exponent, 1 to 1000, or the output of a `SlopeUnit`; the exponent is constant while beats are inside,
-        the slope from two cycles after the first beat on, the boundary from three. No such port where the
-        exponent is fixed.
+        Exponent, 1 to 1000, or the output of a `SlopeUnit`. The exponent is constant while beats are inside,
+        the slope from two cycles after the first beat on, the boundary from three. With a fixed exponent
+        there is no port.
 
     Raises
     ------
     ValueError
-        If the interval or the exponent is out of range, or a unit with a fixed exponent is to share a slope.
+        If the interval or the exponent is out of range, or a unit with a fixed exponent has ``shares_slope``.
 
     Source: docs/theory/units.md#specular-unit; [T] figures 3.6 and 3.7; [C].
     """
@@ -204,7 +205,7 @@ class SpecularUnit(PipelinedUnit):
 
     @staticmethod
     def multiplications(model: Specular, exponent: int | None = None) -> int:
-        """Multiplications M, as in the table above; an initiation interval of M needs one multiplier."""
+        """Multiplications M, as in the table above. An initiation interval of M needs one multiplier."""
         chords = 3 if model.is_coscos else int(model.is_exponential)
         by_slope = exponent is None and not model.as_published
         return by_slope + model.squarings + chords

@@ -1,4 +1,4 @@
-"""Value gate unit: which spans of ``chord-local`` can hold a visible highlight, from three u."""
+"""Value gate unit, which stops spans of ``chord-local`` without a visible highlight, by three values of u."""
 
 from amaranth.hdl import Cat, Const, Mux, Signal, unsigned
 from amaranth.lib import data
@@ -14,10 +14,10 @@ __all__ = ["ValueGateUnit"]
 
 
 class ValueGateUnit(PipelinedUnit):
-    """Whether a span may be lit; 0 only where every pixel of it has a specular term of 0.
+    """Whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
 
-    `ValueGate` is the bit-accurate model. Latency 3 cycles, initiation interval 1, no multiplier. The PROM,
-    which all lights share, holds 1024 words of 18 bits.
+    `ValueGate` is the bit-accurate model. The latency is 3 cycles, the initiation interval 1. There is no
+    multiplier. The PROM, which all lights share, holds 1024 words of 18 bits.
 
     Parameters
     ----------
@@ -26,9 +26,10 @@ class ValueGateUnit(PipelinedUnit):
     lights : int
         Number of lights, at least 1.
     exponent : int or None
-        The exponent, fixed at build time, 1 to 1000: no PROM. ``None``: the exponent is a port.
+        The exponent, 1 to 1000, fixed at build time, without a PROM. ``None``: the exponent is a port.
     takes_threshold : bool
-        Whether the threshold is a port in place of the exponent: no PROM, as for the tables of a `Lobe`.
+        Whether the threshold is a port in place of the exponent, without a PROM, as for the tables of a
+        `Lobe`.
 
     Members
     -------
@@ -37,7 +38,7 @@ class ValueGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light, the first lowest.
     constants : :py:`In(10)` or :py:`In(18)`
-        The exponent or the threshold, where it is a port; constant from 2 cycles before a beat.
+        The exponent or the threshold, as a port, constant from 2 cycles before a beat on.
 
     Source: docs/theory/units.md#highlight-gate.
     """
