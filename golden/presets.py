@@ -1,6 +1,7 @@
 """Designs by name: the methods and reflection models of the command line, the API and the tables."""
 
 from dataclasses import fields, replace
+from types import ModuleType
 from typing import Any, cast
 
 from blysk.golden.build import Build, Style
@@ -18,6 +19,7 @@ from blysk.golden.methods import (
     recurrence_interpolator,
     renormalise_interpolator,
 )
+from blysk.golden.methods.installed import load_methods
 from blysk.golden.methods.interpolator import Interpolator, Operand
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX
@@ -35,7 +37,13 @@ __all__ = [
     "preset",
 ]
 
-_MODULES = (
+
+def _lines(module: ModuleType, *names: str) -> dict[Interpolator, str]:
+    """Methods of a module, with a line about each: of dictionaries of these names, where it has them."""
+    return {method: line for name in names for method, line in vars(module).get(name, {}).items()}
+
+
+_OWN = (
     linear_interpolator,
     renormalise_interpolator,
     bisection_interpolator,
@@ -45,13 +53,21 @@ _MODULES = (
     local_chord_interpolator,
     quotient_interpolator,
 )
-"""Modules with ``METHODS``, and some with ``PUBLISHED``, a line about each; in the order of tables."""
+"""Modules of this project with ``METHODS``, and some with ``PUBLISHED``, a line about each; in the order of
+tables."""
 
-METHODS: dict[str, Interpolator] = {method.name: method for module in _MODULES for method in module.METHODS}
+_MODULES = (
+    *_OWN,
+    *load_methods(method.name for module in _OWN for method in _lines(module, "METHODS", "PUBLISHED")),
+)
+
+METHODS: dict[str, Interpolator] = {
+    method.name: method for module in _MODULES for method in _lines(module, "METHODS")
+}
 """Interpolation methods by name."""
 
 PUBLISHED: dict[str, Interpolator] = {
-    method.name: method for module in _MODULES for method in getattr(module, "PUBLISHED", {})
+    method.name: method for module in _MODULES for method in _lines(module, "PUBLISHED")
 }
 """Methods as published, by name: with the coefficients or in the form of the documents, for comparison.
 They have no error bound for a highlight gate."""
@@ -60,7 +76,7 @@ METHOD_LINES: dict[str, str] = {
     method.name: line
     for name in ("METHODS", "PUBLISHED")
     for module in _MODULES
-    for method, line in getattr(module, name, {}).items()
+    for method, line in _lines(module, name).items()
 }
 """A line about each method and each as published, for the help of the command line."""
 

@@ -6,7 +6,10 @@ A unit has the name of its record's file. A file without a record holds parts th
 import pkgutil
 import re
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+
+from blysk.golden.methods.installed import installed_methods
 
 __all__ = ["ROOMS", "UNITS"]
 
@@ -25,9 +28,13 @@ def _found() -> dict[str, str]:
             path = Path(folder, f"{module.name}.py")
             if not module.ispkg and _RECORD.search(path.read_text(encoding="utf-8")):
                 units[module.name] = f"{package.__name__}.{module.name}"
+    for entry in installed_methods():
+        spec = find_spec(entry.module)
+        if spec and spec.origin and _RECORD.search(Path(spec.origin).read_text(encoding="utf-8")):
+            units[entry.module.rpartition(".")[2]] = entry.module
     return units
 
 
 UNITS: dict[str, str] = _found()
 """The file of each record by the unit's name, as it is imported: in the order of the rooms, within a room by
-name."""
+name; then those of `installed_methods`."""

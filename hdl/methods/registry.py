@@ -29,7 +29,7 @@ def unit_of(model: Interpolator) -> type[InterpolatorUnit]:
     method = type(model)
     if method not in InterpolatorUnit.UNITS:
         raise TypeError(
-            f"{method.__name__} has no unit: {methods.__name__} needs a file *_interpolator.py with a class "
-            f"of model={method.__name__}"
+            f"{method.__name__} has no unit: its module, or a file *_interpolator.py of {methods.__name__}, "
+            f"needs a class with model={method.__name__}"
         )
     return InterpolatorUnit.UNITS[method]

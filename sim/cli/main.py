@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from blysk.golden.methods.installed import MethodError
 from blysk.hdl.emit.errors import NetlistError
 from blysk.sim.cli.lazy_command import LazyCommand
 from blysk.sim.engines.cache import provide_caches
@@ -142,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OptionError as error:
         print(f"blysk: {_option_error(error)}", file=sys.stderr)
         return 2
-    except InputError as error:
+    except (InputError, MethodError) as error:
         print(f"blysk: {error}", file=sys.stderr)
         return 2
     except click.ClickException as error:
