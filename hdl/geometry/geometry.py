@@ -51,20 +51,20 @@ PORT_DESCRIPTIONS = {
 """Fields of a span, for the table in Verilog."""
 
 WAITING_TRIANGLES = 512
-"""Triangles between sort and setup, in block RAMs; not compact.
+"""Triangles between sort and setup, in block RAMs, in the throughput style.
 
-Dropped triangles come in runs, of up to hundreds where a mesh turns its back; meanwhile the setup works on
-these.
+Dropped triangles come in runs, of up to hundreds where a mesh turns its back. Meanwhile the setup works on
+the waiting triangles.
 """
 
 BLOCK_WORDS = 64
-"""Words of a memory from which on it is a block RAM: fewer would take look-up tables."""
+"""Least words of a memory that is a block RAM. Fewer words would take look-up tables."""
 
 _COMPACT_GRADIENT = 12
 """Initiation interval of an attribute in the compact style: the number of its products."""
 
 _INSIDE_BITS = 10
-"""Bits of the counters of triangles: they count modulo more than the unit holds."""
+"""Bits of the counters of triangles. They count modulo more triangles than the unit holds."""
 
 
 class _TriangleSetup(wiring.Component):
@@ -151,27 +151,30 @@ class _TriangleSetup(wiring.Component):
 
 
 class GeometryUnit(wiring.Component):
-    """Triangles to spans, at most a triangle in 8 or 16 cycles and a span a cycle: `Geometry` is the model.
+    """Triangles to spans, at most a triangle in 8 or 16 cycles and a span a cycle. `Geometry` is the model.
 
-    The units of this package in a row. The corners of a sorted triangle go to the edge setup and, one
-    attribute after the other, to a FIFO, where the attributes wait for the scales of their triangle. The
-    edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits before each, so
-    that neither keeps the other from its turn. In the *compact* style one divider serves all edges and one
-    multiplier the gradients of all attributes; attributes take turns along the spans, too, and so do the
-    normals of a span. With vectors one unit cuts a span and makes the words of its pieces. There only the
-    attributes have a FIFO in the setup; other words wait in registers.
+    The unit has the units of this package in a row. The corners of a sorted triangle go to the edge setup.
+    They also go, one attribute after the other, to a FIFO, where the attributes wait for the scales of their
+    triangle. The edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits
+    before each lane, so neither lane keeps the other from its turn.
 
-    The units work on several triangles at the same time, and the slowest one sets the pace. A triangle takes:
+    In the *compact* style one divider serves all edges and one multiplier the gradients of all attributes.
+    Attributes take turns along the spans, too, and so do the normals of a span. With vectors one unit cuts a
+    span and makes the words of its pieces. In this style only the attributes have a FIFO in the setup. Other
+    words wait in registers.
 
-    - in the setup `interval` cycles if it is drawn: 16, compact 48, with two lanes half of that. A triangle
+    The units work on several triangles at the same time, and the slowest unit sets the pace. A triangle
+    takes:
+
+    - in the setup `interval` cycles if it is drawn: 16, compact 48, with two lanes half as many. A triangle
       that the sort drops takes 4 to 9 cycles, compact 5 to 15 (`VertexSortUnit`);
     - in the walk one cycle for each scanline without pixels in the picture;
-    - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits, but at least 1 for 1
-      pixel, 2 for 2 pixels and 3 for more (with ``lines`` or ``vectors`` at least 1): never more than it has
-      pixels. For n pixels cut off at the long edge it takes as many cycles more as n has bits. In the compact
-      style it takes four cycles for each scanline and for every two of those bits; at the same time the
-      normals take three cycles each. With ``vectors`` each time that a span does not fit, and each piece
-      behind the first, takes two cycles (`SpanHalverUnit`); in the compact style a piece takes 13 cycles or
+    - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits. These are at least 1 for
+      1 pixel, 2 for 2 pixels and 3 for more (with ``lines`` or ``vectors`` at least 1), and never more than
+      its pixels. For n pixels cut off at the long edge it takes as many cycles more as n has bits. In the
+      compact style it takes four cycles for each scanline and for every two of these bits. At the same time
+      the normals take three cycles each. With ``vectors`` each time that a span does not fit, and each piece
+      behind the first, takes two cycles (`SpanHalverUnit`). In the compact style a piece takes 13 cycles or
       more at the same time (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` or ``vectors``
@@ -180,9 +183,9 @@ class GeometryUnit(wiring.Component):
     Parameters
     ----------
     model : Geometry
-        Bit-accurate model: grid, and what spans have.
+        Bit-accurate model: grid, and kind of spans.
     build : Build
-        Style of the geometry, and ``setups``: the number of lanes, from the edges to the planes, that
+        Style of the geometry, and ``setups``, the number of lanes, from the edges to the planes, that
         triangles take in turns.
 
     Members
@@ -190,16 +193,16 @@ class GeometryUnit(wiring.Component):
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
-        Their spans; with ``lines`` of `line_spans_shape`, with ``vectors`` of `vector_spans_shape`.
+        Their spans. With ``lines`` in `line_spans_shape`, with ``vectors`` in `vector_spans_shape`.
     constants : :py:`In(frame_shape())`
-        The frame; stays while triangles are inside.
+        The frame, constant while triangles are inside.
     status : :py:`Out(counters_shape(*COUNTERS))`
         Counters since the reset.
 
     Attributes
     ----------
     idle : Signal
-        No triangle and no span is inside. Rises one cycle after the last one left.
+        No triangle and no span is inside. Rises one cycle after the last has left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """

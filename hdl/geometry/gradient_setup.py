@@ -37,12 +37,12 @@ def gradient_shape() -> data.StructLayout:
 
 
 class GradientSetupUnit(PipelinedUnit):
-    """Start and steps of an attribute: `GradientSetup` is the bit-accurate model.
+    """Start and steps of an attribute. `GradientSetup` is the bit-accurate model.
 
-    The twelve multiplications of an attribute take turns at ``ceil(12 / I)`` multipliers of 18x18 bits, I
-    the initiation interval: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter; the sum of
-    the start takes four turns at an adder, two bits of both factors a turn. The latency, `latency`, follows
-    from the schedule: 40 cycles for an interval of 4, 52 for 12.
+    The twelve multiplications of an attribute take turns at ``ceil(12 / I)`` multipliers of 18x18 bits, I the
+    initiation interval: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter. The sum of the
+    start takes four turns at an adder, two bits of both factors a turn. The latency, `latency`, follows from
+    the schedule: 40 cycles for an interval of 4, 52 for 12.
 
     Parameters
     ----------

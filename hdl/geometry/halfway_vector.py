@@ -12,10 +12,10 @@ __all__ = ["HalfwayVectorUnit"]
 
 
 class HalfwayVectorUnit(wiring.Component):
-    """Half-way vectors by a sum and a normaliser: `HalfwayVector` is the bit-accurate model.
+    """Half-way vectors by a sum and a normaliser. `HalfwayVector` is the bit-accurate model.
 
-    Latency, `latency`, and initiation interval are those of `VectorNormaliserUnit`, 18 cycles and 1. It has
-    the only multipliers, six.
+    Latency, `latency`, and initiation interval are those of `VectorNormaliserUnit`, 18 cycles and 1. So are
+    the multipliers, six.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class HalfwayVectorUnit(wiring.Component):
     i : :py:`In(stream.Signature(StructLayout({"light": ..., "viewer": ...})))`
         Unit vectors L and V, ``SQ(1, 17)``.
     o : :py:`Out(stream.Signature(StructLayout({"halfway": ..., "opposite": 1})))`
-        H, ``SQ(1, 17)``; ``opposite``: L and V are opposite, and H is 0.
+        H, ``SQ(1, 17)``. ``opposite``: L and V are opposite, and H is 0.
 
     Source: docs/theory/geometry.md#half-way-vector; [T] figure 4.10.
     """

@@ -27,14 +27,14 @@ def with_components(shape: data.StructLayout, components: int) -> data.StructLay
 
 
 class LightAdapterUnit(wiring.Component):
-    """Components of vectors for further lights beside those of the first: `LightAdapter` is the model.
+    """Components of vectors for further lights, beside the first light's. `LightAdapter` is the model.
 
-    Each component of start and step has a multiplier, which takes x, y and z in turns and adds the products:
-    the initiation interval is 3. In the *serial* form one multiplier makes all components one after the
-    other, 6 cycles each. A span is offered 4 cycles after it was taken in, which is on the last cycle of its
-    interval. If it waits there until the next is made, that waits a cycle longer.
+    Each component of start and step has a multiplier, which takes x, y and z in turns and adds the products.
+    So the initiation interval is 3. In the *serial* form one multiplier makes all components one after the
+    other, 6 cycles each. A span is taken in on the last cycle of its interval, and offered 4 cycles later. If
+    it waits at the output until the next span is made, the next span waits a cycle longer.
 
-    Axes are in memories, so that they take no registers; they are not cleared by reset.
+    Axes are in memories, so they take no registers. Reset does not clear them.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ class LightAdapterUnit(wiring.Component):
     rows : int
         Components of a light, 1 to 3.
     serial : bool
-        Whether one multiplier serves.
+        Whether one multiplier makes all components.
     shape : StructLayout or None
-        Shape of a span: ``start`` and ``step`` of three components, ``length``, and whatever passes
+        Shape of a span: ``start`` and ``step`` of three components, ``length``, and words that pass
         unchanged. ``None``: `vector_spans_shape`.
 
     Members
@@ -55,8 +55,8 @@ class LightAdapterUnit(wiring.Component):
     o : :py:`Out(stream.Signature(with_components(shape, 3 + lights * rows)))`
         The same with the components of further lights behind.
     write : :py:`In(stream.Signature(write_shape()))`
-        Writes of frame constants, always accepted; the axes are taken, see `FrameConstants.writes`. They stay
-        while spans are inside.
+        Writes of frame constants, always accepted. The unit takes the axes, see `FrameConstants.writes`. They
+        are constant while spans are inside.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

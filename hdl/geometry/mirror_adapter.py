@@ -19,27 +19,27 @@ def mirror_constants_shape() -> data.StructLayout:
 
 
 class MirrorAdapterUnit(wiring.Component):
-    """Two components of vectors in place of y: `MirrorAdapter` is the bit-accurate model.
+    """Two components of vectors in place of y. `MirrorAdapter` is the bit-accurate model.
 
-    Two multipliers take the start and then the step of a span: the initiation interval is 2, of a span of one
-    pixel 1. In the *serial* form one multiplier makes the four products, and the interval is 4. A span is
-    offered 3 cycles after it was taken in, which is on the last cycle of its interval.
+    Two multipliers take the start and then the step of a span. So the initiation interval is 2, for a span of
+    one pixel 1. In the *serial* form one multiplier makes the four products, and the interval is 4. A span is
+    taken in on the last cycle of its interval, and offered 3 cycles later.
 
     Parameters
     ----------
     serial : bool
-        Whether one multiplier serves.
+        Whether one multiplier makes all products.
     shape : StructLayout or None
-        Shape of a span, as for `LightAdapterUnit`; its vectors may have components of further lights.
+        Shape of a span, as for `LightAdapterUnit`. Its vectors may have components of further lights.
 
     Members
     -------
     i : :py:`In(stream.Signature(shape))`
         Spans of `VectorAdapterUnit` or `LightAdapterUnit`.
     o : :py:`Out(stream.Signature(with_components(shape, components + 1)))`
-        The same with the components x, y cos a, z, those of further lights, y sin a.
+        The same with the components x, y cos a, z, the components of further lights, y sin a.
     constants : :py:`In(mirror_constants_shape())`
-        sin a and cos a; stay while spans are inside.
+        sin a and cos a, constant while spans are inside.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

@@ -36,13 +36,13 @@ def plane_shape() -> data.StructLayout:
 
 
 class PlaneAssemblerUnit(wiring.Component):
-    """Collects four gradients, and finds ``piece``: `PlaneAssembler` is the bit-accurate model.
+    """Collects four gradients, and finds ``piece``. `PlaneAssembler` is the bit-accurate model.
 
     With the first gradient of a triangle the product of bound and limit begins, two bits of the limit a
-    cycle; after the third gradient the search for ``piece`` begins, one bit a cycle. If gradients are at
-    least 4 cycles apart, a triangle is offered 3 cycles after its fourth gradient was taken in, and the first
-    gradient of the next triangle can be taken in on the cycle after that: gradients that come every four
-    cycles never wait. If spans are not cut, there is neither product nor search. No multipliers.
+    cycle. After the third gradient the search for ``piece`` begins, one bit a cycle. If gradients are at
+    least 4 cycles apart, a triangle is offered 3 cycles after its fourth gradient was taken in. One cycle
+    after the offer the first gradient of the next triangle can be taken in. So gradients that come every four
+    cycles never wait. If spans are not cut, there is neither product nor search. The unit has no multipliers.
 
     In the *serial* form the attributes of a triangle are offered one after the other.
 
@@ -58,9 +58,9 @@ class PlaneAssemblerUnit(wiring.Component):
     i : :py:`In(stream.Signature(gradient_shape()))`
         Gradients of N/W by component, then of the depth.
     o : :py:`Out(stream.Signature(planes_shape()))`
-        Planes of triangles; if ``serial``, of one attribute at a time, in `plane_shape`.
+        Planes of triangles. If ``serial``, the plane of one attribute at a time, in `plane_shape`.
     constants : :py:`In(frame_shape())`
-        The frame, of which ``limit`` is read; stays while triangles are inside.
+        The frame, of which the unit reads ``limit``. Constant while triangles are inside.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

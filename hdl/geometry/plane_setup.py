@@ -33,9 +33,9 @@ def scales_shape() -> dict:
 
 
 class PlaneSetupUnit(PipelinedUnit):
-    """``1/D`` and ``1/W`` as mantissas and exponents: `PlaneSetup` is the bit-accurate model.
+    """``1/D`` and ``1/W`` as mantissas and exponents. `PlaneSetup` is the bit-accurate model.
 
-    One shifter normalises height and area, one table serves both reciprocals, and the seven multiplications
+    One shifter normalises height and area, and one table serves both reciprocals. The seven multiplications
     take turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency,
     `latency`, follows from the schedule: 26 cycles for an interval of 16.
 
@@ -44,7 +44,7 @@ class PlaneSetupUnit(PipelinedUnit):
     grid : Grid
         Fraction bits of the coordinates.
     initiation_interval : int
-        Least number of cycles from a triangle to the next, at least 1; a number larger than the latency
+        Least number of cycles from a triangle to the next, at least 1. A number larger than the latency
         counts as the latency.
     skid : bool
         As in `PipelinedUnit`.

@@ -27,7 +27,7 @@ def shared_table(graph: Dataflow, module: Callable[[], Module]) -> FunctionalUni
     graph : Dataflow
         Graph that gets the table.
     module : callable
-        Returns the module that gets the table's memory; called when the hardware is built.
+        Returns the module that gets the table's memory. It is called when the hardware is built.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Serial vectors: spans of one attribute after the other to pieces with the words of the quotient method."""
+"""Serial vectors: from spans of one attribute after the other to pieces with words of the quotient method."""
 
 from itertools import pairwise
 
@@ -22,29 +22,34 @@ _WIDTH = SPAN_STEP.width
 
 
 class SerialVectorsUnit(wiring.Component):
-    """What `SpanHalverUnit` and `VectorAdapterUnit` do, on one attribute a cycle: their models are its own.
+    """Does the work of `SpanHalverUnit` and `VectorAdapterUnit` on one attribute a cycle, by their models.
 
-    The four attributes of a span are in rings that turn by one attribute a cycle. A span comes in four turns,
-    which also find its shift, and by the shift of the piece before whether it fits. If its own is another,
-    four turns repeat that. Four turns find the exponent of the step; four more give the start, and the last
-    four the step, while the next span comes in, or what is left of this one. Each component of a vector goes
-    through one shifter, a subtraction, another shifter and a rounding.
+    The four attributes of a span are in rings that turn by one attribute a cycle.
 
-    A piece takes 13 cycles, six more each time that it does not fit, and five each time that the shift is
-    another than before. The words of the next begin when it was taken; all before that goes on. A span that
-    fits is offered `latency` cycles at most after its last attribute was taken. No multipliers.
+    1. A span comes in four turns. They also find its shift, and, by the shift of the piece before, whether
+       the span fits. If its own shift differs, four more turns test again.
+    2. Four turns find the exponent of the step.
+    3. Four turns give the start.
+    4. Four turns give the step, while the next span, or the rest of this span, comes in.
+
+    Each component of a vector goes through one shifter, a subtraction, another shifter and a rounding.
+
+    A piece takes 13 cycles, six more each time that it does not fit, and five more each time that the shift
+    differs from the shift before. The words of the next piece begin when this piece was taken; the steps
+    before them go on meanwhile. A span that fits is offered at most `latency` cycles after its last attribute
+    was taken. The unit has no multipliers.
 
     Parameters
     ----------
     rotates : bool
-        That of both models.
+        The parameter of both models.
 
     Members
     -------
     i : :py:`In(stream.Signature(whole_span_shape()))`
-        Attributes of spans, four beats of each: those of `SpanAttributesUnit`, serial and ``whole``.
+        Attributes of spans, four beats a span, from a `SpanAttributesUnit` that is serial and ``whole``.
     o : :py:`Out(stream.Signature(vector_spans_shape()))`
-        Pieces, as those of `VectorAdapterUnit`.
+        Pieces, as from `VectorAdapterUnit`.
     status : :py:`Out(counters_shape("cut"))`
         Number of spans that were cut, since the reset.
 

@@ -1,4 +1,4 @@
-"""The span adapter: what the shading pipeline reads of the spans that geometry makes."""
+"""The span adapter: the part of geometry's spans that the shading pipeline reads."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data
@@ -20,10 +20,10 @@ def line_spans_shape() -> data.StructLayout:
 
 
 class LineAdapterUnit(PipelinedUnit):
-    """Ends of true lines for a method that takes them: `LineAdapter` is the bit-accurate model.
+    """Ends of true lines for a method that takes them. `LineAdapter` is the bit-accurate model.
 
-    The latency is 3 cycles (the bits that are used; the shift; sign and rounding), the initiation interval 1.
-    No multipliers.
+    The latency is 3 cycles (the used bits; the shift; sign and rounding), the initiation interval 1. The unit
+    has no multipliers.
 
     Members
     -------
@@ -73,10 +73,10 @@ class LineAdapterUnit(PipelinedUnit):
 
 
 def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
-    """Wire a span of geometry to a span of the shading pipeline: `shading_spans` in hardware.
+    """Wire a span of geometry to a span of the shading pipeline, as `shading_spans` does.
 
     Coordinates and lengths are cut to the pipeline's widths, which hold them in any of its pictures. A
-    material that the pipeline has no code for gets the largest one.
+    material without a code in the pipeline gets the largest code.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Span attributes: N/W and depth at both ends of every span, and of every piece of a wide one."""
+"""Span attributes: N/W and depth at both ends of every span, and of every piece of a wide span."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, ValueLike, unsigned
 from amaranth.lib import data, stream, wiring
@@ -59,46 +59,46 @@ def whole_spans_shape() -> data.StructLayout:
 
 
 def whole_span_shape() -> data.StructLayout:
-    """Shape of one attribute of `whole_spans_shape`, with all that is the span's."""
+    """Shape of one attribute of `whole_spans_shape`, with the other words of the span."""
     words = {name: FixedShape(SPAN_STEP) for name in ("near", "far", "inward")}
     return data.StructLayout({**whole_spans_shape().members, **words})
 
 
 class SpanAttributesUnit(wiring.Component):
-    """Walks attributes down the long edge and along the spans: `SpanAttributes` is the bit-accurate model.
+    """Walks attributes down the long edge and along the spans. `SpanAttributes` is the bit-accurate model.
 
-    A scanline without pixels takes a cycle. One with pixels takes, for every piece of p pixels, as many
-    cycles as ``p - 1`` has bits, at least one; and for n pixels cut off at the long edge as many as n has
-    bits. So a piece never takes more cycles than it has pixels. A span of one or two pixels, in
-    one piece and with no pixel cut off at the long edge, is offered `latency` cycles, 3, after its scanline
-    was taken in. No multipliers: additions of shifted steps, modulo 4.
+    A scanline without pixels takes a cycle. Other scanlines take, for every piece of p pixels, as many cycles
+    as ``p - 1`` has bits, at least one. For n pixels cut off at the long edge they take as many cycles more
+    as n has bits. So a piece never takes more cycles than it has pixels. A span of one or two pixels, in one
+    piece and with no pixel cut off at the long edge, is offered `latency` cycles, 3, after its scanline was
+    taken in. The unit adds shifted steps, modulo 4, and has no multipliers.
 
     In the *serial* form one attribute after the other goes through the same adders, and its words through
     rings of registers. A scanline comes four times, each time with another attribute's plane. It takes four
-    cycles without pixels, and else four cycles for every two bits of the numbers above; `latency` is 6, from
-    the fourth time on. A piece also waits until the piece before it has been taken.
+    cycles without pixels, and else four cycles for every two bits of the numbers above. `latency` is 6,
+    counted from the fourth time. A piece also waits until the piece before it has been taken.
 
-    With ``whole`` spans are not cut, and leave as the walk finds them, a cycle earlier: `latency` is 2. In
-    the serial form they leave attribute by attribute, and the first is offered `latency` cycles, 3, after its
-    scanline came for the first time.
+    With ``whole`` spans are not cut. They leave as the walk finds them, a cycle earlier: `latency` is 2. In
+    the serial form they leave attribute by attribute. The first attribute is offered `latency` cycles, 3,
+    after its scanline came for the first time.
 
     Parameters
     ----------
     serial : bool
         Whether the attributes of a scanline come and are computed one after the other.
     whole : bool
-        Whether spans are given whole.
+        Whether the unit gives whole spans.
 
     Members
     -------
     i : :py:`In(stream.Signature(planes_rows_shape(serial)))`
-        Scanlines. The planes are read with the first scanline of a triangle: the first of all, or the one
-        after a scanline with ``last``.
+        Scanlines. The planes are read with the first scanline of a triangle. This is the first of all
+        scanlines, or the scanline after a scanline with ``last``.
     o : :py:`Out(stream.Signature(pieces_shape()))`
-        Pieces; with ``whole`` spans, in `whole_spans_shape`, serial in `whole_span_shape`.
+        Pieces. With ``whole`` spans, in `whole_spans_shape`, serial in `whole_span_shape`.
     status : :py:`Out(counters_shape("empty", "cut"))`
-        Number of triangles without a span, and of spans of more than one piece, since the reset; with
-        ``whole`` the first alone.
+        Number of triangles without a span, and of spans of more than one piece, since the reset. With
+        ``whole`` only the first.
 
     Attributes
     ----------

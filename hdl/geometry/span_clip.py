@@ -19,9 +19,10 @@ def clipped_rows_shape() -> data.StructLayout:
 
 
 class SpanClipUnit(PipelinedUnit):
-    """Scanlines cut to the picture: `SpanClip` is the bit-accurate model.
+    """Scanlines cut to the picture. `SpanClip` is the bit-accurate model.
 
-    The latency is 2 cycles (borders, differences) and the initiation interval is 1. No multipliers.
+    The latency is 2 cycles (borders, differences) and the initiation interval is 1. The unit has no
+    multipliers.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ class SpanClipUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(clipped_rows_shape()))`
         The same in the picture.
     constants : :py:`In(frame_shape())`
-        The frame; stays while scanlines are inside.
+        The frame, constant while scanlines are inside.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """

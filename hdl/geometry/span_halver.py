@@ -1,4 +1,4 @@
-"""The span halver: spans cut where N/W grows too short along them for a method that takes vectors."""
+"""The span halver, which cuts spans where N/W grows too short for a method that takes vectors."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
@@ -31,11 +31,12 @@ def halved_spans_shape() -> data.StructLayout:
 
 
 class SpanHalverUnit(wiring.Component):
-    """Pieces of spans along which N/W stays long: `SpanHalver` is the bit-accurate model.
+    """Pieces of spans along which N/W stays long. `SpanHalver` is the bit-accurate model.
 
-    A span, or a piece, is offered with the cycle after it was taken in; while the output is ready one is
-    taken in on every cycle. One that does not fit takes two cycles more each time that it is tried again; so
-    does what is left of a span behind a piece. No multipliers: two ends of an attribute share one adder.
+    A span, or a piece, is offered on the cycle after it was taken in. While the output is ready, a span is
+    taken in on every cycle. A span that does not fit takes two cycles more each time that it is tried again.
+    So does the rest of a span behind a piece. Two ends of an attribute share one adder. The unit has no
+    multipliers.
 
     Parameters
     ----------
@@ -47,8 +48,8 @@ class SpanHalverUnit(wiring.Component):
     i : :py:`In(stream.Signature(whole_spans_shape()))`
         Spans of `SpanAttributesUnit` with ``whole``.
     o : :py:`Out(stream.Signature(halved_spans_shape()))`
-        Their pieces: N/W at the first pixel, the attributes' step away from the long edge, and the places by
-        which both are to be shifted.
+        Their pieces, with N/W at the first pixel, the attributes' step away from the long edge, and the
+        places of the shift of both.
     status : :py:`Out(counters_shape("cut"))`
         Number of spans that were cut, since the reset.
 
@@ -236,9 +237,10 @@ class SpanHalverUnit(wiring.Component):
 
 
 def size_of(code: Value) -> Value:
-    """First bits of the size of a component's code ``SPAN_STEP``: `SpanHalver.BITS`, and those of its shift.
+    """First bits of the size of a component's code ``SPAN_STEP``: `SpanHalver.BITS`, and the bits of its
+    shift.
 
-    Below 0 it is the complement; beyond the range all bits are 1.
+    Below 0 the size is the complement. Beyond the range all bits are 1.
     """
     top = SPAN_STEP.fraction_bits
     sign, beyond = code[-1], code[-1] ^ code[-2]
@@ -247,7 +249,7 @@ def size_of(code: Value) -> Value:
 
 
 def shorter(pixels: Value) -> Value:
-    """Pixels of the piece to try next: one less than an even number, the larger half of an odd number."""
+    """Pixels of the next piece to try: one less than an even number, the larger half of an odd number."""
     odd = pixels[0]
     return (Mux(odd, pixels >> 1, pixels) + Mux(odd, 1, (1 << PIXEL_BITS) - 1))[:PIXEL_BITS]
 
@@ -262,7 +264,7 @@ def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
     long : Value
         Whether a component, or a sum of two, stays long along it.
     large : Value
-        Whether a component has its first bit at an end; without it the largest shift is too small.
+        Whether a component has its first bit at an end. Without this bit the largest shift is too small.
     steep : Value
         Whether a component's ends are too far apart for a piece of two pixels.
     """

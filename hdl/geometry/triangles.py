@@ -41,7 +41,7 @@ def corners_shape(grid: Grid = GRID) -> dict:
 
 
 def triangle_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of a triangle: corners in any order, the index of its material, whether it is two-sided."""
+    """Shape of a triangle: corners in any order, the index of its material, a flag of two-sided material."""
     return data.StructLayout(
         corners_shape(grid) | {"material": unsigned(MATERIAL_BITS), "two_sided": unsigned(1)}
     )
@@ -73,6 +73,6 @@ def count_events(m: Module, counters: data.View, **events: ValueLike) -> None:
 
 
 def first_centre(code: Value, grid: Grid) -> Value:
-    """First column or scanline whose centre is not before a coordinate, signed: `Grid.first_centre`."""
+    """First column or scanline whose centre is not before a coordinate, signed, as `Grid.first_centre`."""
     code = Value.cast(code)
     return (code + (grid.half - 1))[grid.subpixel_bits :].as_signed()

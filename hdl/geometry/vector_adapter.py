@@ -22,10 +22,10 @@ def vector_spans_shape(components: int = 3) -> data.StructLayout:
 
 
 class VectorAdapterUnit(PipelinedUnit):
-    """Vectors and steps for a method that takes them: `VectorAdapter` is the bit-accurate model.
+    """Vectors and steps for a method that takes them. `VectorAdapter` is the bit-accurate model.
 
-    The latency is 4 cycles (the shift of all; the margin to 1, and the bits that the step uses; its own
-    shift; sign and rounding), the initiation interval 1. No multipliers.
+    The latency is 4 cycles (the shift of all; the margin to 1, and the bits that the step uses; the step's
+    own shift; sign and rounding). The initiation interval is 1. The unit has no multipliers.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class VectorAdapterUnit(PipelinedUnit):
 
 
 def rounded(code: Value, flip: Value, point: int) -> Value:
-    """A code with ``point`` fraction bits, negated where told, and rounded to `VectorAdapter.FORMAT`."""
+    """A code with ``point`` fraction bits, negated by ``flip``, and rounded to `VectorAdapter.FORMAT`."""
     format = VectorAdapter.FORMAT
     cut = point - format.fraction_bits
     # The 1 that completes the negation is added together with the half step of the rounding.
@@ -102,7 +102,7 @@ def rounded(code: Value, flip: Value, point: int) -> Value:
 
 
 def exponent_of(used: Value) -> Value:
-    """Places by which a step may be shifted, from its first bits below the sign that are used."""
+    """Places by which a step may be shifted, from its used bits below the sign."""
     places = []
     for size in (8, 4, 2, 1):
         empty = ~used[-size:].any()
@@ -117,12 +117,12 @@ def _smaller(model: VectorAdapter, code: Value) -> Value:
 
 
 def shift_of(model: VectorAdapter, shift: Value) -> Value:
-    """Places by which a vector is shifted: one less if it is to turn, so that its length stays under 1."""
+    """Places by which a vector is shifted, one less if it will turn, which keeps its length under 1."""
     return (shift - shift.any())[: len(shift)] if model.rotates else shift
 
 
 def used_bits(model: VectorAdapter, codes: list[Value]) -> Value:
-    """First bits below the sign that a code of a shifted step uses: where it differs from its sign."""
+    """First bits below the sign that a code of a shifted step uses, because they differ from the sign."""
     p, used = model, 0
     for code in codes:
         used = used | (code[: p.STEP_BITS] ^ code[-1].replicate(p.STEP_BITS))[-p.LARGEST_EXPONENT :]

@@ -30,12 +30,12 @@ def vectors_shape(model: VectorNormaliser) -> tuple[data.StructLayout, data.Stru
 
 
 class VectorNormaliserUnit(PipelinedUnit):
-    """Unit vector along a vector of any length: `VectorNormaliser` is the bit-accurate model.
+    """Unit vector along a vector of any length. `VectorNormaliser` is the bit-accurate model.
 
     The latency is 18 cycles, 3 in `DotProductUnit` and 15 others: four for shift and rounding; one for the
     segment, two for the table, three for ``c0 - c1 u``, one for e; four for ``v + e v``. The initiation
-    interval is 1. Six multipliers of 18x18 bits: three squares and three scalings; ``c1 u`` is a sum of Booth
-    digits. The table holds 512 words of 32 bits.
+    interval is 1. There are six multipliers of 18x18 bits, for three squares and three scalings. ``c1 u`` is
+    a sum of Booth digits. The table holds 512 words of 32 bits.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class VectorNormaliserUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"vector": ..., "flip": 1})))`
-        A vector, and whether its unit vector is negated.
+        A vector. ``flip``: its unit vector is negated.
     o : :py:`Out(stream.Signature(StructLayout({"normal": ..., "lost": 1})))`
-        Unit vector, ``SQ(1, 17)``; ``lost``: the vector has no direction.
+        Unit vector, ``SQ(1, 17)``. ``lost``: the vector has no direction.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -150,9 +150,9 @@ class VectorNormaliserUnit(PipelinedUnit):
 
 
 class SharedVectorNormaliserUnit(PipelinedUnit):
-    """`VectorNormaliserUnit` for vectors some cycles apart: components and products take turns.
+    """`VectorNormaliserUnit` for vectors some cycles apart. Components and products take turns.
 
-    One shifter and one unit for the last rounding serve the three components; the seven multiplications take
+    One shifter and one unit for the last rounding serve the three components. The seven multiplications take
     turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency, `latency`,
     follows from the schedule: 30 cycles for an interval of 3 or 4.
 

@@ -1,4 +1,4 @@
-"""Vertex sort ([T] figure 4.10): corners from top to bottom, orientation, and what is not drawn at all."""
+"""Vertex sort ([T] figure 4.10): corners from top to bottom, orientation, and dropped triangles."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
@@ -32,21 +32,21 @@ def sorted_triangle_shape(grid: Grid = GRID) -> data.StructLayout:
 
 
 class VertexSortUnit(wiring.Component):
-    """Sorts corners, finds the area, and drops what `VertexSort`, the bit-accurate model, drops.
+    """Sorts corners, finds the area, and drops triangles. `VertexSort` is the bit-accurate model.
 
-    Two stages, each with a triangle inside. The first compares neighbouring corners in three cycles,
-    exchanges them a cycle later, and compares the triangle's box with the picture. The second sums
+    There are two stages, each with a triangle inside. The first compares neighbouring corners in three
+    cycles, exchanges them a cycle later, and compares the triangle's box with the picture. The second sums
     ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in n digits of four bits of the heights, from the first
-    one on, with two Booth digits of each product a cycle; low triangles have fewer digits. Results are exact.
-    No multipliers.
+    digit on. It takes two Booth digits of each product a cycle. Low triangles have fewer digits. Results are
+    exact. The unit has no multipliers.
 
     On a grid of 1/256 pixel n is 3 for boxes of up to 6 scanlines, 4 for up to 126, 5 for up to 2046, and 6
     for more. A triangle takes 4 cycles if its box is empty, else n + 3 cycles if it is dropped and n + 4 if
     it is drawn, unless the output waits. A drawn triangle is offered n + 8 cycles after it was taken in.
 
     In the *compact* style there is one triangle inside, and its corners stay in the registers of the first
-    stage. It takes 5 cycles if its box is empty, else n + 9 cycles, and if it is drawn also those on which it
-    is offered, at least one.
+    stage. It takes 5 cycles if its box is empty, else n + 9 cycles. If it is drawn, it also takes the cycles
+    on which it is offered, at least one.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ class VertexSortUnit(wiring.Component):
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(sorted_triangle_shape(grid)))`
-        Triangles that are drawn.
+        Drawn triangles.
     constants : :py:`In(frame_shape())`
-        The frame; stays while triangles are inside.
+        The frame, constant while triangles are inside.
     status : :py:`Out(counters_shape("empty", "zero_area", "culled"))`
         Number of triangles dropped for each reason, since the reset.
 

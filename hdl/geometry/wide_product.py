@@ -15,7 +15,7 @@ __all__ = ["halves", "three_products", "wide_product"]
 
 
 def halves(low_bits: int) -> tuple[Callable[[Any], FixedValue], Callable[[Any], FixedValue]]:
-    """Functions from a number to its high part, signed, and to its low part, unsigned; both are wiring."""
+    """Functions from a number to its high part, signed, and its low part, unsigned. Both are wiring."""
 
     def high(value: FixedValue) -> FixedValue:
         return value.truncate(value.format.fraction_bits - low_bits)
@@ -31,8 +31,8 @@ def three_products(
 ) -> tuple[Word, Word]:
     """The product of the high halves, and the sum of the two products of a high and a low half.
 
-    All three are cut to ``keep`` fraction bits. Three multiplications, and a register for the sum. Other
-    parameters are those of `wide_product`.
+    All three are cut to ``keep`` fraction bits. This takes three multiplications, and a register for the sum.
+    Other parameters are those of `wide_product`.
     """
     (a_high, a_rest), (b_high, b_rest) = halves(a_low), halves(b_low)
     high = graph.multiply(f"{name}_high", a, b, a_high, b_high)
