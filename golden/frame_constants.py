@@ -258,10 +258,10 @@ def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
 
 
 _MEANINGS = {
-    "exponent": "specular exponent, 1 to 1000; of a lobe that of Blinn's power as steep",
+    "exponent": "specular exponent, 1 to 1000; for a lobe the exponent of an equally steep Blinn's power",
     "ambient": "ambient colour, red green blue, UQ(11, 6) in LSB of the channel",
     "material": "index of the material that exponent and colours written next belong to",
-    "lobe": "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins",
+    "lobe": "next value of a table, UQ(0, 17); with bit 17 set, number of the bank whose table begins",
     "threshold": "of the table: where its highlight ends; {threshold}",
     "bank": "bank of the material's table",
     "diffuse": "diffuse colour, red green blue, UQ(11, 6)",

@@ -125,8 +125,8 @@ def frame_registers(keep: bool = False) -> list[Register]:
     borders = {
         "left": "first column of the picture on the grid",
         "top": "first row",
-        "right": "the column after the last",
-        "bottom": "the row after the last",
+        "right": "column after the last column",
+        "bottom": "row after the last row",
     }
     kinds = ", ".join(f"{k}: {name}" for k, name in enumerate(BACK_FACES))
     most = 1 << X_BITS - 2
@@ -137,7 +137,9 @@ def frame_registers(keep: bool = False) -> list[Register]:
         ("limit", LIMIT_BITS, False, f"{chord}; not read where spans have true lines or vectors"),
     ]
     if keep:
-        rows.append(("keep", 1, False, "1: the next frame adds to the picture; 0: its depths begin anew"))
+        rows.append(
+            ("keep", 1, False, "1: the next frame adds to the picture; 0: it clears the depths first")
+        )
     ranges = dict.fromkeys(borders, (-most, most)) | {"back_faces": (0, len(BACK_FACES) - 1)}
     return [
         Register(name, FRAME + 4 * k, "read-write", width, signed, text, range=ranges.get(name))
@@ -180,10 +182,10 @@ def constant_registers(design: ShadingPipeline, axes: Sequence[str] = ()) -> lis
 
     add("", 0, FIELDS_OF_A_FRAME, _OF_A_FRAME)
     if design.materials > 1:
-        text = "index of the material that exponent and colours written next belong to"
+        text = "index of the material to which the next exponent and colours belong"
         rows.append(("material", MATERIAL_ADDRESS, (design.materials - 1).bit_length(), False, "", text))
     if design.loads_tables:
-        text = "the next value of a table, UQ(0, 17); with bit 17 the bank whose table begins"
+        text = "next value of a table, UQ(0, 17); with bit 17 set, number of the bank whose table begins"
         rows.append(("lobe", LOBE_ADDRESS, 18, False, "", text))
     if design.threshold_format is not None:
         form = design.threshold_format

@@ -137,7 +137,7 @@ class QuotientInterpolator(Interpolator):
             "at most ceil(log2(length - 1)) + 3.",
             "Halve a span where |v| at its ends differs by a factor over 2, "
             "or where they are over 90 degrees",
-            "apart. Give a span of two pixels as two of one, whose step is 0. "
+            "apart. Give a span of two pixels as two spans of one, whose step is 0. "
             "A span with a pixel of |v| under",
             "1/128, which these cuts exclude, is wrong, and counted in status_out_of_range_spans.",
             *(constants if highlights else []),

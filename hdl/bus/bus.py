@@ -21,11 +21,11 @@ BUSES = {"axi": ("s_axil", AxiLite, AxiLiteUnit), "wishbone": ("wb", Wishbone, W
 
 PORT_DESCRIPTIONS = {
     "s_axis_tdata": "one triangle or span, see above",
-    "s_axis_tlast": "the last one of the frame",
+    "s_axis_tlast": "the last beat of the frame",
     "m_axis_tdata": "one pixel or span, see above",
     "m_axis_tkeep": "all ones",
-    "m_axis_tlast": "the last one of a packet, see above",
-    "m_axis_tuser": "bit 0: the first one of the frame; bit 1: the last one",
+    "m_axis_tlast": "the last beat of a packet, see above",
+    "m_axis_tuser": "bit 0: the first beat of the frame; bit 1: the last beat",
 }
 """Ports of the streams, for the table in Verilog."""
 

@@ -30,8 +30,8 @@ LINT_EXCEPTIONS = {
 _DESCRIPTIONS = {
     "clk": "clock, rising edge",
     "rst": "synchronous reset, active high",
-    "valid": "the payload is there",
-    "ready": "the payload is accepted",
+    "valid": "the source has a payload",
+    "ready": "the sink takes the payload",
 }
 
 # `opt_dff` without enables keeps the synchronous reset readable and introduces no undefined values.

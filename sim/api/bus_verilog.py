@@ -14,10 +14,10 @@ __all__ = ["bus_descriptions", "bus_header", "triangle_descriptions"]
 
 _MARKS = {
     "span": "the last pixel of its span",
-    "run": "a pixel that the next one does not follow on its right, or the last of the frame",
-    "frame": "the last one of the frame",
+    "run": "a pixel whose right neighbour is not the next pixel, or the last pixel of the frame",
+    "frame": "the last beat of the frame",
 }
-_DEPTHS = "Depths begin anew with each frame; a frame that is sent with 1 in keep adds to the picture."
+_DEPTHS = "Each frame clears the depths; a frame that is sent with 1 in keep adds to the picture."
 
 _PATHS = {
     "axi": "AXI4-Lite, s_axil_*",
@@ -65,7 +65,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
     """
     framing, map = unit.framing, unit.map
     packets, layouts = framing.packets, framing.model
-    # Words are told by the layouts and the map.
+    # The layouts and the map describe the words.
     kept = [line for line in of_core if not line.startswith(("status_", "constants_", "before the first"))]
     registers = [
         f"  0x{register.address:03X}  {register.name:<12} {register.text}"
@@ -76,21 +76,21 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
         *kept,
         "",
         f"Streams: AXI4-Stream. Registers: {_PATHS[bus]}; words of 32 bits, little endian.",
-        "rst is synchronous and active high: of an active-low aresetn its inverse.",
+        "rst is synchronous and active high: drive it with the inverse of an active-low aresetn.",
         "",
         f"s_axis_tdata, {layouts.given.size} bytes: byte, C declaration, format; extended by sign or 0:",
         *layout_lines(layouts.given),
         f"m_axis_tdata, {layouts.made.size} bytes, likewise:",
         *layout_lines(layouts.made),
-        "s_axis_tlast ends a frame: needed, or the last beat is never given.",
+        "s_axis_tlast ends a frame: without it the last beat never comes.",
         f"m_axis_tlast: {_MARKS[packets]}.",
-        "m_axis_tuser: bit 0 the first one of the frame, bit 1 the last one; tkeep is all ones.",
+        "m_axis_tuser: bit 0 marks the first beat of the frame, bit 1 the last; tkeep is all ones.",
         "",
-        "Order: rst for a cycle; write every frame register and constant in any order; send the beats of a",
-        "frame, tlast with the last; wait until state is 0; then write again or send the next frame.",
+        "Order: hold rst for a cycle; write every frame register and constant in any order; send the beats",
+        "of a frame, tlast with the last; wait until state is 0; then write again or send the next frame.",
         "A refused access (SLVERR, err) changes nothing but errors and refused: no register at the address,",
         "the wrong direction, part of a word, a value that does not fit, a write while a frame is inside.",
-        "errors takes any word or byte at any time: all ones clear it.",
+        "errors takes any word or byte at any time; all ones clear it.",
         *([_DEPTHS] if "keep" in map.by_name else []),
         "",
         "Registers, by address of a byte:",
@@ -99,7 +99,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
     if map.constants:
         lines += [
             "",
-            f"Frame constants: register 0x{CONSTANTS:03X} + 4 address, signed ones extended by sign:",
+            f"Frame constants: register 0x{CONSTANTS:03X} + 4 address, signed values extended by sign:",
         ]
         lines += constants
     return lines

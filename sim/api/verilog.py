@@ -54,7 +54,7 @@ def header_of(unit: ShadingUnit) -> list[str]:
         lines += made.interpolator.input_lines(made.lights, made.specular is not None, made.factors)
     lines += [
         f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
-        "before the first span: rst high for a cycle, then write every frame constant in any order",
+        "before the first span: hold rst high for a cycle, then write every frame constant in any order",
     ]
     return lines
 
@@ -64,9 +64,13 @@ def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[st
     if several is None:
         return []
     streams = (
-        "o_k_*: its pixels" if isinstance(unit, PixelPipelinesUnit) else "o_*: pixels in the spans' order"
+        "o_k_*: pixels of pipeline k"
+        if isinstance(unit, PixelPipelinesUnit)
+        else "o_*: pixels in the spans' order"
     )
-    return [f"{several.pipes} pipelines; pipeline k takes spans with y mod {several.pipes} = k; {streams}"]
+    return [
+        f"{several.pipes} pipelines; pipeline k shades scanlines with y mod {several.pipes} = k; {streams}"
+    ]
 
 
 def _render_header(unit: RendererUnit) -> list[str]:
@@ -82,20 +86,21 @@ def _render_header(unit: RendererUnit) -> list[str]:
         *_geometry_lines(unit.geometry),
         *_axes_lines(unit.model),
         *_coarse_lines(unit),
-        "memory_*: a depth for each pixel; read data a clock after the place; before a picture's first pixel "
-        "the core writes all ones to every pixel of the picture, one a clock",
-        "constants_picture changes with each picture: depths begin anew, as after rst; else it is added to",
+        "memory_*: a depth for each pixel; read data comes a clock after the place; before a picture's first "
+        "pixel the core writes all ones to every pixel of the picture, a pixel a clock",
+        "constants_picture: change it for each picture, to clear the depths as after rst; without a change "
+        "triangles add to the picture",
     ]
 
 
 def _axes_lines(renderer: Renderer) -> list[str]:
-    """How the axes of further lights are made, and how long a normal may be."""
+    """Lines on the axes of further lights, and on the length of a normal."""
     if not renderer.axes:
         return []
     return [
-        "With several lights no vertex normal is longer than 1 before it is multiplied by 1/W.",
-        f"axes: of light k from 1 on {', '.join(renderer.axes)} of its frame, each as its dot products with",
-        "x, y and z of light 0's frame, times 2^17, rounded, at most 2^17 - 1; written before the first "
+        "With several lights no vertex normal may be longer than 1, before it is times 1/W.",
+        f"axes of light k, from 1 on: {', '.join(renderer.axes)} of its frame, each as its dot products with",
+        "x, y and z of light 0's frame, times 2^17, rounded, at most 2^17 - 1; write them before the first "
         "triangle of a frame",
     ]
 
@@ -157,17 +162,17 @@ def verilog(
     Parameters
     ----------
     design : Design, optional
-        The pipeline, as `design` makes it; by default that of the defaults.
+        The pipeline, from `design`; by default the design with all defaults.
     name : str
         Name of the top module.
     **options
-        Those below, by the names of the command line. ``None`` counts as not given.
+        Options below, with the names of the command line. ``None`` counts as not given.
 
     Raises
     ------
     InputError
-        If the name is no Verilog identifier, the method takes values of a span and the core triangles, the
-        design cannot have that number of pipelines, or the bus does not serve the core.
+        If the name is not a Verilog identifier, the method takes values of a span but the core triangles, the
+        design cannot have this number of pipelines, or the bus does not serve the core.
     """
     return verilog_and_unit(built(ShadingPipeline() if design is None else design, options), name)[0]
 
@@ -180,7 +185,7 @@ def verilog_and_unit(
     Raises
     ------
     OptionError
-        If the name is no Verilog identifier.
+        If the name is not a Verilog identifier.
     """
     if not re.fullmatch("[a-zA-Z][a-zA-Z0-9_]*", name):
         raise OptionError("name", name, "not a Verilog name", "use letters, digits and underscores")

@@ -67,7 +67,7 @@ def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
     if lobe.parts == 2:
         half = lobe.entries // 2
         parts = [
-            f"  these are {half} values; then as many of the same highlight by c = (N.H)^2 for s, "
+            f"  these are {half} values; then as many values of it over c = (N.H)^2 in place of s, "
             "from c = 0 on; last c = 1"
         ]
     return [
@@ -77,8 +77,8 @@ def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
         f"0, (1 + k / {steps}) 2^(r - {octaves + 1}) from row 1 on"
         + ("" if parts else f"; last {operand} = 1"),
         *parts,
-        "  each rounded to the nearest; between two of them the highlight is a straight line. The "
-        "example's are moved against that line's error by half of it, which halves it; S itself will do",
+        "  each rounded to the nearest; between two values the highlight is a straight line. The values "
+        "of the example are moved by half the error of this line, which halves the error; plain S also works",
         f"  of the example: {', '.join(map(str, table[:6]))}, ..., {', '.join(map(str, table[-4:]))}; entry "
         f"{lobe.entries // 2}: {table[1 + lobe.entries // 2]}",
     ]

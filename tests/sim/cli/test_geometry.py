@@ -64,7 +64,7 @@ def test_coarse_depth_test_in_verilog(capsys):
     options = ["--top", "render", "--method", "linear", "--coarse", "64x48", "--bus", "axi", "-o", "core.v"]
     assert main(["verilog", *options]) == 0
     assert "coarse depth test: pictures of at most 64x48, 384 words of 36 bits" in Path("core.v").read_text()
-    assert "Depths begin anew with each frame" in Path("core.v").read_text()
+    assert "Each frame clears the depths" in Path("core.v").read_text()
     assert "1: the next frame adds to the picture" in Path("core.md").read_text()
 
 
