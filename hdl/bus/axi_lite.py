@@ -40,10 +40,10 @@ class AxiLite(wiring.Signature):
 
 
 class AxiLiteUnit(wiring.Component):
-    """Adapter from AXI4-Lite to accesses, one at a time; reads and writes alternate when both wait.
+    """Adapter from AXI4-Lite to accesses, one at a time. If a read and a write wait, they take turns.
 
-    An address and a word each wait in a register; so every ready and every valid is a register, and no path
-    leads from one to another. A refused access is answered with SLVERR.
+    An address and a word each wait in a register. So every ready and every valid is a register, and no path
+    leads from one to another. A refused access gets the answer SLVERR.
 
     Members
     -------

@@ -1,4 +1,4 @@
-"""A core on a bus: AXI4-Stream for what it draws, AXI4-Lite or Wishbone for its registers."""
+"""A core on a bus: AXI4-Stream for its input and output, AXI4-Lite or Wishbone for its registers."""
 
 from amaranth.hdl import Cat, Module, Value
 from amaranth.lib import wiring
@@ -38,7 +38,7 @@ class AxiStream(wiring.Signature):
     size : int
         Bytes of TDATA.
     user : int
-        Bits of TUSER; 0: neither TUSER nor TKEEP.
+        Bits of TUSER. 0: neither TUSER nor TKEEP.
     """
 
     def __init__(self, size: int, user: int = 0):
@@ -51,8 +51,8 @@ class AxiStream(wiring.Signature):
 class BusUnit(wiring.Component):
     """A core on a bus: a `FramingUnit` for its streams and a `RegistersUnit` for its registers, connected.
 
-    Registers are written only while no frame is inside, so that constants never change within a frame. No
-    path leads from a ready to a valid; s_axis_tready may depend on s_axis_tvalid and the index of a material.
+    Registers are written only while no frame is inside. So constants never change within a frame. No path
+    leads from a ready to a valid. s_axis_tready may depend on s_axis_tvalid and the index of a material.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class BusUnit(wiring.Component):
     Members
     -------
     s_axis : :py:`In(AxiStream(...))`
-        Triangles or spans; TLAST ends a frame.
+        Triangles or spans. TLAST ends a frame.
     m_axis : :py:`Out(AxiStream(..., user=2))`
         Pixels or spans.
     s_axil : :py:`In(AxiLite())`
@@ -152,7 +152,7 @@ class BusUnit(wiring.Component):
 
 
 def core_of(design: ShadingPipeline) -> wiring.Component:
-    """The core that a design's `Build` asks for: one of `TOPS`, with its own streams or on a bus.
+    """The core of a design's `Build`: one of `TOPS`, with its own streams or on a bus.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Conversion between bytes of a bus and fields of a payload; the layout follows from the payload's shape."""
+"""Conversion between bytes of a bus and fields of a payload, in a layout that the payload's shape gives."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -16,15 +16,15 @@ def layout_of(
 ) -> ByteLayout:
     """Layout of the bytes of a payload.
 
-    A member of a nested structure is named by both names, with an underscore between; an array of structures
-    gives an index as the name of each.
+    The name of a member of a nested structure has both names, with an underscore between them. In an array of
+    structures the index is the name of each.
 
     Parameters
     ----------
     shape : ShapeLike
         Shape of the payload, a structure.
     without : sequence of str
-        Members that are elsewhere on the bus.
+        Members with another place on the bus.
     below : mapping of str to int, optional
         `Field.below` of fields by name.
     """
@@ -67,7 +67,7 @@ def _places(shape: ShapeLike, without: Sequence[str]) -> Iterator[tuple[Field, i
 
 
 def fields_of(shape: ShapeLike, word: Value) -> Value:
-    """Payload made from its bytes; padding bits are not read."""
+    """Payload made from its bytes, without padding bits."""
     parts, bit = [], 0
     for field, first, place in _places(shape, ()):
         assert first == bit, "a structure without gaps"

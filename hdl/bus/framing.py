@@ -1,4 +1,4 @@
-"""Framing: a core between streams of bytes, which tell where packets and frames begin and end."""
+"""Framing: a core between streams of bytes, which mark the start and end of packets and frames."""
 
 from amaranth.hdl import Const, Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
@@ -19,24 +19,24 @@ _SETTLES = 3
 
 
 def given_shape(layout: ByteLayout) -> data.StructLayout:
-    """Shape of a beat that goes in: bytes, and whether it is the last of its frame."""
+    """Shape of an incoming beat: bytes, and a flag of the last beat of its frame."""
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1})
 
 
 def made_shape(layout: ByteLayout) -> data.StructLayout:
-    """Shape of a beat that comes out: bytes; ``last`` of a packet; ``first`` and ``end`` of a frame."""
+    """Shape of an outgoing beat: bytes; ``last`` of a packet; ``first`` and ``end`` of a frame."""
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1, "first": 1, "end": 1})
 
 
 class FramingUnit(wiring.Component):
-    """A core between streams of bytes with the borders of frames: `Framing` is the bit-accurate model.
+    """A core between streams of bytes with the borders of frames. `Framing` is the bit-accurate model.
 
     A frame ends with a beat that has ``last``. No beat is accepted after it until the core is empty and the
-    frame's last beat has been accepted at the output, so that beats of two frames are never inside together,
-    and constants can change in between. One output beat is held back until the next one comes or the frame
-    ends: only then is it known whether it is the last. This costs 2 cycles of latency, and no throughput. A
-    frame without output gives no beat; ``frames`` counts it. Depths begin anew with each frame, unless the
-    constant ``keep`` is 1: then the frame adds to the picture of the one before it.
+    frame's last beat has been accepted at the output. So beats of two frames are never inside together, and
+    constants can change in between. One output beat is held back until the next beat comes or the frame ends,
+    because only then the last beat is known. This costs 2 cycles of latency, and no throughput. A frame
+    without output gives no beat; ``frames`` counts it. Depths begin anew with each frame. With 1 in the
+    constant ``keep`` the frame adds to the picture of the frame before it.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class FramingUnit(wiring.Component):
     o : :py:`Out(stream.Signature(made_shape(layout)))`
         Pixels or spans.
     write, constants, memory
-        Members of the core, if it has them; in place of ``picture`` the constants have ``keep``.
+        Members of the core, if it has them. In place of ``picture`` the constants have ``keep``.
     status : :py:`Out(...)`
-        Counters of the core; ``frames``, which have ended; ``misfits``, the beats with a number that did not
-        fit its field (its low bits were taken; of the index of a material past the last the last one); and
-        ``busy``.
+        Counters of the core; ``frames``, the number of ended frames; ``misfits``, the number of beats with a
+        number that outgrew its field; and ``busy``. Of a misfit the low bits are taken. For an index past the
+        last material the last material is taken.
 
     Source: docs/theory/bus.md#streams; not in the documents.
     """

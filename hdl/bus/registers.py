@@ -1,4 +1,4 @@
-"""The registers of a core: an answer for each access of a bus."""
+"""The registers of a core, with an answer for each access of a bus."""
 
 from amaranth.hdl import Const, Module, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
@@ -20,14 +20,14 @@ __all__ = ["RegistersUnit", "access_shape", "answer_shape", "front_members"]
 
 
 def access_shape() -> data.StructLayout:
-    """Shape of an access: byte address, whether it is a write, the word, and a strobe for each byte."""
+    """Shape of an access: byte address, a flag of a write, the word, and a strobe for each byte."""
     return data.StructLayout(
         {"address": ADDRESS_BITS, "write": 1, "data": WORD_BITS, "strobe": WORD_BITS // 8}
     )
 
 
 def answer_shape() -> data.StructLayout:
-    """Shape of an answer: the word read (0 for a write), and whether the access was refused."""
+    """Shape of an answer: the read word (0 for a write), and a flag of a refusal."""
     return data.StructLayout({"data": WORD_BITS, "error": 1})
 
 
@@ -41,12 +41,12 @@ def front_members(bus: wiring.Signature) -> dict[str, wiring.Member]:
 
 
 class RegistersUnit(wiring.Component):
-    """Registers behind a bus: `RegisterFile` is the bit-accurate model.
+    """Registers behind a bus. `RegisterFile` is the bit-accurate model.
 
-    An access is answered 2 cycles after it was accepted, and the next is accepted when the answer has been
-    taken. A refused access changes nothing but the registers ``errors`` and ``refused``. Registers of the
-    picture and frame constants are written while ``busy`` is low, as whole words. Bits of ``errors`` are
-    cleared at any time, by the bytes that are written, all ones included. A read of a byte gets its word.
+    An access is answered 2 cycles after it was accepted. The next is accepted when the answer has been taken.
+    A refused access changes only the registers ``errors`` and ``refused``. Registers of the picture and frame
+    constants are written while ``busy`` is low, as whole words. Bits of ``errors`` are cleared at any time,
+    by the written bytes, all ones included. A read of a byte gets its word.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class RegistersUnit(wiring.Component):
     constants : :py:`In(...)`
         State of the core: ``busy``, and its counters by name.
     picture : :py:`Out(...)`
-        Registers of the picture by name; only if there are any.
+        Registers of the picture by name, if there are any.
     load : :py:`Out(...)`
         A frame constant, written on the cycle on which ``valid`` is high.
 

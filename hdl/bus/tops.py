@@ -26,10 +26,10 @@ class Top:
     title : str
         Its input and its output, as in ``triangles to spans``.
     unit : callable
-        Makes the core from a `ShadingPipeline`; keywords go to the constructor of its unit.
+        Makes the core from a `ShadingPipeline`. Keywords go to the constructor of its unit.
     watch : callable
-        Makes a signal from the core, before it is elaborated: high while anything is inside, except a beat
-        that waits at ``o``.
+        Makes a signal from the core, before it is elaborated. The signal is high while anything is inside,
+        except a beat that waits at ``o``.
     """
 
     title: str

@@ -13,7 +13,7 @@ _WORD_ADDRESS_BITS = ADDRESS_BITS - 2
 
 
 class Wishbone(wiring.Signature):
-    """Signals of Wishbone B4 with words of 32 bits, seen from the initiator; addresses are those of words."""
+    """Signals of Wishbone B4 with words of 32 bits, seen from the initiator. Addresses count words."""
 
     def __init__(self):
         super().__init__(
@@ -35,11 +35,11 @@ class Wishbone(wiring.Signature):
 class WishboneUnit(wiring.Component):
     """Adapter from Wishbone to accesses, one at a time.
 
-    A request is taken on a cycle on which ``stall`` is low. From the next one on, up to and with the cycle of
-    ``ack`` or ``err``, ``stall`` is high: so a classic initiator, which keeps ``stb`` until it is answered,
-    asks once, and a pipelined one waits. Both need no other wiring; a classic one leaves ``stall`` open. An
-    initiator that ends the cycle before it is answered gets no answer, and a write may have been made.
-    ``ack``, ``err`` and ``stall`` are registers.
+    A request is taken on a cycle on which ``stall`` is low. From the next cycle to the cycle of ``ack`` or
+    ``err`` ``stall`` is high. So a classic initiator, which keeps ``stb`` until its answer, asks once, and a
+    pipelined initiator waits. Both need no other wiring. A classic initiator leaves ``stall`` open. An
+    initiator that ends the cycle before its answer gets no answer, and a write may have been made. ``ack``,
+    ``err`` and ``stall`` are registers.
 
     Members
     -------

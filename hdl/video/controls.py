@@ -12,11 +12,11 @@ __all__ = ["ControlsUnit"]
 
 
 class ControlsUnit(wiring.Component):
-    """Angle and list of each frame: `Controls` is the bit-accurate model.
+    """Angle and list of each frame. `Controls` is the bit-accurate model.
 
-    Buttons go through two flip-flops, and are sampled when a counter of all of them is full; a press is a
-    sample that is down after one that is up. Angle and list of a frame are valid from the cycle after
-    ``frame``, and change before the next ``frame`` only by a press. No multipliers.
+    Buttons go through two flip-flops, and are sampled when a common counter is full. A press is a sample that
+    is down after a sample that is up. Angle and list of a frame are valid from the cycle after ``frame`` on.
+    Before the next ``frame`` only a press changes them. The unit has no multipliers.
 
     Parameters
     ----------

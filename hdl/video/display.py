@@ -18,10 +18,10 @@ __all__ = ["DisplayUnit"]
 
 
 class DisplayUnit(wiring.Component):
-    """Bands, timing, three encoders and the serialiser of four lanes: `Display` is the bit-accurate model.
+    """Bands, timing, three encoders and the serialiser of four lanes. `Display` is the bit-accurate model.
 
-    Three clocks: ``sync`` draws, ``pixel`` shows, ``serial`` sends at five times the rate of ``pixel``.
-    Lane 0 is blue with both sync signals, lane 1 green, lane 2 red, lane 3 the pixel clock.
+    There are three clocks: ``sync`` draws, ``pixel`` shows, ``serial`` sends at five times the rate of
+    ``pixel``. Lane 0 is blue with both sync signals, lane 1 green, lane 2 red, lane 3 the pixel clock.
 
     Parameters
     ----------

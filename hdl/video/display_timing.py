@@ -1,4 +1,4 @@
-"""Display timing: which pixel a display shows on each cycle of the pixel clock, and its sync pulses."""
+"""Display timing: the pixel of a display on each cycle of the pixel clock, and its sync pulses."""
 
 from amaranth.hdl import Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, wiring
@@ -10,7 +10,7 @@ __all__ = ["DisplayTimingUnit", "timing_shape"]
 
 
 def timing_shape(mode: DisplayMode) -> data.StructLayout:
-    """Shape of a cycle of the pixel clock: position, whether it is in the picture, both sync signals."""
+    """Shape of a cycle of the pixel clock: position, a flag of the picture, both sync signals."""
     return data.StructLayout(
         {
             "x": unsigned((mode.horizontal.total - 1).bit_length()),
@@ -23,10 +23,10 @@ def timing_shape(mode: DisplayMode) -> data.StructLayout:
 
 
 class DisplayTimingUnit(wiring.Component):
-    """Two counters and the signals that follow from them: `DisplayTiming` is the bit-accurate model.
+    """Two counters and the signals that follow from them. `DisplayTiming` is the bit-accurate model.
 
-    Free-running: the display never waits. A position each cycle; the first cycle after the reset is the
-    model's cycle 0. No multipliers. Its clock is the pixel clock.
+    The unit runs freely, because the display never waits. It gives a position each cycle. The first cycle
+    after the reset is the model's cycle 0. The unit has no multipliers. Its clock is the pixel clock.
 
     Parameters
     ----------

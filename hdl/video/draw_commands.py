@@ -19,17 +19,17 @@ def command_shape() -> data.StructLayout:
 
 
 def walk_request_shape(commands: int) -> data.StructLayout:
-    """Shape of a request for a walk: start address of the list, and whether it is a frame's first band."""
+    """Shape of a request for a walk: start address of the list, and a flag of a frame's first band."""
     bits = max((commands - 1).bit_length(), 1)
     return data.StructLayout({"start": unsigned(bits), "first_band": unsigned(1)})
 
 
 class DrawCommandsUnit(wiring.Component):
-    """Walks a list from its start to its end: `DrawCommands` is the bit-accurate model.
+    """Walks a list from its start to its end. `DrawCommands` is the bit-accurate model.
 
-    A word a cycle is read; commands for a frame's first band are left out in other bands. The first command
-    is offered two cycles after the request was accepted, and the next request accepted after the end was
-    taken. No multipliers.
+    The unit reads a word a cycle. In other bands it leaves out commands for a frame's first band. The first
+    command is offered two cycles after the request was accepted. The next request is accepted after the end
+    was taken. The unit has no multipliers.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class DrawCommandsUnit(wiring.Component):
     i : :py:`In(stream.Signature(walk_request_shape(commands)))`
         Requests.
     o : :py:`Out(stream.Signature(command_shape()))`
-        Commands, up to and with the end.
+        Commands, with the end.
 
     Source: docs/theory/video.md#bands; [T] chapter 4.
     """

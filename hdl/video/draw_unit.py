@@ -26,7 +26,7 @@ from blysk.hdl.video.vertex_unit import VertexUnit, matrix_shape
 __all__ = ["STATUS", "DrawUnit", "band_shape", "drawn_band_pixel_shape"]
 
 STATUS = (*COUNTERS, *RENDERED, "frames", "bands", "busy")
-"""Counters of `DrawUnit`: those of the assembly and of the renderer; frames and bands begun; busy cycles."""
+"""Counters of `DrawUnit`: of the assembly and of the renderer; begun frames and bands; busy cycles."""
 
 
 def band_shape(bands: int):
@@ -41,15 +41,19 @@ def drawn_band_pixel_shape(x_bits: int, y_bits: int) -> data.StructLayout:
 
 
 class DrawUnit(wiring.Component):
-    """Draws bands on request: `Drawing` is the bit-accurate model.
+    """Draws bands on request. `Drawing` is the bit-accurate model.
 
-    A band begins a frame if its index is not larger than that of the band before: the controls move on, the
-    vertices of all meshes are transformed, and the constants written. After that (in other bands at once) the
-    list's triangles are read, and those in the band are drawn. When the last pixel has left, ``done`` gives
-    the band's index; then the depths are cleared, before the next request is accepted.
+    A band begins a frame if its index is at most the index of the band before. The controls then move on, the
+    vertices of all meshes are transformed, and the constants written. Then, and in other bands at once, the
+    list's triangles are read, and the triangles in the band are drawn. When the last pixel has left, ``done``
+    gives the band's index. Then the depths are cleared, before the next request is accepted.
 
-    A frame takes, beside the renderer's cycles: three for a triangle and a band; 30 for a vertex; 150 for a
-    mesh; `BandDepth.swept` for a band where the next one is asked for at once.
+    Beside the renderer's cycles a frame takes
+
+    - three cycles for a triangle and a band;
+    - 30 for a vertex;
+    - 150 for a mesh;
+    - `BandDepth.swept` for a band, if the next band is requested at once.
 
     Parameters
     ----------
@@ -59,11 +63,11 @@ class DrawUnit(wiring.Component):
     Members
     -------
     request : :py:`In(stream.Signature(band_shape(bands)))`
-        Bands to draw, from 0 on; some may be left out.
+        Bands to draw, from 0 on. Some may be left out.
     done : :py:`Out(stream.Signature(band_shape(bands)))`
-        Bands of which every pixel has been taken.
+        Bands whose pixels have all been taken.
     pixels : :py:`Out(stream.Signature(drawn_band_pixel_shape(x_bits, y_bits)))`
-        Pixels of the band asked for last; later ones count over earlier ones.
+        Pixels of the last requested band. At a place the last pixel counts.
     buttons : :py:`In(4)`
         See `ControlsUnit`.
     status : :py:`Out(counters_shape(*STATUS))`

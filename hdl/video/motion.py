@@ -32,9 +32,9 @@ def entry_shape() -> data.StructLayout:
 
 
 class MotionUnit(wiring.Component):
-    """Computes a matrix, one entry after the other: `Motion` is the bit-accurate model.
+    """Computes a matrix, one entry after the other. `Motion` is the bit-accurate model.
 
-    A matrix takes three cycles for cosine and sine, then seven an entry. One multiplier.
+    A matrix takes three cycles for cosine and sine, then seven an entry. The unit has one multiplier.
 
     Parameters
     ----------

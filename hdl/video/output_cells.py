@@ -12,9 +12,9 @@ __all__ = ["OutputCells"]
 class OutputCells(wiring.Component):
     """A cell a lane that sends bit 0 of a pair in the first half of a cycle, bit 1 in the second.
 
-    With ports it is the FPGA's own cell, by Amaranth's `DDRBuffer`: ``ODDRX1F`` on ECP5. Without ports it is
-    a model of that cell: ``bits`` has on each cycle the pair that the pins send, two cycles after it was
-    given, as with ``ODDRX1F``. Its clock is the domain ``serial``.
+    With ports it is the FPGA's own cell, by Amaranth's `DDRBuffer`, ``ODDRX1F`` on ECP5. Without ports it is
+    a model of this cell. On each cycle ``bits`` has the pair that the pins send, two cycles after its input,
+    as with ``ODDRX1F``. Its clock is the domain ``serial``.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class OutputCells(wiring.Component):
     pairs : :py:`In(data.ArrayLayout(2, lanes))`
         Pairs to send.
     bits : :py:`Out(data.ArrayLayout(2, lanes))`
-        Pairs that are sent; only without ports.
+        Sent pairs. Only without ports.
 
     Source: docs/theory/video.md#tmds.
     """

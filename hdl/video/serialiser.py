@@ -12,10 +12,10 @@ __all__ = ["SerialiserUnit"]
 
 
 class SerialiserUnit(wiring.Component):
-    """Sends each word as five pairs of bits: `Serialiser` is the bit-accurate model.
+    """Sends each word as five pairs of bits. `Serialiser` is the bit-accurate model.
 
-    A word every 5 cycles; its first pair leaves a cycle after it was taken in. Its clock is the serial clock.
-    No multipliers.
+    The unit takes a word every 5 cycles. Its first pair leaves a cycle after it was taken in. The clock is
+    the serial clock. The unit has no multipliers.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class SerialiserUnit(wiring.Component):
     i : :py:`In(stream.Signature(data.ArrayLayout(10, lanes)))`
         Words.
     o : :py:`Out(stream.Signature(data.ArrayLayout(2, lanes)))`
-        Pairs of bits; bit 0 is sent first.
+        Pairs of bits. Bit 0 is sent first.
 
     Source: docs/theory/video.md#tmds.
     """

@@ -13,9 +13,10 @@ SYMBOL = data.StructLayout({"data": 8, "control": 2, "active": 1})
 
 
 class TmdsEncoderUnit(PipelinedUnit):
-    """Ten bits for a byte or a control period: `TmdsEncoder` is the bit-accurate model.
+    """Ten bits for a byte or a control period. `TmdsEncoder` is the bit-accurate model.
 
-    A word a cycle, 3 cycles later: XOR or XNOR; the excess of ones; the balance. No multipliers.
+    The unit gives a word a cycle, 3 cycles after its input: XOR or XNOR; the excess of ones; the balance. It
+    has no multipliers.
 
     Parameters
     ----------
@@ -27,7 +28,7 @@ class TmdsEncoderUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(SYMBOL))`
         Bytes or control bits to send.
     o : :py:`Out(stream.Signature(10))`
-        The word; bit 0 is to be sent first.
+        The word. Bit 0 has to be sent first.
 
     Attributes
     ----------

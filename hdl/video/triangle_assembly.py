@@ -26,11 +26,11 @@ def band_rows_shape() -> data.StructLayout:
 
 
 class TriangleAssemblyUnit(wiring.Component):
-    """Keeps vertices of a frame, makes triangles from them: `TriangleAssembly` is the bit-accurate model.
+    """Keeps vertices of a frame, makes triangles from them. `TriangleAssembly` is the bit-accurate model.
 
-    A triangle takes three cycles, one for each corner that is read, whether it is sent or not; it is offered
-    `latency` cycles after its first corner's address. A range is accepted while none is read, and costs two
-    cycles more. No multipliers.
+    A triangle takes three cycles, one for each corner that is read, also if it is not sent. It is offered
+    `latency` cycles after its first corner's address. A range is accepted while no other is read, and costs
+    two cycles more. The unit has no multipliers.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ class TriangleAssemblyUnit(wiring.Component):
     i : :py:`In(stream.Signature(draw_shape()))`
         Ranges of triangles.
     o : :py:`Out(stream.Signature(triangle_shape(grid)))`
-        The triangles to be drawn.
+        The triangles to draw.
     write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid)}))`
         Vertices of the frame, one a cycle, while no triangle is read.
     constants : :py:`In(band_rows_shape())`
-        The band; constant while triangles are read.
+        The band, constant while triangles are read.
     status : :py:`Out(counters_shape(*COUNTERS))`
         Counters since the reset.
 

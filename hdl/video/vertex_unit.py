@@ -47,9 +47,9 @@ def screen_vertex_shape(grid: Grid = GRID) -> data.StructLayout:
 
 
 class VertexUnit(PipelinedUnit):
-    """Transforms vertices: `VertexTransform` is the bit-accurate model.
+    """Transforms vertices. `VertexTransform` is the bit-accurate model.
 
-    The latency is the attribute ``latency``; with one multiplier the initiation interval is 30 cycles.
+    The latency is the attribute ``latency``. With one multiplier the initiation interval is 30 cycles.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class VertexUnit(PipelinedUnit):
     index_bits : int
         Bits of the index that goes with a vertex.
     initiation_interval : int
-        Cycles from a vertex to the next, 15 or more: 15 takes two multipliers.
+        Cycles from a vertex to the next, 15 or more. 15 takes two multipliers.
 
     Members
     -------
@@ -67,7 +67,7 @@ class VertexUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(data.StructLayout({"index", "vertex": screen_vertex_shape(grid)})))`
         The same vertices on the screen.
     constants : :py:`In(matrix_shape())`
-        The matrix; constant while vertices are inside.
+        The matrix, constant while vertices are inside.
 
     Source: docs/theory/video.md#vertices; not in the documents.
     """

@@ -11,10 +11,11 @@ __all__ = ["WordCrossing"]
 class WordCrossing(wiring.Component):
     """Brings a word of each ``pixel`` cycle into the domain ``serial``, where every fifth cycle is valid.
 
-    A bit that toggles with each word goes through two flip-flops; its first edge sets a counter of five
-    cycles. Later edges may come a cycle early or late, where the edges of both clocks lie close together,
-    without moving it: every word is taken at the same distance from its edge, two or three cycles.
-    Constraint: the words' paths take less than two periods of the serial clock; they stay for five.
+    A bit that toggles with each word goes through two flip-flops. Its first edge sets a counter of five
+    cycles. If the edges of both clocks lie close together, later edges may come a cycle early or late. They
+    do not move the counter. So every word is taken at the same distance from its edge, two or three cycles.
+    The constraint is that the words' paths take less than two periods of the serial clock. The words stay for
+    five.
 
     Both clocks come from one source, at 1 : 5. The phase does not matter.
 
@@ -28,7 +29,7 @@ class WordCrossing(wiring.Component):
     i : :py:`In(shape)`
         Domain ``pixel``.
     o, valid : :py:`Out(shape)`, :py:`Out(1)`
-        Domain ``serial``: the word, and the cycle on which it is to be taken.
+        Domain ``serial``: the word, and the cycle on which it has to be taken.
 
     Source: docs/theory/video.md#tmds.
     """
