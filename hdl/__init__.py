@@ -1,1 +1,1 @@
-"""Hardware layer: Amaranth components. Constants come from `golden`; meshes and engines are unknown here."""
+"""Hardware layer: Amaranth components. Constants come from `golden`. Meshes and engines are unknown here."""

@@ -28,7 +28,7 @@ def write_shape() -> data.StructLayout:
 
 
 def existing_material(index: Value, materials: int) -> Value:
-    """Index of a material: one past the last is that of the last."""
+    """Index of a material. An index past the last material counts as the last."""
     return index if materials == 1 << len(index) else Mux(index >= materials, materials - 1, index)
 
 
@@ -62,10 +62,10 @@ def frame_constants_shape(lights: int, threshold: Format | None = None, banks: i
 class FrameConstantsUnit(wiring.Component):
     """Registers for the constants of a frame, one word a write.
 
-    A write is accepted on a cycle on which ``hold`` is low. Words are 18 bits; the low bits count where the
-    constant is shorter. A write to any other address is accepted, too, and changes nothing. Reset clears
-    every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are accepted and shade by the
-    same formula, outside the stated error.
+    A write is accepted on a cycle on which ``hold`` is low. Words have 18 bits; of a shorter constant the low
+    bits count. A write to any other address is accepted, too, and changes nothing. Reset clears every
+    constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are accepted and shade by the same
+    formula, outside the stated error.
 
     ======================== ==========================================================
     address                  constant
@@ -83,10 +83,11 @@ class FrameConstantsUnit(wiring.Component):
     ======================== ==========================================================
 
     A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
-    the colours are in memories, one for each word, written for the material whose index was last written to
-    address 4 and read for ``material``: 1 cycle after ``material`` changes, and 3 after a write. All 18 bits
-    of an index count: writes for an index past the last material are lost, and so is a bank past the last
-    one. A unit of one material has no index: address 4 changes nothing. Memories are not cleared by reset.
+    the colours are in memories, one for each word. They are written for the material whose index was last
+    written to address 4. They are read for ``material``, 1 cycle after ``material`` changes, and 3 after a
+    write. All 18 bits of an index count. Writes for an index past the last material are lost, and so is a
+    bank past the last bank. A unit of one material has no index, and address 4 changes nothing. Reset does
+    not clear memories.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ class FrameConstantsUnit(wiring.Component):
     materials : int
         Number of materials, 1 to `MAX_MATERIALS`.
     threshold : Format or None
-        Format of a threshold for each material, see `ShadingPipeline.threshold_of`. ``None``: there is none.
+        Format of a threshold for each material, see `ShadingPipeline.threshold_of`. ``None``: no threshold.
     banks : int
         Number of tables of lobes that materials choose from.
 
@@ -111,7 +112,7 @@ class FrameConstantsUnit(wiring.Component):
     hold : :py:`In(1)`
         Whether no write is accepted.
     material : :py:`In(range(materials))`
-        Only with several materials: index of the material whose constants are given.
+        Only with several materials: index of the material of the given constants.
     constants : :py:`Out(frame_constants_shape(lights, threshold, banks))`
         The constants.
 

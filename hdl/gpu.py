@@ -19,9 +19,9 @@ STATUS = (*DRAWN, "late_bands", "frames_shown")
 
 
 class GpuUnit(wiring.Component):
-    """Draws a mesh and shows it, by a `DrawUnit` and a `DisplayUnit`: `Gpu` is the bit-accurate model.
+    """Draws a mesh and shows it, by a `DrawUnit` and a `DisplayUnit`. `Gpu` is the bit-accurate model.
 
-    Three clocks, see `DisplayUnit`. Pixels are drawn as fast as they come, and shown a band later.
+    There are three clocks, see `DisplayUnit`. Pixels are drawn as fast as they come, and shown a band later.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class GpuUnit(wiring.Component):
     Members
     -------
     buttons : :py:`In(4)`
-        See `ControlsUnit`; from any clock.
+        See `ControlsUnit`. From any clock.
     pairs : :py:`Out(data.ArrayLayout(2, 4))`
         Domain ``serial``, see `DisplayUnit`.
     status : :py:`Out(counters_shape(*STATUS))`

@@ -26,10 +26,11 @@ __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 
 
 def span_shape(model: ShadingPipeline) -> data.StructLayout:
-    """Shape of a raster span: first pixel, pixels, and what the method takes.
+    """Shape of a raster span: first pixel, pixels, and the operands of the method.
 
-    Unit normals at the first and last pixel centre; the ends of the true line; values of each light; or
-    vectors N/W with their steps. Without lights there are none. ``material`` is there with several materials.
+    The operands are unit normals at the first and last pixel centre, the ends of the true line, values of
+    each light, or vectors N/W with their steps. Without lights there are no operands. With several materials
+    there is ``material``.
 
     Parameters
     ----------
@@ -58,9 +59,10 @@ def span_shape(model: ShadingPipeline) -> data.StructLayout:
 def status_shape() -> data.StructLayout:
     """Shape of the pipeline's counters since reset, which stop at their largest value.
 
-    ``out_of_range_spans``: spans whose angle the method does not serve, so that their pixels have no error
-    bound; counted some cycles after the span is accepted. ``empty_spans``: spans of length 0. ``overrun``:
-    whether a span went past the largest x, after which x goes on from 0.
+    - ``out_of_range_spans``: spans with a larger angle than the method serves. Their pixels have no error
+    bound. They are counted some cycles after the span is accepted.
+    - ``empty_spans``: spans of length 0.
+    - ``overrun``: whether a span went past the largest x. After it x goes on from 0.
     """
     return data.StructLayout(
         {
@@ -74,39 +76,48 @@ def status_shape() -> data.StructLayout:
 class ShadingPipelineUnit(wiring.Component):
     """Shading pipeline of a design: any method, any reflection model, any number of lights.
 
-    An interpolator takes spans to the operands of their pixels; a light unit for each light takes these to
-    terms, and the intensity unit to colours. The setup of the next spans overlaps the pixels of this one; a
-    FIFO carries the coordinates of the spans past both. `ShadingPipeline` is the bit-accurate model.
+    An interpolator takes spans to the operands of their pixels. A light unit for each light takes operands to
+    terms, and the intensity unit takes terms to colours. The setup of the next spans overlaps the pixels of
+    this span. A FIFO carries the coordinates of the spans past both. `ShadingPipeline` is the bit-accurate
+    model.
 
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
     each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles, and in the
-    throughput style at least ``cycles_per_pixel length``: the fewest if it is short and follows a long one,
-    as up to two prepared spans wait before the accumulator. (``bisection`` takes longer where it has several
-    segments.) A span of length 0 is accepted like any other and gives no pixel.
+    throughput style at least ``cycles_per_pixel length``. A short span that follows a long span takes the
+    fewest, because up to two prepared spans wait before the accumulator. (``bisection`` takes longer for
+    several segments.) A span of length 0 is accepted like any other and gives no pixel.
 
     With a gate a highlight gate processes each span in parallel with the interpolator, and decides for each
-    light whether the span has no highlight: then the specular unit of the light keeps its state, or in the
-    compact style is bypassed. The gate accepts spans as often as the setup does. A decision precedes the
-    first pixel of its span, or the pixel waits for it: a method whose setup is shorter than the gate, such as
+    light. If the span has no highlight, the specular unit of the light keeps its state, or in the compact
+    style is bypassed. The gate accepts spans as often as the setup does. A decision precedes the first pixel
+    of its span, or the pixel waits for the decision. So a method with a shorter setup than the gate, such as
     ``linear``, may take a cycle more for short spans.
 
-    Without lights there is neither interpolator nor multiplier; every pixel has the ambient colour.
+    Without lights there is neither interpolator nor multiplier. Every pixel has the ambient colour.
 
-    In the *compact* style there is one multiplier for the colours, one for the specular terms of each light,
-    two for its products with a normal (if the method finds normals), and one or two for the setup (as many as
-    its longest interval needs). ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for
-    the setup. A pixel takes a cycle a channel for each of its diffuse and specular terms
-    that is not 0, and for one term at least; or, if a light is in front and the span not dark, as many cycles
-    as the specular model has products (a power 42), if those are more. So pixels without a highlight take
-    fewer cycles. The pixels are the same to the bit.
-    ``cycles_per_pixel`` and ``latency`` are then those of a pixel with every term.
+    In the *compact* style there are these multipliers:
 
-    A write is accepted when no span is inside, and no span is accepted while a write waits, so the constants
-    never change while spans are inside: ``i.ready`` falls on the cycle on which ``write.valid`` rises, and
+    - one for the colours;
+    - one for the specular terms of each light;
+    - two for the products of each light with a normal, if the method finds normals;
+    - one or two for the setup, as many as its longest interval needs.
+
+    ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for the setup. A pixel takes the
+    larger of two numbers of cycles:
+
+    - a cycle a channel for each of its diffuse and specular terms that is not 0, and for one term at least;
+    - if a light is in front and the span not dark, a cycle for each product of the specular model (a power
+      42).
+
+    So pixels without a highlight take fewer cycles. The pixels are the same to the bit. ``cycles_per_pixel``
+    and ``latency`` are then those of a pixel with every term.
+
+    A write is accepted when no span is inside, and no span is accepted while a write waits. So the constants
+    never change while spans are inside. ``i.ready`` falls on the cycle on which ``write.valid`` rises, and
     rises 2 cycles after the last write was accepted. For the same reason a span of another material than the
-    one before it waits until no span is inside: it is accepted 5 cycles after the last pixel has left, and
-    its first pixel comes ``latency + 5`` cycles after that one, where without the change it comes 1 cycle
-    after. Sort spans by material.
+    span before it waits until no span is inside. It is accepted 5 cycles after the last pixel has left. Its
+    first pixel comes ``latency + 5`` cycles after this last pixel, in place of 1 cycle without the change.
+    Sort spans by material.
 
     Parameters
     ----------
@@ -116,7 +127,7 @@ class ShadingPipelineUnit(wiring.Component):
     Raises
     ------
     ValueError
-        If the method is not built for the setup interval.
+        If the method cannot be built for the setup interval.
 
     Members
     -------
@@ -132,7 +143,8 @@ class ShadingPipelineUnit(wiring.Component):
     Attributes
     ----------
     direction : View
-        Of `normal_shape`: the constant L of the first light, for what makes vectors for highlights of R·V.
+        In `normal_shape`: the constant L of the first light, for units that make vectors for highlights of
+        R·V.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """

@@ -16,7 +16,7 @@ def coordinates_shape(x_bits: int = 12, y_bits: int = 12, length_bits: int = 12)
 
 
 def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
-    """Shape of a pixel: coordinates, colour, and whether it is the last of its span."""
+    """Shape of a pixel: coordinates, colour, and a flag of the last pixel of its span."""
     return data.StructLayout(
         {
             "x": unsigned(x_bits),
@@ -30,10 +30,11 @@ def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 
 
 class PixelAssemblerUnit(wiring.Component):
-    """Joins the streams of colours and of spans' coordinates; counts x along the span and marks its end.
+    """Joins the streams of colours and of spans' coordinates, counts x along the span and marks its end.
 
-    A colour leaves as a pixel 1 cycle after it was accepted, and one is accepted on every cycle, if its
-    coordinates came a cycle before. Coordinates are accepted ahead of their colours. No multipliers.
+    A colour leaves as a pixel 1 cycle after it was accepted. A colour is accepted on every cycle, if its
+    coordinates came a cycle before. Coordinates are accepted ahead of their colours. The unit has no
+    multipliers.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class PixelAssemblerUnit(wiring.Component):
     """Cycles from coordinates to their first pixel, if the colour waits."""
 
     SPANS_INSIDE = 4
-    """Spans inside at most: coordinates of two, and two pixels that wait."""
+    """Largest number of spans inside: coordinates of two, and two waiting pixels."""
 
     def __init__(self, x_bits: int = 12, y_bits: int = 12, length_bits: int = 12):
         super().__init__(

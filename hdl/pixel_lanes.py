@@ -11,7 +11,7 @@ __all__ = ["PixelLanesUnit", "lanes_shape"]
 
 
 def lanes_shape(pipes: int, x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
-    """Shape of a wide beat: a pixel for each lane, and in ``present`` a bit for each lane that has one.
+    """Shape of a wide beat: a pixel for each lane, and in ``present`` a bit for each lane with a pixel.
 
     Parameters
     ----------
@@ -25,10 +25,11 @@ def lanes_shape(pipes: int, x_bits: int = 12, y_bits: int = 12) -> data.StructLa
 
 
 class PixelLanesUnit(wiring.Component):
-    """Joins several streams of pixels into beats of a pixel a lane; a lane may have none.
+    """Joins several streams of pixels into beats of at most a pixel a lane.
 
-    A pixel leaves 1 cycle after it was accepted, and every lane accepts one on every cycle without stalls:
-    no lane waits for another. The payload of a lane without a pixel has no meaning. No multipliers.
+    A pixel leaves 1 cycle after it was accepted. Without stalls every lane accepts a pixel on every cycle,
+    and no lane waits for another. The payload of a lane without a pixel has no meaning. The unit has no
+    multipliers.
 
     Parameters
     ----------

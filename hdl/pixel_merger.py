@@ -16,8 +16,8 @@ __all__ = ["PixelMergerUnit"]
 class PixelMergerUnit(wiring.Component):
     """Takes spans of pixels from several streams in turns, and gives one stream, a pixel a cycle.
 
-    A turn is the index of an input: the pixels of one span are taken from it, up to the one that is the last
-    of its span. A pixel leaves 1 cycle after it was accepted. No multipliers.
+    A turn is the index of an input. The pixels of one span are taken from this input, up to the last pixel of
+    the span. A pixel leaves 1 cycle after it was accepted. The unit has no multipliers.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class PixelMergerUnit(wiring.Component):
     Members
     -------
     turns : :py:`In(stream.Signature(range(pipes)))`
-        The input of each span, of 1 pixel or more, in the order in which they are to leave.
+        The input of each span, of 1 pixel or more, in the order of the output.
     i : :py:`In(stream.Signature(pixel_shape(x_bits, y_bits))).array(pipes)`
         Pixels.
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`

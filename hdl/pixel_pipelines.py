@@ -29,10 +29,10 @@ __all__ = [
 WAITING_SPANS = 512
 """Spans that wait before a pipeline in a memory.
 
-Block RAMs hold 512 words, and a memory in look-up tables of 32 words takes more logic than the block RAMs'
-ports. If the spans of a mesh have about as many pixels as there are pipelines, the span port has no cycle to
-spare, and each cycle on which a full FIFO stops it is lost: for the 10,712 triangles of the teapot at 640x480
-four pipelines give 3.3 times the pixels of one with 32 words, and 3.6 times with 512.
+Block RAMs hold 512 words. A memory of 32 words in look-up tables takes more logic than the block RAMs' ports.
+If the spans of a mesh have about as many pixels as there are pipelines, the span port has no cycle to spare.
+Each cycle on which a full FIFO stops it is then lost. For the 10,712 triangles of the teapot at 640x480 four
+pipelines give 3.3 times the pixels of one pipeline with 32 words, and 3.6 times with 512.
 """
 
 
@@ -58,24 +58,24 @@ _BEHIND = 2
 
 
 class PixelPipelinesUnit(wiring.Component):
-    """Shading pipelines of one design; pipeline k takes the spans of scanlines y with ``y mod pipes = k``.
+    """Shading pipelines of one design. Pipeline k takes the spans of scanlines y with ``y mod pipes = k``.
 
-    Each has a stream of pixels of its own, with its own back-pressure, so that as many pixels leave on a
-    cycle as there are pipelines. `PixelPipelines` is the bit-accurate model. A scanline belongs to one
-    pipeline: its pixels keep the order of its spans. Between scanlines no order holds.
+    Each has a stream of pixels of its own, with its own back-pressure. So a pixel of each pipeline may leave
+    on a cycle. `PixelPipelines` is the bit-accurate model. A scanline belongs to one pipeline, so its pixels
+    keep the order of its spans. Between scanlines no order holds.
 
-    One span is accepted a cycle, into the FIFO before its pipeline; a full FIFO stops the port. So the pixels
-    a cycle are at most the mean number of pixels of a span, and fewer where many spans in a row go to one
-    pipeline. Spans triangle by triangle, which go from scanline to scanline, keep all pipelines busy; a frame
-    sorted by scanlines keeps only one busy if a scanline has more spans than a FIFO holds.
+    One span is accepted a cycle, into the FIFO before its pipeline. A full FIFO stops the port. So the pixels
+    a cycle are at most the mean number of pixels of a span. They are fewer where many spans in a row go to
+    one pipeline. Spans triangle by triangle go from scanline to scanline, and keep all pipelines busy. A
+    frame sorted by scanlines keeps only one pipeline busy if a scanline has more spans than a FIFO holds.
 
     A write goes to all pipelines. It is accepted when no span is inside, in a FIFO or a pipeline, and no span
     is accepted while a write waits. The first pixel leaves an idle unit `latency` cycles after its span was
     accepted. Every pipeline has its own frame constants, and at a change of the material waits only for its
     own spans.
 
-    Counters of ``status`` are the sums of those of the pipelines and stop at their largest value, like those
-    of one pipeline; they come a cycle later for each doubling of the pipelines.
+    Counters of ``status`` are the sums of the pipelines' counters. Like these they stop at their largest
+    value. They come a cycle later for each doubling of the pipelines.
 
     Parameters
     ----------
@@ -196,9 +196,9 @@ class _JoinedPipelines(wiring.Component):
 
 
 class WidePipelinesUnit(_JoinedPipelines):
-    """`PixelPipelinesUnit` with one wide stream of pixels, a lane for each pipeline: for simulation.
+    """`PixelPipelinesUnit` with one wide stream of pixels, a lane for each pipeline, for simulation.
 
-    A pipeline waits for no other; the first pixel leaves an idle unit `latency` cycles after its span was
+    A pipeline waits for no other. The first pixel leaves an idle unit `latency` cycles after its span was
     accepted.
 
     Parameters
@@ -233,9 +233,9 @@ class WidePipelinesUnit(_JoinedPipelines):
 
 
 class MergedPipelinesUnit(_JoinedPipelines):
-    """`PixelPipelinesUnit` with one stream of pixels, in the order of the spans: that of one pipeline.
+    """`PixelPipelinesUnit` with one stream of pixels, in the order of the spans, as of one pipeline.
 
-    It gives a pixel a cycle at most, so that several pipelines gain speed only if each takes several cycles a
+    It gives at most a pixel a cycle. So several pipelines gain speed only if each takes several cycles a
     pixel, as in the compact style.
 
     Parameters

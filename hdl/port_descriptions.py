@@ -1,4 +1,4 @@
-"""What each port of a shading pipeline carries, for the table in its Verilog."""
+"""Descriptions of the ports of a shading pipeline, for the table in its Verilog."""
 
 __all__ = ["COUNTER_TEXTS", "PORT_DESCRIPTIONS"]
 
@@ -19,7 +19,7 @@ COUNTER_TEXTS = {
     "frames": "completed frames",
     "misfits": "beats with a number that did not fit its field; low bits were taken, or the last material",
 }
-"""What each counter of a core counts, by its field in ``status``."""
+"""Description of each counter of a core, by its field in ``status``."""
 
 PORT_DESCRIPTIONS = {
     "i_x": "column of the span's first pixel",

@@ -68,28 +68,28 @@ _COMPONENTS = 3
 """Components of a vector of geometry."""
 
 WAITING_SPANS = 512
-"""Spans between geometry and shading, in block RAMs; compact only of vectors.
+"""Spans between geometry and shading, in block RAMs. In the compact style only spans of vectors wait there.
 
-Shading works on these while small triangles are set up, or spans are cut; while it has large ones, the setup
-goes on.
+Shading works on these spans while small triangles are set up, or spans are cut. While shading has large
+spans, the setup goes on.
 """
 
 
 class RendererUnit(wiring.Component):
-    """Triangles to the pixels that are to be written: `Renderer` is the bit-accurate model.
+    """Triangles to the pixels to write. `Renderer` is the bit-accurate model.
 
-    `GeometryUnit`, `ShadingPipelineUnit` and `DepthTesterUnit` in a row; spans wait between the first two in
-    a FIFO (compact without vectors or a coarse test: one in a register), and their depths pass the pipeline
-    in another. With a coarse depth test a span also waits in the FIFO for the test's answer, and then leaves,
-    or is dropped in one cycle. The units work at the same time: a frame takes as many cycles as the slowest
-    of them alone, if none waits for long. The design's `Build` has the styles, the lanes of triangle setup
-    and the coarse test.
+    The unit has `GeometryUnit`, `ShadingPipelineUnit` and `DepthTesterUnit` in a row. Spans wait between the
+    first two in a FIFO. (In the compact style without vectors and coarse test one span waits in a register.)
+    Their depths pass the pipeline in another FIFO. With a coarse depth test a span also waits in the FIFO for
+    the test's answer. Then it leaves, or is dropped in one cycle. The units work at the same time. If none
+    waits for long, a frame takes as many cycles as the slowest unit alone. The design's `Build` has the
+    styles, the lanes of triangle setup and the coarse test.
 
-    Frame constants are written while no span is inside; spans of another material than the one before wait
-    for the pipeline to be empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
-    highlights of R·V, `MirrorAdapterUnit` make the components of vectors that geometry does not have. The one
-    has its own memories for the axes of further lights, the other reads L of the first: write both before the
-    frame's first triangle.
+    Frame constants are written while no span is inside. Spans of another material than the span before wait
+    until the pipeline is empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
+    highlights of R·V, `MirrorAdapterUnit` make the components of vectors that geometry does not have.
+    `LightAdapterUnit` has its own memories for the axes of further lights. `MirrorAdapterUnit` reads L of the
+    first light. Write both before the frame's first triangle.
 
     Parameters
     ----------
@@ -99,28 +99,28 @@ class RendererUnit(wiring.Component):
         As for `DepthTesterUnit`.
     clears : bool
         Whether the memory of depths is cleared for each picture, see `DepthTesterUnit`. Else the unit is
-        right for one picture, unless the memory outside is cleared between two.
+        right for one picture, unless the memory outside is cleared between pictures.
 
     Members
     -------
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits)))`
-        Pixels to be written.
+        Pixels to write.
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants of the shading pipeline.
     constants : :py:`In(frame_shape())`
-        The picture's borders and options; constant while triangles are inside. With a coarse depth test, or
+        The picture's borders and options, constant while triangles are inside. With a coarse depth test, or
         if the unit clears, also a bit ``picture``, which changes from picture to picture.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
-        Depths so far; only without a ``size``.
+        Depths so far. Only without a ``size``.
 
     Attributes
     ----------
     idle : Signal
-        No triangle, span or pixel is inside; high from a cycle after the last has left.
+        No triangle, span or pixel is inside. High from a cycle after the last has left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """

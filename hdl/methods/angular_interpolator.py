@@ -18,8 +18,8 @@ class AngularInterpolatorUnit(InterpolatorUnit, model=AngularInterpolator):
     """Angular setup and highlight cosine in series, for L and for H of each light in parallel.
 
     `AngularInterpolator` is the bit-accurate model. All series are equal and have the same input and the same
-    ready of the output, so they are in the same state on every cycle, and the handshake of one is that of
-    all. Two multipliers a vector, and those of the angular setup.
+    ready of the output. So they are in the same state on every cycle, and the handshake of one series stands
+    for all. There are two multipliers a vector, and the multipliers of the angular setup.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class AngularInterpolatorUnit(InterpolatorUnit, model=AngularInterpolator):
     lights : int
         Number of lights, at least 1.
     options
-        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 6.
+        As for `InterpolatorUnit`, with a ``setup_interval`` of 1 to 6.
 
     Source: docs/theory/interpolation.md#angular-method; [T] 3.1, 3.2.
     """

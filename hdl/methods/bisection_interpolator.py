@@ -16,9 +16,9 @@ EMPTY_SEGMENT_CYCLES = 3
 
 
 class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpolator):
-    """The adaptive normaliser; `BisectionInterpolator` is the bit-accurate model.
+    """The adaptive normaliser. `BisectionInterpolator` is the bit-accurate model.
 
-    `latency` and `setup_interval` are those of a span of one segment; more segments take longer (see
+    `latency` and `setup_interval` are those of a span of one segment. More segments take longer (see
     `AdaptiveNormaliserUnit`).
 
     Parameters
@@ -40,7 +40,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpola
         self.setup_interval = self._normaliser.interval(0)
 
     def span_intervals(self, spans):
-        """Those of spans of several segments are longer.
+        """Intervals of spans of several segments are longer.
 
         A span's levels are counted while the previous span is divided.
         """

@@ -29,7 +29,7 @@ _LONG = 3
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
-    """Accumulators of ``N . L`` and u of each light, and of factors, a quadratic each; see `AccumulatorUnit`.
+    """Accumulators of ``N . L`` and u of each light, and of factors, a quadratic each, see `AccumulatorUnit`.
 
     The words of a span come a cycle after it was accepted.
 
@@ -44,17 +44,17 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     gated : bool
         Whether spans bring a gate's decision for each light, ``lit``.
     factors : sequence of int
-        Indices of the lights that fade, which have a quadratic more.
+        Indices of the lights that fade. These have a quadratic more.
 
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"length": 12, "lit": lights})))`
         Lengths of spans, 1 or more, and decisions.
     words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
-        First values of the span that is taken in, and its differences; with factors ``factor_start`` and
+        First values of the span that is taken in, and its differences. With factors ``factor_start`` and
         ``factors``, too.
     taken : :py:`Out(1)`
-        High for one cycle as the words of the span accepted before are taken in.
+        High for one cycle while the words of the span accepted before are taken in.
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights, ...)))`
         Operands of the pixels.
 
@@ -93,7 +93,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     @classmethod
     def begin(cls, model, start):
-        """The start; where adding half a step of the result takes an adder, `rounded` adds it."""
+        """The start. If adding half a step of the result takes an adder, `rounded` adds it."""
         return start.extend(model.format) if cls._adds_late(model) else super().begin(model, start)
 
     @classmethod
@@ -112,7 +112,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         return self.words
 
     def hold(self, m, load):
-        """Keep the decision alone: the words are on the port when they are taken in."""
+        """Keep only the decision, as the words are on the port when they are taken in."""
         if self.gated:
             self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
             with m.If(self.i.ready):
@@ -139,11 +139,12 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
 
 class ChordSpansUnit(wiring.Component):
-    """Values of spans in, the operands of their pixels out: chord setup, then accumulators.
+    """From values of spans to the operands of their pixels, by chord setup and accumulators.
 
-    A span of three pixels or more goes through the setup, and its start past it through a memory; a span of
-    one pixel through the memory alone. So short spans take a cycle each, and wait only for those before them.
-    The setup never waits: a span is accepted only if there is room for its differences behind the setup.
+    A span of three pixels or more goes through the setup, and its start past the setup through a memory. A
+    span of one pixel goes through the memory alone. So short spans take a cycle each, and wait only for the
+    spans before them. The setup never waits, because a span is accepted only if there is room for its
+    differences behind the setup.
 
     Parameters
     ----------
@@ -158,22 +159,22 @@ class ChordSpansUnit(wiring.Component):
     length_bits : int
         Bits of the length.
     gate : ValueGateUnit or None
-        Decides which spans have no highlight; ``None``: no gate.
+        Gate that decides whether a span has no highlight. ``None``: no gate.
     factors : sequence of int
         Indices of the lights that fade.
 
     Members
     -------
     i : :py:`In(stream.Signature(span_operands_shape(lights, highlights, length_bits, len(factors))))`
-        Spans of one pixel, of which the first value counts, or of three and more.
+        Spans of one pixel, whose first value counts, or of three and more.
     long : :py:`In(1)`
-        Whether the span that is offered has more than one pixel: its source knows without the length.
+        Whether the offered span has more than one pixel. Its source knows this without the length.
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights)))`
         Operands of the pixels.
     out_of_range : :py:`Out(1)`
-        High for one cycle for each span with a word that does not fit.
+        High for one cycle for each span with a word out of range.
     constants : :py:`In(10)` or :py:`In(18)`
-        Specular exponent or threshold, constant while spans are inside; only if the gate has it as a port.
+        Specular exponent or threshold, constant while spans are inside. Only if the gate has it as a port.
 
     Source: docs/theory/chord.md#differences.
     """
@@ -219,21 +220,23 @@ class ChordSpansUnit(wiring.Component):
 
     @property
     def starts_inside(self) -> int:
-        """Depth of the memory of starts: room for the spans that may follow one during its setup.
+        """Depth of the memory of starts, with room for the spans that may follow a span during its setup.
 
-        And for those before it: its values may take an interval, in which no span comes.
+        It also has room for the spans before it. Its values may take an interval, in which no span comes.
         """
         needed = self._setup.latency + self._setup.initiation_interval + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
 
     @property
     def differences_inside(self) -> int:
-        """Depth of the memory of differences: room also for the spans inside the setup, three cycles each."""
+        """Depth of the memory of differences, with room also for the spans inside the setup, three cycles
+        each.
+        """
         needed = -(-self._setup.latency // _LONG) + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
 
     _LATE = 4
-    """Spans beyond those counted: three that come before the count is known, and one whose words wait."""
+    """Spans beyond the count: three that come before the count is known, and one whose words wait."""
 
     def elaborate(self, platform):
         """Memory of starts beside the setup, one of differences behind it, and the accumulators."""

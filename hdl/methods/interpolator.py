@@ -1,4 +1,4 @@
-"""Interpolators: units that take a span to the operands of its pixels, by any method."""
+"""Interpolators, units that take a span to the operands of its pixels, by any method."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -31,7 +31,7 @@ def spelled(numbers: Sequence[int]) -> str:
 
 
 def span_words(span: data.View) -> list[tuple[str, Value]]:
-    """Names and values of a span's members; a shorter length may be assigned to one of 12 bits."""
+    """Names and values of a span's members. A shorter length may be assigned to a length of 12 bits."""
     return [(name, span[name]) for name in ("normal_left", "normal_right", "length")]
 
 
@@ -65,14 +65,14 @@ def flag_spans(m: Module, accepted: Value, pixel: data.View) -> Signal:
 
 
 class InterpolatorUnit(wiring.Component):
-    """A method of the pipeline: spans in, the operands of their pixels out, first pixel first.
+    """A method of the pipeline, from spans to the operands of their pixels, first pixel first.
 
     Each method has a subclass, which names the class of its bit-accurate model::
 
         class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
 
-    and sets three attributes: `latency`, cycles from a span to its first pixel while nothing is stalled;
-    `setup_interval`, least cycles from a span to the next; and `cycles_per_pixel`.
+    and sets three attributes: `latency`, the cycles from a span to its first pixel without stalls;
+    `setup_interval`, the least cycles from a span to the next; and `cycles_per_pixel`.
 
     Parameters
     ----------
@@ -82,20 +82,20 @@ class InterpolatorUnit(wiring.Component):
         Number of lights, at least 1.
     setup_interval : int or None
         Least cycles from a span to the next, one of `setup_intervals`. ``None``: the largest of them up to
-        `DEFAULT_INTERVAL`, or the only one of a method without a choice.
+        `DEFAULT_INTERVAL`, or the only interval of a method without a choice.
     highlights : bool
-        Whether there is specular light; without it there are no operands of it.
+        Whether there is specular light, and operands for it.
     length_bits : int
         Bits of the length.
     product_interval : int
         Least cycles from a pixel to the next in the products with L and H, for methods that find normals.
     gate : ValueGateUnit or None
-        From `gate_inside`: decides which spans have no highlight; operands then have ``gated``.
+        From `gate_inside`. The gate decides whether a span has no highlight, and operands have ``gated``.
     takes_threshold : bool
-        Whether a threshold tells where highlights end, in place of the exponent; see
+        Whether a threshold tells the end of highlights, in place of the exponent, see
         `ShadingPipeline.threshold_of`.
     factors : sequence of int
-        Indices of the lights that fade, for methods that serve them; see `ShadingPipeline`.
+        Indices of the lights that fade, for methods that serve them, see `ShadingPipeline`.
 
     Members
     -------
@@ -104,18 +104,18 @@ class InterpolatorUnit(wiring.Component):
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights)))`
         Operands of the pixels.
     constants : :py:`In(light_vectors_shape(lights))`
-        L and H of each light; constant while spans are inside. See `constant_members`.
+        L and H of each light, constant while spans are inside. See `constant_members`.
     out_of_range : :py:`Out(1)`
-        High for one cycle for each span whose angle the method does not serve.
+        High for one cycle for each span with a larger angle than the method serves.
 
     Raises
     ------
     ValueError
-        If the method is not built for the setup interval.
+        If the method cannot be built for the setup interval.
     """
 
     UNITS: ClassVar[dict[type[Interpolator], type["InterpolatorUnit"]]] = {}
-    """Unit of each method, by the class of its model; `registry` fills it."""
+    """Unit of each method, by the class of its model. `registry` fills it."""
 
     cycles_per_pixel = 1
 
@@ -123,7 +123,7 @@ class InterpolatorUnit(wiring.Component):
     """Cycles from the first pixel of a span until there is room for the span after the next, prepared."""
 
     DEFAULT_INTERVAL = 4
-    """Largest `setup_interval` that is taken where none is given."""
+    """Largest default of `setup_interval`."""
 
     def __init_subclass__(cls, *, model: type[Interpolator] | None = None, **options):
         super().__init_subclass__(**options)
@@ -132,24 +132,24 @@ class InterpolatorUnit(wiring.Component):
 
     @classmethod
     def setup_intervals(cls, model: Interpolator) -> Sequence[int]:
-        """Setup intervals that the method can be built for; empty where it has no choice."""
+        """Setup intervals that the method can be built for; empty without a choice."""
         return ()
 
     @classmethod
     def gate_inside(cls, design: ShadingPipeline) -> ValueGateUnit | None:
-        """The gate that decides inside this unit, of a design with a gate; ``None``: there is none inside."""
+        """The gate that decides inside this unit, for a design with a gate. ``None``: no gate is inside."""
         return None
 
     @classmethod
     def gate_beside(cls, design: ShadingPipeline, setup_interval: int) -> PipelinedUnit | None:
-        """The gate that decides beside this unit, from the same spans; ``None``: there is none beside.
+        """The gate that decides beside this unit, from the same spans. ``None``: no gate is beside it.
 
         Parameters
         ----------
         design : ShadingPipeline
             A design with a gate.
         setup_interval : int
-            Cycles from a span to the next in this unit; the gate takes spans as often.
+            Cycles from a span to the next in this unit. The gate takes spans as often.
         """
         return HighlightGateUnit(
             design.highlight_gate,
@@ -161,7 +161,7 @@ class InterpolatorUnit(wiring.Component):
 
     @property
     def shortest_interval(self) -> int:
-        """Least cycles from any span to the next; a short one may take fewer than `setup_interval`."""
+        """Least cycles from any span to the next. A short span may take fewer than `setup_interval`."""
         return self.setup_interval
 
     def span_intervals(self, spans: Spans) -> np.ndarray:
@@ -170,14 +170,14 @@ class InterpolatorUnit(wiring.Component):
 
     @property
     def has_begun(self) -> Value | None:
-        """Whether words of the span that is offered were taken already: payload and constants have to stay.
+        """Whether words of the offered span were taken already. Payload and constants then have to stay.
 
-        ``None`` where a unit takes all words of a span at once.
+        ``None`` if a unit takes all words of a span at once.
         """
         return None
 
     def constant_members(self) -> dict[str, wiring.Member]:
-        """Ports for the constants that the method reads: by default L and H of each light."""
+        """Ports for the constants that the method reads, by default L and H of each light."""
         return {"constants": In(light_vectors_shape(self.lights))}
 
     def further_members(self) -> dict[str, wiring.Member]:
@@ -186,17 +186,17 @@ class InterpolatorUnit(wiring.Component):
 
     @property
     def light_vectors(self) -> data.View | tuple:
-        """Where L and H of each light go; empty for a method that does not read them."""
+        """Ports for L and H of each light; empty for a method that does not read them."""
         return self.constants
 
     @property
     def exponent(self) -> Value | None:
-        """The specular exponent, from the constants; ``None`` where the method does not need it."""
+        """The specular exponent, from the constants; ``None`` if the method does not need it."""
         return None
 
     @property
     def threshold(self) -> Value | None:
-        """The threshold, from the constants; ``None`` where there is none."""
+        """The threshold, from the constants; ``None`` without a threshold."""
         return None
 
     @classmethod
@@ -212,7 +212,7 @@ class InterpolatorUnit(wiring.Component):
 
     @classmethod
     def span_options(cls, model: Interpolator) -> dict[str, bool]:
-        """Further arguments of `span_shape` that follow from the model; none by default."""
+        """Further arguments of `span_shape` that follow from the model; empty by default."""
         return {}
 
     def __init__(

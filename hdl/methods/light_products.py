@@ -35,9 +35,10 @@ def operands_shape(
     highlights : bool
         Whether there is specular light.
     gated : bool
-        Whether a gate's decision, that there is no highlight, comes with them.
+        Whether a gate's decision against a highlight comes with the operands.
     factored : bool
-        Whether factors of the lights that fade come with them; the factor of another light is 0, and unused.
+        Whether factors of the lights that fade come with the operands. The factor of another light is 0, and
+        unused.
     """
     operands = {"cosine": FixedShape(model.COSINE_FORMAT)}
     if highlights:
@@ -74,7 +75,7 @@ class LightProductsUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights)))`
         Operands.
     constants : :py:`In(light_vectors_shape(lights))`
-        L and H; constant while beats are inside.
+        L and H, constant while beats are inside.
 
     Source: docs/theory/interpolation.md#dot-product, docs/theory/chord.md#the-chord; [T] figure 2.5.
     """

@@ -14,10 +14,10 @@ __all__ = ["LinearInterpolatorUnit"]
 
 
 class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
-    """Normals on a straight line; `LinearInterpolator` is the bit-accurate model.
+    """Normals on a straight line. `LinearInterpolator` is the bit-accurate model.
 
-    The difference setup of a straight line, ``P = N_r - N_l``, and the accumulator. A span that is out of
-    range is flagged when it is accepted.
+    The unit has the difference setup of a straight line, ``P = N_r - N_l``, and the accumulator. A span out
+    of range is flagged when it is accepted.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
     lights : int
         Number of lights, at least 1.
     options
-        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 7.
+        As for `InterpolatorUnit`, with a ``setup_interval`` of 1 to 7.
 
     Source: docs/theory/interpolation.md#spans; [T] 2.1.
     """

@@ -18,13 +18,14 @@ __all__ = ["LocalChordInterpolatorUnit"]
 
 
 class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator):
-    """Chord setup, then accumulators: spans with values in, the operands of their pixels out.
+    """From spans with values to the operands of their pixels, by chord setup and accumulators.
 
-    `LocalChordInterpolator` is the bit-accurate model. No multiplier a pixel; the attribute ``multipliers``
-    is the number of those of the setup. A span of two pixels takes two cycles, as two spans of one pixel do.
+    `LocalChordInterpolator` is the bit-accurate model. Pixels need no multiplier. The attribute
+    ``multipliers`` is the number of the setup's multipliers. A span of two pixels takes two cycles, as two
+    spans of one pixel do.
 
     Spans carry values in place of normals, so there are no vectors of lights. A span is flagged if one of its
-    words does not fit.
+    words is out of range.
 
     Parameters
     ----------
@@ -33,12 +34,12 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
     lights : int
         Number of lights, at least 1.
     options
-        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 6.
+        As for `InterpolatorUnit`, with a ``setup_interval`` of 1 to 6.
 
     Members
     -------
     constants : :py:`In(10)` or :py:`In(18)`
-        Specular exponent or threshold, constant while spans are inside; only if the gate has it as a port.
+        Specular exponent or threshold, constant while spans are inside. Only if the gate has it as a port.
 
     Source: docs/theory/chord.md#local-lights.
     """
@@ -47,11 +48,11 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @property
     def shortest_interval(self):
-        """1: that of spans of one pixel."""
+        """1, the interval of spans of one pixel."""
         return 1
 
     def span_intervals(self, spans):
-        """Those of spans of one or two pixels are shorter."""
+        """Intervals of spans of one or two pixels are shorter."""
         return np.minimum(spans.length, 3) * self.setup_interval // 3
 
     @classmethod
@@ -116,7 +117,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @classmethod
     def gate_inside(cls, design):
-        """The gate by values, which reads those of the spans here."""
+        """The gate by values, which reads the values of the spans here."""
         return ValueGateUnit(
             design.highlight_gate,
             design.lights,
@@ -126,11 +127,11 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @classmethod
     def gate_beside(cls, design, setup_interval):
-        """``None``: the gate is inside."""
+        """``None``, because the gate is inside."""
         return None
 
     def constant_members(self):
-        """Exponent or threshold of a gate; spans bring what L and H would serve for."""
+        """Exponent or threshold of a gate. Spans bring values in place of L and H."""
         return {} if self.gate is None else self.gate.ports
 
     @property

@@ -17,10 +17,10 @@ __all__ = ["QuadraticInterpolatorUnit"]
 
 
 class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpolator):
-    """Normals on a quadratic curve; `QuadraticInterpolator` is the bit-accurate model.
+    """Normals on a quadratic curve. `QuadraticInterpolator` is the bit-accurate model.
 
-    Middle normal and G/P/Q find the coefficients of a span; forward differences, or an evaluator, find the
-    normals of its pixels. A FIFO carries the lengths past the first two.
+    Middle normal and G/P/Q find the coefficients of a span. Forward differences, or an evaluator, find the
+    normals of its pixels. A FIFO carries the lengths past middle normal and G/P/Q.
 
     =============== ======================== ===================== ============
     form            multipliers              setup interval        cycles/pixel
@@ -37,7 +37,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
     lights : int
         Number of lights, at least 1.
     options
-        As for `InterpolatorUnit`; ``setup_interval`` of the form ``differences`` is 1 to 7.
+        As for `InterpolatorUnit`. ``setup_interval`` of the form ``differences`` is 1 to 7.
 
     Source: docs/theory/interpolation.md#quadratic-normals, docs/theory/interpolation.md#forward-differences;
     [T] 2.2, 2.3, figures 2.8 to 2.11.

@@ -17,11 +17,11 @@ __all__ = ["QuotientInterpolatorUnit"]
 
 
 class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
-    """Spans of vectors in, N·L and places in lobes' tables out; `QuotientInterpolator` is the model.
+    """From spans of vectors to N·L and places in lobes' tables. `QuotientInterpolator` is the model.
 
     `QuotientSpansUnit` gives the words of the pixels, `QuotientUnit` their quotients. A span of two pixels or
-    more takes three cycles at least, a span of one pixel one. A span is flagged at its first pixel that is
-    out of range.
+    more takes at least three cycles, a span of one pixel takes one. A span is flagged at its first pixel out
+    of range.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     Members
     -------
     begun : :py:`Out(1)`
-        Whether words of the span that is offered were taken already: payload and constants have to stay.
+        Whether words of the offered span were taken already. Payload and constants then have to stay.
 
     Source: docs/theory/quotient.md.
     """
@@ -54,11 +54,11 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
 
     @property
     def shortest_interval(self):
-        """1: that of spans of one pixel."""
+        """1, the interval of spans of one pixel."""
         return 1
 
     def span_intervals(self, spans):
-        """Those of spans of one or two pixels are shorter."""
+        """Intervals of spans of one or two pixels are shorter."""
         return np.minimum(spans.length, 3) * self.setup_interval // 3
 
     @property

@@ -17,9 +17,9 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator)
     """Recurrence setup, then a recurrence unit for each light, with a copy for L and one for H.
 
     `RecurrenceInterpolator` is the bit-accurate model. All recurrence units are equal and have the same input
-    and the same ready of the output, so they are in the same state on every cycle. Two multipliers a light,
-    and those of the setup, ``ceil((14 + 32 lights) / setup_interval)``. Without highlights the units are the
-    same, and the results of H are not connected.
+    and the same ready of the output. So they are in the same state on every cycle. There are two multipliers
+    a light, and ``ceil((14 + 32 lights) / setup_interval)`` in the setup. Without highlights the units are
+    the same, and the results of H stay open.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator)
     lights : int
         Number of lights, at least 1.
     options
-        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 46.
+        As for `InterpolatorUnit`, with a ``setup_interval`` of 1 to 46.
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.1, 3.3, figure 3.5.
     """

@@ -49,10 +49,10 @@ class LineAccumulatorUnit(AccumulatorUnit):
 
 
 class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInterpolator):
-    """Line setup, accumulator, renormaliser; `RenormaliseInterpolator` is the bit-accurate model.
+    """Line setup, accumulator, renormaliser. `RenormaliseInterpolator` is the bit-accurate model.
 
-    Eight multipliers for the renormaliser, ``ceil(9 / setup_interval)`` for the setup. A span is flagged at
-    its first pixel that is out of range.
+    The renormaliser has eight multipliers, the setup ``ceil(9 / setup_interval)``. A span is flagged at its
+    first pixel out of range.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInter
     lights : int
         Number of lights, at least 1.
     options
-        As for `InterpolatorUnit`; ``setup_interval`` is 1 to 5 or 9.
+        As for `InterpolatorUnit`, with a ``setup_interval`` of 1 to 5 or 9.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
