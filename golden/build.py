@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from blysk.golden.bus.framing import BUSES, PACKETS
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.lighting.highlight_operand import MAX_EXPONENT
 
@@ -21,10 +20,10 @@ PIPES = (1, 2, 4, 8)
 SETUPS = (1, 2)
 """Numbers of lanes of triangle setup."""
 
-TOPS = tuple(PACKETS)
+TOPS = ("shader", "geometry", "render")
 """Cores: spans to pixels, triangles to spans, triangles to pixels."""
 
-PORTS = ("native", *BUSES)
+PORTS = ("native", "axi", "wishbone")
 """Ports of a core: its own streams, or a bus."""
 
 

@@ -26,7 +26,7 @@ BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/too
 
 BESIDE = {
     "tests/bench/report/test_report_browser.py": "tests/bench/report/test_report.py",
-    "tests/bench/tools/test_web_inside.py": "tests/bench/tools/test_web_browser.py",
+    "tests/bench/web/test_web_inside.py": "tests/bench/web/test_web_browser.py",
     "tests/test_citations.py": "tests/test_house.py",
 }
 """Files in the group of another file: report, site, and parsed sources of both are made once."""
@@ -38,9 +38,10 @@ LONGEST = (
     *(f"tests/sim/engines/test_{name}.py" for name in ("cache", "compilers")),
     *("tests/sim/frames/test_animation.py", "tests/sim/frames/test_frame.py", "tests/sim/api/test_api.py"),
     *(f"tests/simulators/test_{name}.py" for name in ("mapped", "pipelines", "units")),
-    *(f"tests/bench/report/test_{name}.py" for name in ("report", "pairs", "points")),
-    *(f"tests/bench/tools/test_{name}.py" for name in ("web_browser", "place_and_route")),
-    "tests/bench/quality/test_mutants.py",
+    *(f"tests/bench/report/test_{name}.py" for name in ("report", "points")),
+    "tests/bench/web/test_web_browser.py",
+    "tests/bench/tools/test_place_and_route.py",
+    *(f"tests/bench/quality/test_{name}.py" for name in ("mutants", "pairs")),
 )
 """Beginnings of the groups that take the longest: workers begin with them."""
 

@@ -111,6 +111,46 @@ def test_no_import_goes_in_a_circle():
     list(graphlib.TopologicalSorter(graph).static_order())
 
 
+def circle_of_rooms(graph: dict[str, set[str]]) -> list[str]:
+    """Rooms of one folder in a circle, if there is one: `graph` has the imports of every file.
+
+    A room is a subfolder, or a file beside the subfolders.
+    """
+    rooms: dict[str, dict[str, set[str]]] = {}
+    for name, modules in graph.items():
+        for module in modules:
+            if FILES[module].name == "__init__.py":
+                continue
+            own, other = name.split("."), module.split(".")
+            depth = next((k for k, pair in enumerate(zip(own, other, strict=False)) if pair[0] != pair[1]), 0)
+            if depth > 1:
+                folder = rooms.setdefault(".".join(own[:depth]), {})
+                folder.setdefault(".".join(own[: depth + 1]), set()).add(".".join(other[: depth + 1]))
+    for of_folder in rooms.values():
+        try:
+            list(graphlib.TopologicalSorter(of_folder).static_order())
+        except graphlib.CycleError as error:
+            return list(error.args[1])
+    return []
+
+
+def test_no_rooms_import_in_a_circle():
+    """In a layer, and in a folder of rooms inside it."""
+    graph = {
+        name: (imports(path.read_text(encoding="utf-8"), name) & set(FILES)) for name, path in FILES.items()
+    }
+    assert circle_of_rooms(graph) == []
+
+
+def test_a_circle_of_rooms_is_found():
+    """Though no file is in a circle."""
+    gate, method = "blysk.golden.lighting.highlight_gate", "blysk.golden.methods.interpolator"
+    factor, linear = "blysk.golden.lighting.factor", "blysk.golden.methods.linear_interpolator"
+    assert circle_of_rooms({gate: {method}, linear: {method}}) == []
+    found = circle_of_rooms({gate: {method}, linear: {factor}})
+    assert set(found) == {"blysk.golden.lighting", "blysk.golden.methods"}
+
+
 STARTERS = {
     "blysk.hdl.emit.processes": "programs",
     "blysk.sim.frames.workers": "workers, which watch their parent",

@@ -1,4 +1,4 @@
-"""``blysk explore``: the design space; see `blysk.bench.tools.explore`."""
+"""``blysk explore``: the design space; see `blysk.bench.report.explore`."""
 
 import math
 from collections.abc import Sequence
@@ -157,6 +157,6 @@ def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, fi
     if not candidates:
         raise InputError("the sweep", f"holds no possible design, {left_out}", "choose other combinations")
     check_mesh_file(mesh)
-    from blysk.bench.tools.explore import explore
+    from blysk.bench.report.explore import explore
 
     explore(candidates, mesh, exponent, size, error, largest, cost, limit, jobs, address, figures, impossible)

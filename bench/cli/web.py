@@ -1,11 +1,11 @@
-"""``blysk web``: the live page; see `blysk.bench.tools.web`."""
+"""``blysk web``: the live page; see `blysk.bench.web.web`."""
 
 from pathlib import Path
 
 import click
 
-from blysk.bench.tools.web_designs import DESIGNS, SERVED, TABLES
-from blysk.bench.tools.web_folder import PAGE, check_extras, check_folder, folders_of, report_files
+from blysk.bench.web.web_designs import DESIGNS, SERVED, TABLES
+from blysk.bench.web.web_folder import PAGE, check_extras, check_folder, folders_of, report_files
 from blysk.golden.presets import METHODS, MIRROR_LOBES, MODELS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
@@ -85,7 +85,7 @@ def command(folder, report, pages, designs, jobs):
     if report is not None:
         report_files(report)
     check_extras()
-    from blysk.bench.tools.web import make_site
+    from blysk.bench.web.web import make_site
 
     make_site(folder, report, folders, designs, jobs)
     click.echo(f"{'site':<12}{folder / PAGE}")

@@ -130,8 +130,13 @@ def _missing(name: str) -> InputError:
 
 
 @functools.cache
-def environment() -> Any:
+def environment(*packages: str) -> Any:
     """Jinja's environment of the pages, with their filters.
+
+    Parameters
+    ----------
+    *packages : str
+        Packages with further templates.
 
     Raises
     ------
@@ -149,7 +154,7 @@ def environment() -> Any:
             raise _missing(name)
     markdown = MarkdownIt("commonmark", {"html": False})
     found = Environment(
-        loader=ChoiceLoader([PackageLoader("blysk.bench.report"), PackageLoader("blysk.bench.tools")]),
+        loader=ChoiceLoader([PackageLoader(name) for name in ("blysk.bench.report", *packages)]),
         undefined=StrictUndefined,
         autoescape=True,
         trim_blocks=True,

@@ -15,7 +15,7 @@ SECTIONS: dict[str, str] = {
     "several-pipelines": "blysk.bench.report.several_pipelines",
     "geometry": "blysk.bench.report.geometry",
     "energy": "blysk.bench.report.energy",
-    "explore": "blysk.bench.tools.explore",
+    "explore": "blysk.bench.report.explore",
     "units": "blysk.bench.report.units",
     "lobe": "blysk.bench.report.lobe",
     "thesis": "blysk.bench.report.thesis",

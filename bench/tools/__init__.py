@@ -1,1 +1,1 @@
-"""Tools for a designer: unit table and pages, design space, place and route, the live page."""
+"""Tools for a designer: unit table and pages, sweeps of designs, place and route."""

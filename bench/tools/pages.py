@@ -21,12 +21,11 @@ from blysk.bench.svg import STYLE, svg
 from blysk.bench.tools.blocks import Row, cells_of, entries_shown, row_of, sample_of
 from blysk.bench.tools.defaults import SEED
 from blysk.bench.tools.docstrings import inline, markdown, markdown_table
-from blysk.bench.tools.documents import PROJECT
 from blysk.bench.tools.drawing import draw_structure
 from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, likeness
 from blysk.bench.tools.netlist import describe_shape
-from blysk.bench.tools.pages_folder import MADE, check_folder
+from blysk.bench.tools.pages_folder import MADE, PROJECT, check_folder
 from blysk.bench.tools.structure import graph_of
 from blysk.bench.tools.timing import draw_timing, waves_of
 from blysk.bench.units.names import ROOMS

@@ -6,7 +6,10 @@ from pathlib import Path
 from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable
 
-__all__ = ["MADE", "check_folder"]
+__all__ = ["MADE", "PROJECT", "check_folder"]
+
+PROJECT = Path(__file__).resolve().parents[2]
+"""Folder of the project, with its sources and documents if it is a checkout."""
 
 MADE = "made by `blysk pages`"
 """Words of the folder's first page by which it is known."""

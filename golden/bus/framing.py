@@ -7,10 +7,7 @@ import numpy as np
 
 from blysk.golden.bus.byte_layout import ByteLayout
 
-__all__ = ["BUSES", "PACKETS", "Framing"]
-
-BUSES = ("axi", "wishbone")
-"""Buses by which a core and its registers can be accessed."""
+__all__ = ["PACKETS", "Framing"]
 
 PACKETS = {"shader": "span", "geometry": "frame", "render": "run"}
 """Packet that ends with TLAST, by core: a span, a frame, or a run of pixels side by side in one row."""

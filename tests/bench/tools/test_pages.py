@@ -10,10 +10,10 @@ import pytest
 from blysk.bench.tools import pages
 from blysk.bench.tools.blocks import ENTRIES, Entry, entries_shown, sample_of
 from blysk.bench.tools.docstrings import markdown
-from blysk.bench.tools.documents import PROJECT
 from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, Node, likeness
 from blysk.bench.tools.pages import write_pages
+from blysk.bench.tools.pages_folder import PROJECT
 from blysk.bench.units.record import Decisions, Record, Sample, Variant
 from blysk.bench.units.registry import RECORDS
 from blysk.sim.errors import InputError

@@ -20,12 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from blysk.bench.command import resumable
-from blysk.bench.report.frames import scenes_of, view_of
-from blysk.bench.report.section import Drawing, Section, Table
-from blysk.bench.store import Task, results_of
-from blysk.bench.svg import svg
-from blysk.bench.tools.defaults import EXPONENT, SIZE
-from blysk.bench.tools.design_space import (
+from blysk.bench.report.design_space import (
     Explored,
     cheapest,
     errors_of,
@@ -33,6 +28,11 @@ from blysk.bench.tools.design_space import (
     front_of,
     tasks_of,
 )
+from blysk.bench.report.frames import scenes_of, view_of
+from blysk.bench.report.section import Drawing, Section, Table
+from blysk.bench.store import Task, results_of
+from blysk.bench.svg import svg
+from blysk.bench.tools.defaults import EXPONENT, SIZE
 from blysk.bench.tools.sweep import COSTS, Candidate, Sweep
 from blysk.golden.build import STYLES
 from blysk.golden.reference.raster import rasterise

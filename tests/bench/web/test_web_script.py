@@ -8,7 +8,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from blysk.bench.tools import web_data
+from blysk.bench.web import web_data
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import intensity
@@ -17,7 +17,7 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 def by_script(call, **given):
     """Value of an expression by the script's core, in which ``given`` has these names."""
-    folder = resources.files("blysk.bench.tools").joinpath("templates", "web")
+    folder = resources.files("blysk.bench.web").joinpath("templates", "web")
     script = folder.joinpath("core.js").read_text(encoding="utf-8")
     names = f"const {{{', '.join(given)}}} = JSON.parse(require('fs').readFileSync(0, 'utf8'));"
     text = f"{script}\nconst core = blyskCore();\n{names}\nconsole.log(JSON.stringify({call}));"

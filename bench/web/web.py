@@ -19,8 +19,8 @@ from blysk.bench.report.page import embedded, environment
 from blysk.bench.report.report import about, chosen_tasks, measure_all, measured, write_report
 from blysk.bench.report.sections import SECTIONS
 from blysk.bench.store import Task
-from blysk.bench.tools.documents import DOCUMENTS, documents
-from blysk.bench.tools.web_data import (
+from blysk.bench.web.documents import DOCUMENTS, documents
+from blysk.bench.web.web_data import (
     BACKGROUND,
     BANDS,
     COLUMNS,
@@ -36,8 +36,8 @@ from blysk.bench.tools.web_data import (
     streams_of,
     tables,
 )
-from blysk.bench.tools.web_designs import DESIGNS
-from blysk.bench.tools.web_folder import MARK, PAGE, check_folder, earlier, report_files
+from blysk.bench.web.web_designs import DESIGNS
+from blysk.bench.web.web_folder import MARK, PAGE, check_folder, earlier, report_files
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS
 from blysk.sim.engines.cache import version_of
@@ -121,7 +121,7 @@ def write_site(
     if report is not None:
         pictures |= {f"report/{path.name}": path for path in report_files(report)}
     files[PAGE] = (
-        environment()
+        environment(__package__)
         .get_template("web/index.html")
         .render(
             site=_site(designs, meshes),

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from blysk.bench.tools.documents import PROJECT
+from blysk.bench.tools.pages_folder import PROJECT
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
 from blysk.sim.output import files_within

@@ -6,7 +6,7 @@ import hashlib
 
 import numpy as np
 
-from blysk.bench.tools import web_data
+from blysk.bench.web import web_data
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.frame import frame_buffer
 from blysk.golden.frames.prepare import PreparedFrame, constants_of

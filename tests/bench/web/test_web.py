@@ -14,7 +14,7 @@ from amaranth.hdl import Fragment
 from click.testing import CliRunner
 
 from blysk.bench.cli.web import command
-from blysk.bench.tools import web, web_data, web_designs, web_folder
+from blysk.bench.web import web, web_data, web_designs, web_folder
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
@@ -140,9 +140,7 @@ def probes():
 @pytest.fixture(scope="module")
 def script():
     return (
-        resources.files("blysk.bench.tools")
-        .joinpath("templates", "web", "app.js")
-        .read_text(encoding="utf-8")
+        resources.files("blysk.bench.web").joinpath("templates", "web", "app.js").read_text(encoding="utf-8")
     )
 
 
@@ -315,8 +313,8 @@ def test_documents_in_the_site(tmp_path, work, results):
     assert '<h1 id="to-use-it">To use it</h1>' in use
     assert '<a href="../blocks/unit.html#a-b-c">a</a> b <a href="#to-use-it">c</a>' in use
     # By where the files lie; a source has a page of its own.
-    assert '<a href="../source/bench.tools.web.py.html">d</a> <a href="../blocks/unit.html">e</a>' in use
-    assert "&quot;&quot;&quot;" in (site / "source" / "bench.tools.web.py.html").read_text()
+    assert '<a href="../source/bench.web.web.py.html">d</a> <a href="../blocks/unit.html">e</a>' in use
+    assert "&quot;&quot;&quot;" in (site / "source" / "bench.web.web.py.html").read_text()
     assert (site / "guide" / "index.html").read_text() == use
     unit = (site / "blocks" / "unit.html").read_text()
     assert '<h2 id="a-b-c">' in unit
@@ -451,7 +449,7 @@ def test_interrupt_leaves_nothing_behind(interrupted):
     """A worker in the midst of a program of its own, with files of its own."""
     status, text = interrupted(
         "import subprocess, sys, tempfile\n"
-        "from blysk.bench.tools import web\n"
+        "from blysk.bench.web import web\n"
         "from blysk.bench.store import Task\n"
         "def sleep(seconds):\n"
         "    with tempfile.TemporaryDirectory(prefix='blysk-'):\n"

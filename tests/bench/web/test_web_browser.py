@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blysk.bench.store import results_of
-from blysk.bench.tools import web, web_data, web_designs
+from blysk.bench.web import web, web_data, web_designs
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.metrics import error_figures

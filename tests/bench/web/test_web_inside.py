@@ -12,7 +12,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 import numpy as np
 import pytest
 
-from blysk.bench.tools import web_data
+from blysk.bench.web import web_data
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import constants_of
 from blysk.sim.engines.beats import pack, unpack

@@ -13,9 +13,9 @@ from click.testing import CliRunner
 
 from blysk.bench import store
 from blysk.bench.cli.explore import command
-from blysk.bench.tools import design_space, explore
-from blysk.bench.tools.design_space import costs_of, explored, front_of
-from blysk.bench.tools.explore import section, tasks
+from blysk.bench.report import design_space, explore
+from blysk.bench.report.design_space import costs_of, explored, front_of
+from blysk.bench.report.explore import section, tasks
 from blysk.bench.tools.sweep import COSTS, Candidate
 from blysk.golden.presets import METHODS
 from blysk.golden.reference.raster import rasterise

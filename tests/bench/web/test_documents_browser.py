@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from blysk.bench.tools import web, web_folder
-from blysk.bench.tools.documents import documents
 from blysk.bench.tools.pages import write_pages
+from blysk.bench.web import web, web_folder
+from blysk.bench.web.documents import documents
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 

@@ -12,9 +12,8 @@ from click.testing import CliRunner
 
 from blysk.bench.accuracy import model_of
 from blysk.bench.quality import baselines
-from blysk.bench.tools import design_space, explore
-from blysk.bench.tools.defaults import EXPONENT
-from blysk.bench.tools.design_space import (
+from blysk.bench.report import design_space, explore
+from blysk.bench.report.design_space import (
     Explored,
     cheapest,
     costs_of,
@@ -23,6 +22,7 @@ from blysk.bench.tools.design_space import (
     front_of,
     tasks_of,
 )
+from blysk.bench.tools.defaults import EXPONENT
 from blysk.bench.tools.sweep import COSTS, Candidate, Sweep
 from blysk.golden.build import STYLES
 from blysk.golden.frame_constants import FrameConstants

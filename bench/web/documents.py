@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from blysk.bench.report.page import environment
+from blysk.bench.tools.pages_folder import PROJECT
 
-__all__ = ["DOCUMENTS", "PROJECT", "documents", "slug"]
+__all__ = ["DOCUMENTS", "documents", "slug"]
 
 DOCUMENTS = {
     "guide": ("Guide", "how to use and to embed it, and its words"),
@@ -16,9 +17,6 @@ DOCUMENTS = {
     "blocks": ("Units", "equations, formats, structure, timing and errors of each"),
 }
 """Folders that a site may have: title, and contents."""
-
-PROJECT = Path(__file__).resolve().parents[2]
-"""Folder of the project, with its sources and documents if it is a checkout."""
 
 _LINK = re.compile(r'<a href="([^"#:]*)(#[^"]*)?"([^>]*)>(.*?)</a>', re.DOTALL)
 _IMAGE = re.compile(r'<img src="(\.\./[^":]*)"')
@@ -52,7 +50,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
     from markdown_it import MarkdownIt
 
     markdown = MarkdownIt("commonmark").enable("table")
-    template = environment().get_template("web/document.html")
+    template = environment(__package__).get_template("web/document.html")
     pages: dict[str, str] = {}
     sources: dict[str, Path] = {}
     pictures: dict[str, Path] = {}
