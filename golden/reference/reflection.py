@@ -109,8 +109,8 @@ class ReflectionModel:
     def steepness(self, parameter: float | None) -> float:
         """Exponent of the Blinn power with the same steepest slope. It decides how fine spans must be.
 
-        For models with an exponent it is the exponent. For the models of `lobes` it is the largest
-        ``|dS/dc|``, from 1 to 10,000.
+        It is the exponent of the model. For the models of `lobes` it is the largest ``|dS/dc|``, from 1 to
+        10,000.
 
         Raises
         ------
