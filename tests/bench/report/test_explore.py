@@ -58,7 +58,7 @@ def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
     lines = result.output.splitlines()
     listed = [line for line in lines if re.match(r" *\d+ .*(throughput|compact)  ", line)]
     assert len(listed) == min(len(under), 3)
-    assert not any(line.startswith("chord-local is given") for line in lines)
+    assert not any(line.startswith("chord-local gets values") for line in lines)
     commands = [re.sub(r"^ *\d+  ", "", line) for line in lines[-len(listed) :]]
     assert commands == [one["command"] for one in under[:3]]
     for line, one in zip(listed, under, strict=False):

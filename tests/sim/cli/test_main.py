@@ -72,7 +72,7 @@ def test_help_and_refused_options_are_quick():
 def test_help_names_every_key_of_a_scene_file(capsys):
     assert main(["render", "--help"]) == 0
     (keys,) = re.findall(r"Keys of a scene file.*?\n\n", capsys.readouterr().out, re.DOTALL)
-    example = read_scene_file.__doc__.partition("::")[2].partition("The values'")[0]
+    example = read_scene_file.__doc__.partition("::")[2].partition("The values have")[0]
     names = re.findall(r"^ *(\w+) =|^ *(\[+\w+\]+)", example, re.MULTILINE)
     assert len(names) > 20
     for name in [*(first or second for first, second in names), "position", "target"]:
