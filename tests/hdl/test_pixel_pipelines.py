@@ -70,18 +70,6 @@ def test_each_lane_equals_its_model_under_stalls(wide, shares):
 
 
 @pytest.mark.long
-def test_both_engines_give_equal_cycles():
-    unit = WidePipelinesUnit(PixelPipelines(PLAIN.built(pipes=4)), 4)
-    rng = np.random.default_rng(3)
-    spans = any_spans(rng, PLAIN, rng.integers(0, 6, 40))
-    constants = any_constants(rng, PLAIN, spans)
-    stalls = {"input_stalls": rng.random(97) < 0.2, "output_stalls": rng.random(89) < 0.5}
-    (_, fast), (_, slow) = (shade(unit, spans, constants, engine=e, **stalls) for e in ("auto", "pysim"))
-    for name in ("beats", "cycles", "input_cycles"):
-        np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("pipes", [1, 2, 4, 8])
 def test_so_many_pixels_a_cycle(pipes):
     """Spans of as many pixels as there are pipelines, from scanline to scanline: no pipeline ever waits."""
@@ -94,21 +82,6 @@ def test_so_many_pixels_a_cycle(pipes):
     # Two FIFOs pause for a word that comes for the address that they read: where one comes every other cycle.
     assert run.cycles[0] == run.input_cycles[0] + unit.latency + (2 if pipes == 2 else 0)
     assert [len(lane) for lane in lanes] == [9 * count // pipes] * pipes
-
-
-def test_merged_stream_is_that_of_one_pipeline():
-    """The first pixel after `latency` cycles, then one a cycle."""
-    unit = MergedPipelinesUnit(PixelPipelines(PLAIN.built(pipes=4)), 9)
-    rng = np.random.default_rng(6)
-    spans = any_spans(rng, PLAIN, rng.integers(4, 9, 40))
-    constants = any_constants(rng, PLAIN, spans)
-    expected = unit.model.compute(spans, constants)
-    sent = {"count": len(expected.x), "write": writes_of(constants), "engine": "pysim"}
-    run = simulate(unit, beats_of(unit, spans), **sent)
-    np.testing.assert_array_equal(run.beats["x"], expected.x)
-    np.testing.assert_array_equal(run.beats["y"], expected.y)
-    assert run.cycles[0] == run.input_cycles[0] + unit.latency
-    assert run.cycles[-1] - run.cycles[0] == len(expected.x) - 1
 
 
 @pytest.mark.long

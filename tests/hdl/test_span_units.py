@@ -1,4 +1,4 @@
-"""Units that make pixels of spans one by one: cycles and resets; `tests.test_units` has their results."""
+"""Units that make pixels of spans one by one: their cycles; `tests.test_units` has their results."""
 
 import numpy as np
 import pytest
@@ -8,12 +8,11 @@ from blysk.bench.units.normals import difference_accumulator, quadratic_evaluato
 from blysk.golden.number.spans import pixels_of
 from blysk.sim.engines.simulate import simulate
 
-from ..checks import assert_beats_equal, resets
+from ..checks import assert_beats_equal
 from .variants import mostly_long
 
 HIGHLIGHT_COSINE = (highlight_cosine, highlight_cosine.RECORD.default)
 ACCUMULATOR = (difference_accumulator, difference_accumulator.RECORD.default)
-EVALUATORS = [(quadratic_evaluator, form) for form in ("direct", "horner")]
 RECURRENCES = [(recurrence, variant) for variant in recurrence.MEASURED]
 """Modules of records, and variants."""
 
@@ -47,17 +46,3 @@ def test_pixels_come_without_gaps(module, variant):
     np.testing.assert_array_equal(run.input_cycles, np.cumsum(taken) - taken)
     span, index = pixels_of(lengths)
     np.testing.assert_array_equal(run.cycles, run.input_cycles[span] + unit.latency + interval * index)
-
-
-@pytest.mark.ci
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("module", "variant"), [HIGHLIGHT_COSINE, ACCUMULATOR, *EVALUATORS, *RECURRENCES], ids=ids
-)
-def test_reset_in_mid_span(module, variant):
-    """In each cycle of a pixel and of interleaved states, and to the last pixel of a span of 60."""
-    unit = module.RECORD.variants[variant].unit()
-    interval = getattr(unit, "cycles_per_pixel", 1)
-    befores = (1, 2, 3, 4, 5, 6, 9, 14, 18, 31, 40, 59, 60, 61, 70)
-    found = resets(unit, case_of(module, unit, [6, 60]), befores, cycles=45, count=1)
-    assert [cycle for cycle, _ in found] == [unit.latency + interval * k for k in range(6)]

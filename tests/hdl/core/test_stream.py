@@ -1,18 +1,18 @@
 # amaranth: UnusedElaboratable=no
-"""Connections that look at every field, and the control of a pipelined unit: stalls, distance, reset."""
+"""Connections that look at every field, and the control of a pipelined unit: stalls and distance."""
 
 import itertools
 from functools import partial
 
 import numpy as np
 import pytest
-from amaranth.hdl import Cat, Module, ResetInserter, Signal, Value, signed, unsigned
+from amaranth.hdl import Cat, Module, Signal, Value, signed, unsigned
 from amaranth.lib import data, enum, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
 from blysk.hdl.core.fixed import SQ, UQ, FixedShape
-from blysk.hdl.core.stream import PipelinedUnit, connect, connect_slice, count_down, require_same_shape
+from blysk.hdl.core.stream import PipelinedUnit, connect, connect_slice, require_same_shape
 from blysk.sim.engines.simulate import simulate
 
 
@@ -162,38 +162,6 @@ class Registers(wiring.Component):
         return m
 
 
-@pytest.mark.parametrize("cycles", [1, 3])
-def test_counter_follows_the_span(cycles):
-    """Against a plain count of spans of 0 to 5 pixels, on enabled cycles alone."""
-    rng = np.random.default_rng(cycles)
-    m, valid, length, advance = Module(), Signal(), Signal(3), Signal()
-    active, ends = count_down(m, valid, length, advance)
-    seen = []
-
-    async def bench(ctx):
-        left = 0
-        for _ in range(400):
-            assert (ctx.get(active), ctx.get(ends)) == (left > 0, left <= 1)
-            moves, given = bool(rng.random() < 1 / cycles), int(rng.integers(6))
-            offered = bool(rng.random() < 0.7)
-            begins = moves and left <= 1 and offered
-            ctx.set(advance, moves)
-            ctx.set(valid, offered)
-            ctx.set(length, given)
-            await ctx.tick()
-            if begins:
-                left = given
-                seen.append(given)
-            elif moves:
-                left = max(left - 1, 0)
-
-    simulator = Simulator(m)
-    simulator.add_clock(1e-8)
-    simulator.add_testbench(bench)
-    simulator.run()
-    assert set(seen) == set(range(6))
-
-
 class Delay(PipelinedUnit):
     """The input, plus 1 for every register but the first; one register a clock of latency."""
 
@@ -324,20 +292,6 @@ def test_ready_waits_for_no_other_ready(make):
     assert {(0, 1), (1, 0)} <= seen
 
 
-@pytest.mark.parametrize("interval", [2, 5])
-def test_beats_are_whole_turns_apart(interval):
-    """While a beat is inside, the next comes a multiple of the interval later; else at any time."""
-    unit = Delay(9, interval)
-    rng = np.random.default_rng(interval)
-    codes = rng.integers(0, 2**15, 200)
-    run = simulate(unit, codes, count=200, engine="pysim", input_stalls=rng.random(997) < 0.8)
-    distance = np.diff(run.input_cycles)
-    inside = distance < unit.latency
-    assert (distance[inside] % interval == 0).all()
-    assert inside.any()
-    assert (distance[~inside] % interval != 0).any()
-
-
 @pytest.mark.parametrize("interval", [2, 3, 5])
 @pytest.mark.parametrize("output_share", [0, 0.4])
 def test_spaced_beats_come_at_any_distance(interval, output_share):
@@ -368,64 +322,6 @@ def test_slices_lose_no_cycle_to_a_payload_that_waits(count):
     np.testing.assert_array_equal(run.beats, codes)
     # Three of four cycles, on both sides, whatever their phases.
     assert run.cycles[-1] - run.cycles[10] <= 49 * 4 // 3 + 1
-
-
-def drive(unit, codes, stalls, reset_at=None):
-    """Beats taken in pysim, each with its clock since power-up or since the reset, which lasts one clock.
-
-    The source offers one beat after the other as soon as it may; after the reset it begins again, as does the
-    pattern of stalls. A payload that waits must stay.
-    """
-    reset = Signal()
-    m = Module()
-    m.submodules.unit = ResetInserter(reset)(unit)
-    runs = []
-
-    async def run(ctx, cycles):
-        taken, sent, held = [], 0, None
-        for clock in range(cycles):
-            offered = sent < len(codes)
-            ready = not stalls[clock % len(stalls)]
-            ctx.set(unit.i.valid, offered)
-            ctx.set(unit.i.payload, codes[sent] if offered else 0xFFFF)
-            ctx.set(unit.o.ready, ready)
-            valid, code = ctx.get(unit.o.valid), ctx.get(unit.o.payload)
-            assert held is None or (valid, code) == (1, held)
-            held = code if valid and not ready else None
-            if valid and ready:
-                taken.append((clock, code))
-            sent += bool(offered and ctx.get(unit.i.ready))
-            await ctx.tick()
-        runs.append((taken, sent))
-
-    async def bench(ctx):
-        if reset_at is not None:
-            await run(ctx, reset_at)
-            ctx.set(reset, 1)
-            await ctx.tick()
-            ctx.set(reset, 0)
-        await run(ctx, 120)
-
-    simulator = Simulator(m)
-    simulator.add_clock(1e-8)
-    simulator.add_testbench(bench)
-    simulator.run()
-    return runs
-
-
-@pytest.mark.parametrize(("latency", "interval"), [(4, 1), (7, 3)])
-@pytest.mark.parametrize("reset_at", [5, 11, 12, 13])
-def test_reset_in_mid_stream_leaves_nothing_behind(latency, interval, reset_at):
-    """After a reset with beats inside, some of them waiting, the unit does as from power-up."""
-    rng = np.random.default_rng(reset_at)
-    codes = rng.integers(0, 2**15, 12).tolist()
-    stalls = (rng.random(31) < 0.4).tolist()
-    unit = Delay(latency, interval)
-    ((fresh, _),) = drive(unit, codes, stalls)
-    assert [code for _, code in fresh] == [code + unit.added for code in codes]
-    (before, sent), (after, _) = drive(Delay(latency, interval), codes, stalls, reset_at)
-    assert len(before) < sent
-    assert after == fresh
 
 
 def test_at_counts_enabled_cycles():

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""The local chord method: multipliers, latencies, a pixel in every cycle for spans of any length, resets.
+"""The local chord method: multipliers, latencies, a pixel in every cycle for spans of any length.
 
 `tests.test_units` holds the unit against its model under stalls.
 """
@@ -15,7 +15,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 from blysk.sim.engines.simulate import simulate
 
-from ...checks import assert_beats_equal, resets, words_of
+from ...checks import assert_beats_equal
 
 
 def make(lights=1, **options):
@@ -132,14 +132,3 @@ def test_waiting_output_holds_the_input():
     assert entered == 0
     after = run.cycles[run.cycles >= 530]
     np.testing.assert_array_equal(after, 530 + np.arange(len(after)))
-
-
-@pytest.mark.ci
-@pytest.mark.long
-def test_reset_in_mid_span_leaves_nothing():
-    """Resets at every stage of a span: the spans then come as at first."""
-    unit, count = make(), 12
-    case = case_of(unit, np.tile([5, 1, 2, 3], 4))
-    befores = (1, 2, 3, 4, 5, 14, 17, 28, 30, 42, 47, 52)
-    found = resets(unit, case, befores, cycles=110, count=count)
-    assert [word for _, word in found] == words_of(unit.o, RECORD.expect(unit, case.first(count)))

@@ -1,4 +1,4 @@
-"""Adaptive normaliser: its cycles, its FIFO, and resets; `tests.test_units` has its results."""
+"""Adaptive normaliser: its cycles and its FIFO; `tests.test_units` has its results."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from blysk.golden.number.spans import pixels_of
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
 from blysk.sim.engines.simulate import simulate
 
-from ...checks import assert_beats_equal, resets
+from ...checks import assert_beats_equal
 
 
 def run_of(unit, angles, lengths, **stalls):
@@ -73,12 +73,3 @@ def test_front_runs_ahead_until_the_fifo_is_full():
     run, _ = run_of(unit, np.linspace(0, 3, 100), np.ones(100, dtype=np.int64), output_stalls=stalls)
     # One span more is in each of the three parts.
     assert (run.input_cycles < wait).sum() == (2 << unit.model.depth) + 3
-
-
-@pytest.mark.long
-def test_reset_in_every_state():
-    """Two levels: bisection to 70, segments to 140, pixels to 160."""
-    unit = AdaptiveNormaliserUnit()
-    case = spans_of(code_pairs_at(np.random.default_rng(9), 2, np.array([1.0, 16])), np.array([7, 20]))
-    found = resets(unit, case, [1, 20, 60, 120, 148, 152, 160, 168, 200], 100, 1)
-    assert [cycle for cycle, _ in found] == [unit.preparation(0) + k for k in range(7)]

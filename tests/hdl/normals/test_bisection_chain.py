@@ -1,15 +1,12 @@
-"""Chain of bisections: its cycles, and resets; `tests.test_units` has its results."""
+"""Chain of bisections: its cycles; `tests.test_units` has its results."""
 
 import numpy as np
 import pytest
 
 from blysk.bench.units.normals.bisection_chain import RECORD
 from blysk.bench.units.operands import code_pairs_at
-from blysk.bench.units.record import Case
 from blysk.hdl.normals.bisection_chain import BisectionChainUnit
 from blysk.sim.engines.simulate import simulate
-
-from ...checks import resets
 
 
 @pytest.mark.long
@@ -25,12 +22,3 @@ def test_latency_by_level(variant):
     latency = np.array([unit.latency(k) for k in np.where(level, level, 16).tolist()])
     np.testing.assert_array_equal(run.cycles - run.input_cycles, latency)
     np.testing.assert_array_equal(run.input_cycles[1:], run.cycles[:-1] + 1)
-
-
-def test_reset_in_every_state():
-    """The wait for a ready sink included."""
-    unit = BisectionChainUnit()
-    left, right = code_pairs_at(np.random.default_rng(5), 2, np.array([30.0, 80.0]))
-    case = Case({"normal_left": left, "normal_right": right, "level": np.array([3, 2])})
-    found = resets(unit, case, [1, 4, 9, 21, 34, 43, 51, 52, 53, 70], 80, 1)
-    assert [cycle for cycle, _ in found] == [unit.latency(3)]
