@@ -3,10 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from blysk.golden.number.polynomials import half_angle_factor, minimax
 from blysk.golden.reference.curves import CURVES, interpolate
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 LEFT = np.array([0.0, 0.0, 1.0])
 T = np.linspace(0, 1, 20001)
@@ -66,122 +64,6 @@ def test_great_circle_is_a_third_curve(degrees, shown):
     between = np.cross(interpolate("slerp", left, right, T), interpolate("normalised", left, right, T))
     angle = np.degrees(np.arcsin(np.linalg.norm(between, axis=1).max()))
     assert f"{angle:.{len(shown) - 2}f}" == shown
-
-
-SPANS = 4000
-PIXELS = np.linspace(0, 1, 65)
-
-
-def rounded(vectors):
-    """16 fractional bits, as the table of the chord method has them."""
-    return np.floor(vectors * 2**16 + 0.5) / 2**16
-
-
-def random_spans(degrees, seed, reach=None):
-    """Ends, and a vector H or L: anywhere, or at most ``reach`` radians off the span and off its plane."""
-    rng = np.random.default_rng(seed)
-    left = normalise(rng.normal(size=(SPANS, 3)))
-    side = rng.normal(size=(SPANS, 3))
-    side = normalise(side - (side * left).sum(axis=1, keepdims=True) * left)
-    angle = math.radians(degrees)
-    right = math.cos(angle) * left + math.sin(angle) * side
-    if reach is None:
-        return left, right, normalise(rng.normal(size=(SPANS, 3)))
-    along = rng.uniform(-reach, angle + reach, (SPANS, 1))
-    across = rng.uniform(-reach, reach, (SPANS, 1))
-    vector = np.cos(across) * (np.cos(along) * left + np.sin(along) * side)
-    return left, right, vector + np.sin(across) * np.cross(left, side)
-
-
-def through_three(first, middle, last):
-    """Quadratic in t through scalars at t = 0, 1/2 and 1, at every pixel; shape (spans, pixels)."""
-    a, b, c = (value[:, np.newaxis] for value in (first, middle, last))
-    return (2 * (a - 2 * b + c) * PIXELS + (4 * b - 3 * a - c)) * PIXELS + a
-
-
-def exact_cosines(left, right, vector):
-    normals = interpolate("normalised", left[:, np.newaxis], right[:, np.newaxis], PIXELS)
-    return np.einsum("spk,sk->sp", normals, vector)
-
-
-# 3-point chord, linear-normal chord, dot product of quadratic normals with the plain minimax h.
-@pytest.mark.parametrize(
-    ("n", "degrees", "shown"),
-    [
-        (100, 1, (0.05, 0.04, 14.4)),
-        (100, 10, (0.29, 0.42, 8.8)),
-        (100, 20, (2.6, 2.9, 4.2)),
-        (1000, 1, (0.14, 0.11, 125)),
-        (1000, 5, (0.25, 0.15, 115)),
-        (1000, 10, (1.3, 1.9, 81)),
-        (1000, 20, (12, 29, 42)),
-    ],
-)
-def test_published_errors_of_the_chord(n, degrees, shown):
-    """Worst of 4,000 random spans, ours within a quarter of the published: a worst case is a matter of luck.
-
-    The column of the 3-point dot product cannot be had: ``1 - N·H = |N - H|^2/2`` at each of the three
-    points, so that its model error is that of the 3-point chord, and the rounding of N and H, each by up to
-    ``sqrt(3) 2^-17``, adds ``2 sqrt(3) 2^-17 n/2`` to the base: 6.7 LSB at n = 1000 (6.6 published at
-    1 degree), 0.67 at n = 100 (0.61). The 47 and 140 LSB published at 10 and 20 degrees contradict the 1.3
-    and 12 of the chord beside them; ours are 4.5 and 14.
-    """
-    left, right, halfway = random_spans(degrees, 1, reach=2 / math.sqrt(n))
-    exact = REFLECTION_MODELS["cosquad"].reflect(exact_cosines(left, right, halfway), n)
-    assert (exact > 0).mean() > 0.2
-    a, b, h = rounded(left), rounded(right), rounded(halfway)
-    middle = rounded(normalise(a + b))
-
-    def chord(normal):
-        return ((normal - h) ** 2).sum(axis=-1)
-
-    def cosine(normal):
-        return (normal * h).sum(axis=-1)
-
-    def worst(base):
-        return 255 * np.abs(np.maximum(base, 0) ** 2 - exact).max()
-
-    three_chords = worst(1 - n / 4 * through_three(chord(a), chord(middle), chord(b)))
-    linear = interpolate("linear", a[:, np.newaxis], b[:, np.newaxis], PIXELS)
-    linear_chord = worst(1 - n / 4 * ((linear - h[:, np.newaxis]) ** 2).sum(axis=-1))
-    plain = minimax(lambda r: half_angle_factor(1 - r), 0, 1, 3)
-    documented = np.polynomial.polynomial.polyval((a * b).sum(axis=1), plain)[:, np.newaxis] * (a + b)
-    quadratic = worst(1 + n / 2 * (through_three(cosine(a), cosine(documented), cosine(b)) - 1))
-    # The figures have two digits at most.
-    for found, published in zip((three_chords, linear_chord, quadratic), shown, strict=True):
-        assert 0.75 * published < found < 1.08 * published
-    three_cosines = worst(1 + n / 2 * (through_three(cosine(a), cosine(middle), cosine(b)) - 1))
-    # Three weights of up to 1.25 together, base at most 1; the same rounding in the chord is far smaller.
-    rounding = 255 * 2 * 1.25 * n / 2 * 2 * math.sqrt(3) * 2.0**-17
-    assert rounding / 3 < three_cosines < three_chords + rounding
-
-
-@pytest.mark.parametrize(
-    ("degrees", "shown", "ours"), [(5, 0.02, 0.0083), (10, 0.05, 0.039), (20, 0.28, 0.27), (30, 0.9, 0.89)]
-)
-def test_published_errors_of_the_diffuse_fit(degrees, shown, ours):
-    """N·L through three points; at the small angles rounding is all of it, and ours is less."""
-    left, right, light = random_spans(degrees, 2)
-    a, b, vector = rounded(left), rounded(right), rounded(light)
-    middle = rounded(normalise(a + b))
-    fit = through_three(*((normal * vector).sum(axis=1) for normal in (a, middle, b)))
-    error = 255 * np.abs(np.maximum(fit, 0) - np.maximum(exact_cosines(left, right, light), 0)).max()
-    assert error == pytest.approx(ours, rel=0.06)
-    assert error < 1.02 * shown
-
-
-def test_length_error_in_dot_product_and_chord():
-    """N (1 + e) puts the base off by ``n e/2`` with the dot, the chord by e^2 and e theta^2."""
-    n, e = 1000, 1e-4
-    assert 1 - math.sqrt(REFLECTION_MODELS["cosquad"].reflect(1 - e, n)) == pytest.approx(0.05, rel=1e-9)
-    left, _ = pair(30)
-    for degrees in (0, 1, 3):
-        normal = interpolate("slerp", *pair(30), degrees / 30)
-        chord = ((normal * (1 + e) - left) ** 2).sum()
-        theta = math.radians(degrees)
-        assert chord - 4 * math.sin(theta / 2) ** 2 == pytest.approx(
-            e * e + 4 * e * math.sin(theta / 2) ** 2, abs=1e-15
-        )
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])

@@ -73,6 +73,15 @@ def test_errors_over_the_whole_range(model, shown):
         )
 
 
+@pytest.mark.parametrize(("n", "shown"), [(16, "0.19"), (64, "0.20"), (256, "0.20")])
+def test_schlick_is_no_better_than_the_parabola(n, shown):
+    """A rival of the literature that the project does not build: ``c / (n - n c + c)``."""
+    cosine = 1 - np.linspace(0, min(n, 30), 6001) / n
+    error = np.abs(cosine / (n - n * cosine + cosine) - cosine**n).max()
+    assert f"{error:.2f}" == shown
+    assert error > np.abs(REFLECTION_MODELS["cosquad"].reflect(cosine, n) - cosine**n).max()
+
+
 def test_refitted_slopes_are_minimax():
     """No slope near has a largest error 2e-4 smaller, the price of a line in n and four digits."""
     for model, power, slack in (
