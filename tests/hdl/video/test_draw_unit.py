@@ -13,8 +13,9 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.video.controls import BUTTONS, Controls
 from blysk.golden.video.draw_unit import Drawing, board_design
 from blysk.hdl.video.draw_unit import COUNTERS, RENDERED
-from blysk.sim.frames.drawing import DrawingSimulator
 from blysk.sim.meshes.teapot import teapot
+
+from .drawing import DrawingSimulator
 
 LAMPS = (Light((0.5, 0.8, 1)), Light((-1, 0.3, 0.4), (0.3, 0.9, 0.9)))
 
