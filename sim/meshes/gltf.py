@@ -1,4 +1,4 @@
-"""GLB and glTF files: checks that trimesh does not make, materials, and a text that trimesh reads right."""
+"""GLB and glTF files: checks that trimesh lacks, materials, and a text that trimesh reads right."""
 
 import importlib.util
 import json
@@ -88,7 +88,7 @@ def _of_version(version: str) -> Refused:
 
 
 def check_gltf(document: dict) -> None:
-    """Refuse geometry that trimesh would load as zeros, and counts that would exhaust the memory."""
+    """Refuse geometry that trimesh would load as zeros, and counts that would fill the memory."""
     for extension in sorted(map(str, document.get("extensionsRequired", []))):
         if extension not in _READ | _SILENT | _TOLD:
             raise Refused(
@@ -137,7 +137,7 @@ def _check_nodes(document: dict) -> None:
 
 
 def complete_scene(document: dict, found: Found) -> None:
-    """Put the root nodes of a document without scenes into one, and leave out nodes that are not visible."""
+    """Put the root nodes of a document without scenes into a scene, and leave out invisible nodes."""
     nodes = document.setdefault("nodes", [])
     if not document.get("scenes"):
         if not nodes:
@@ -161,7 +161,7 @@ def _extension(part: dict, name: str) -> dict:
 def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
     """Replace a document's materials by their numbers, and remove textures and vertex colours.
 
-    trimesh then gives the material's number of each part of a mesh, and looks for no image file.
+    Then trimesh gives the number of each part's material, and looks for no image file.
     """
     texts = document.pop("materials", None) or []
     for unread in ("images", "textures", "samplers"):
@@ -258,9 +258,9 @@ def _factor(look: dict, key: str, name: str) -> float:
 
 
 def tell_contents(document: dict, found: Found) -> None:
-    """Tell contents of a document, but for its materials, that change the picture and are not read.
+    """Tell contents of a document, without its materials, that change the picture and are not read.
 
-    Skins, and morph targets with a weight other than 0, are counted: the mesh is drawn without them.
+    Skins, and morph targets with a weight other than 0, are counted. The mesh is drawn without them.
     """
     meshes, nodes = document.get("meshes", []), document.get("nodes", [])
     morphed = {

@@ -1,4 +1,4 @@
-"""Arrays of glTF files: quantised ones as floats, fans as triangles, instances as nodes."""
+"""Arrays of glTF files: quantised arrays as floats, fans as triangles, instances as nodes."""
 
 import base64
 import binascii
@@ -29,7 +29,7 @@ _DRACO = "KHR_draco_mesh_compression"
 _LINES, _STRIP, _FAN, _MODES = 3, 5, 6, 7
 _READ = ("POSITION", "NORMAL")
 MESHOPT = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
-"""Extensions of compressed views, for which there is no decoder: read where the plain data is there, too."""
+"""Extensions of compressed views without a decoder. A view is read if the plain data is there, too."""
 
 
 def _listed(document: dict, name: str) -> list[dict]:
@@ -243,19 +243,19 @@ class _Arrays:
 
 
 def plain_arrays(document: dict, buffers: list[bytes], found: Found) -> bytes:
-    """Put a document into a form that trimesh reads right, of triangles alone; its one buffer.
+    """Put a document into a form of triangles alone, which trimesh reads right; return its one buffer.
 
-    trimesh does not scale normalised whole numbers, reads no sparse arrays, leaves out triangle fans, and
-    draws only one of a node's instances. Parts of points and lines are told.
+    By itself trimesh scales no normalised whole numbers, reads no sparse arrays, leaves out triangle fans,
+    and draws only one of a node's instances. Parts of points and lines are told.
 
     Parameters
     ----------
     document : dict
-        After `check_arrays`; it is changed.
+        Document after `check_arrays`. It is changed.
     buffers : list of bytes
-        Of `gltf_buffers`.
+        From `gltf_buffers`.
     found : Found
-        Told what is left out.
+        Takes the contents that are left out.
     """
     arrays = _Arrays(document, buffers)
     for mesh in document.get("meshes", []):

@@ -1,4 +1,4 @@
-"""Materials of mesh files: values that a file gives, and the reflection coefficients made of them."""
+"""Materials of mesh files: values of a file, and the reflection coefficients made of them."""
 
 from collections.abc import Callable, Collection, Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,12 +20,12 @@ _INSTEAD = (("diffuse", "ambient"), ("exponent", "roughness"), ("specular", "fre
 
 @dataclass(frozen=True)
 class FileMaterial:
-    """Values that a file gives for a material; ``None`` where it gives none.
+    """Values of a file for a material. ``None``: the file has no value.
 
     Parameters
     ----------
     name : str
-        Its name; empty for faces that have no material in the file.
+        Its name. Empty for faces without a material in the file.
     diffuse, specular : three floats or None
         Colours, each channel 0 to 1: k_d and k_s without conversion.
     exponent : int or None
@@ -33,7 +33,7 @@ class FileMaterial:
     roughness : float or None
         Roughness, for the reflection models that have one in place of an exponent.
     fresnel, ambient : three floats or None
-        F_0 of `Material`; and k_a, if it is not to be a share of the diffuse colour.
+        F_0 of `Material`, and k_a. ``None`` of k_a: a share of the diffuse colour.
     two_sided : bool
         Whether its faces are seen from behind, too.
     """
@@ -51,7 +51,7 @@ class FileMaterial:
     def of_metallic_roughness(
         cls, name: str, base: Triple, metallic: float, roughness: float, two_sided: bool = False
     ) -> "FileMaterial":
-        """A material of glTF's factors, 0 to 1 each: see `Material.of_metallic_roughness`."""
+        """A material of glTF's factors, 0 to 1 each, see `Material.of_metallic_roughness`."""
         made = Material.of_metallic_roughness(base, metallic, roughness, _AMBIENT_SHARE)
         names = ("diffuse", "specular", "exponent", "roughness", "fresnel", "ambient")
         return cls(name, **{field: getattr(made, field) for field in names}, two_sided=two_sided)
@@ -59,15 +59,15 @@ class FileMaterial:
 
 @dataclass
 class Found:
-    """A file's materials, number 0 for faces without one, and its contents that are not read.
+    """A file's materials, number 0 for faces without a material, and its contents that are not read.
 
     Parameters
     ----------
     names : list of str
         Names of the materials.
     readers : list of callable or None
-        A function for each material that returns it, called if a face uses it; ``None`` if the file does not
-        define it.
+        A function for each material that returns it, called if a face uses it. ``None`` if the file lacks the
+        material.
     """
 
     names: list[str] = field(default_factory=lambda: [""])
@@ -81,12 +81,12 @@ class Found:
         return FileMaterial(shown(self.names[number])) if reader is None else reader()
 
     def tell(self, what: str, many: str = "", count: int = 1) -> None:
-        """Tell contents that are not read: in words, or as a number of them if there is a plural."""
+        """Tell contents that are not read, in words, or as a number if there is a plural."""
         if count:
             self._counts[what, many] = self._counts.get((what, many), 0) + count
 
     def tell_names(self, kind: str, names: Iterable[str], known: Container[str] = ()) -> None:
-        """Tell those names of a kind that a reader does not know: every reader lists what it knows."""
+        """Tell names of a kind that a reader does not know. Every reader lists the names that it knows."""
         for name in names:
             if name not in known:
                 self._listed.setdefault(kind, {})[shown(name)] = None
@@ -118,10 +118,10 @@ def color_of(channels: list[float], what: str, name: str, text: str) -> Triple:
 def surfaces(
     materials: Sequence[FileMaterial], default: Material, fixed: Collection[str] = ()
 ) -> tuple[Material, ...]:
-    """Reflection coefficients of a mesh's materials: the file's values, and a default where it has none.
+    """Reflection coefficients of a mesh's materials, from the file's values or from a default.
 
     k_d is the file's diffuse colour, k_s its specular colour, and k_a a tenth of the diffuse or base colour.
-    If ``fixed`` has the exponent, the file's roughness does not count; in the same way the specular colour
+    If ``fixed`` has the exponent, the file's roughness does not count. In the same way the specular colour
     excludes the file's F_0, and the diffuse colour its k_a.
 
     Parameters
@@ -129,9 +129,9 @@ def surfaces(
     materials : sequence of FileMaterial
         Materials of `load_mesh`.
     default : Material
-        Coefficients where the file gives none.
+        Coefficients that the file does not give.
     fixed : collection of str
-        Fields of ``default`` that hold for all materials, whatever the file says: ``"diffuse"`` and so on.
+        Fields of ``default`` that replace the values of all materials: ``"diffuse"`` and so on.
     """
     result = []
     for material in materials:

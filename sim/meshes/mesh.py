@@ -1,4 +1,4 @@
-"""Meshes by file or by name, with unit vertex normals, materials, and every flaw counted or reported."""
+"""Meshes by file or by name, with unit vertex normals and materials. Every flaw is counted or reported."""
 
 import io
 import logging
@@ -69,16 +69,16 @@ class LoadedMesh:
         Stored vertex normals that were zero, not finite, or more than 1/256 off unit length, or that the
         file refers to but does not hold.
     dropped_faces : int
-        Triangles without area, left out: two corners are at one position, or no triangle shares a side.
-        Others without area stay: they close the seam between a side and its parts.
+        Dropped triangles without area: two corners are at one position, or no triangle shares a side. Other
+        triangles without area stay, because they close the seam between a side and its parts.
     opposed_faces : int
-        Triangles whose stored normals all point against their winding: their light falls on the other side.
+        Triangles whose stored normals all point against their winding. Their light falls on the other side.
     materials : tuple of FileMaterial
         Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
         differ in more than the name.
     ignored : tuple of str
         Contents or references of the file that change a picture and are not read: textures, vertex colours,
-        alpha, a material file that is not there, and by their names what a reader does not know.
+        alpha, a missing material file, and the names that a reader does not know.
     """
 
     mesh: Mesh
@@ -99,31 +99,35 @@ def load_mesh(
 ) -> LoadedMesh:
     """Load a mesh from a file, or build the teapot.
 
-    Normals stored at the vertices of an OBJ, PLY, GLB or glTF file are kept. Zero, NaN and infinite ones
-    are replaced by the computed normal, normals of another length are normalised; both are counted. Without
-    stored normals (and for STL, whose normals belong to faces) vertices of equal position are welded, the
-    mesh is cut along the edges where two faces meet at more than ``crease_angle``, and a vertex gets the sum
-    of its face normals, each weighted by the face's angle at the vertex, as a unit vector.
+    *Normals* stored at the vertices of an OBJ, PLY, GLB or glTF file are kept. The computed normal replaces
+    zero, NaN and infinite normals. Normals of another length are normalised. Both kinds are counted. Without
+    stored normals (and for STL, whose normals belong to faces)
 
-    All meshes of a scene are put together in world coordinates: vertices by the node's matrix ``M``,
-    normals by its inverse transpose, and a mirroring node (``det M < 0``) turns the triangles round.
+    - vertices of equal position are welded;
+    - the mesh is cut along the edges where two faces meet at more than ``crease_angle``;
+    - a vertex gets the unit vector along the sum of its face normals, each weighted by the face's angle at
+      the vertex.
+
+    *Geometry.* All meshes of a scene are put together in world coordinates: vertices by the node's matrix
+    ``M``, normals by its inverse transpose. A mirroring node (``det M < 0``) turns the triangles round.
     Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
-    cover them and keep all their corners, concave ones by ear clipping; strips of PLY and glTF are drawn.
-    Quantised and sparse arrays of glTF are read, and all instances of a node drawn; morph weights and skins
-    are not applied. A glTF file without scenes shows its root nodes. Nodes that are not visible
-    (KHR_node_visibility) are left out. Texts may begin with a byte order mark, and have any ends of lines.
+    cover them and keep all their corners, concave polygons by ear clipping. Strips of PLY and glTF are drawn.
+    Quantised and sparse arrays of glTF are read, and all instances of a node drawn. Morph weights and skins
+    are not applied. A glTF file without scenes shows its root nodes. Invisible nodes (KHR_node_visibility)
+    are left out. Texts may begin with a byte order mark, and have any ends of lines.
 
-    Materials of a GLB or glTF file: the base colour without its alpha, metallic and roughness factors of
-    ``pbrMetallicRoughness``, each 1 if missing (see `Material.of_metallic_roughness`), and ``doubleSided``.
-    Materials of an OBJ file, from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded, at
-    least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of glTF are linear, as k_d
-    is, and the picture is written without a transfer curve: they are used without conversion, as is Kd.
-    If a material file does not exist, or lacks a name, the colours are ``None``. Materials of no face are
-    left out, and equal ones merged. PLY and STL files have one material.
+    *Materials.* Of a GLB or glTF file these are read: the base colour without its alpha, metallic and
+    roughness factors of ``pbrMetallicRoughness``, each 1 if missing (see `Material.of_metallic_roughness`),
+    and ``doubleSided``. Of an OBJ file these are read from the ``mtllib`` files in its folder: ``Kd``, ``Ks``
+    and ``Ns`` (rounded, at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of
+    glTF are linear, as k_d is, and the picture is written without a transfer curve. So they are used without
+    conversion, and Kd, too. If a material file is missing, or lacks a name, the colours are ``None``.
+    Materials of no face are left out, and equal materials merged. PLY and STL files have one material.
 
-    What changes a picture and is not read is in ``ignored``: textures, vertex colours, alpha, emission,
-    ``illum``, smoothing groups, lights, cameras, animations. Each reader has a list of the statements,
-    keywords, properties, keys and extensions that it knows; others are in ``ignored`` by their names.
+    Contents that change a picture and are not read are in ``ignored``: textures, vertex colours, alpha,
+    emission, ``illum``, smoothing groups, lights, cameras, animations. Each reader has a list of the
+    statements, keywords, properties, keys and extensions that it knows. Others are in ``ignored`` by their
+    names.
 
     Parameters
     ----------
@@ -131,11 +135,11 @@ def load_mesh(
         ``teapot`` for the built-in mesh (a file of that name is ``./teapot``), else a path that ends in
         .obj, .ply, .stl, .glb or .gltf, in upper or lower case.
     triangles : int
-        Triangles of the teapot, about, 64 to 4,000,000; without effect for a file.
+        Approximate number of triangles of the teapot, 64 to 4,000,000. Without effect for a file.
     crease_angle : float
         Degrees, 0 to 180. At 0 only coplanar faces share a normal, at 180 all faces do.
     materials : bool
-        Whether to read the file's materials; if not, all faces have one material without values.
+        Whether to read the file's materials. If not, all faces have one material without values.
 
     Returns
     -------
@@ -145,12 +149,17 @@ def load_mesh(
     Raises
     ------
     InputError
-        If a number is out of range; if the file is missing, empty, of unknown type or damaged, refers to
-        buffers outside its folder, needs a decoder that is not installed or a glTF extension that is not
-        supported, or has numbers in another form than the format's; if it holds no triangle, a vertex that
-        is not finite, an index out of range, nodes that form no trees, or more than 20 million triangles; if
-        a material in use has a colour that is not three numbers from 0 to 1 or an exponent over 1000; or if
-        more than 1024 materials are in use.
+        In one of these cases:
+
+        - a number is out of range;
+        - the file is missing, empty, of unknown type or damaged;
+        - it refers to buffers outside its folder;
+        - it needs a decoder that is not installed, or a glTF extension that is not supported;
+        - it has numbers in another form than the format's;
+        - it holds no triangle, a vertex that is not finite, an index out of range, nodes that form no trees,
+          or more than 20 million triangles;
+        - a used material has a colour that is not three numbers from 0 to 1, or an exponent over 1000;
+        - more than 1024 materials are in use.
     """
     if not 0 <= crease_angle <= 180:
         raise InputError(
@@ -179,21 +188,22 @@ def load_mesh(
 
 
 def given_mesh(source: object, crease_angle: float = DEFAULT_CREASE) -> LoadedMesh:
-    """A mesh of another library, or of arrays, with its flaws mended as those of a file.
+    """A mesh of another library, or of arrays, with its flaws mended as for a file.
 
     Parameters
     ----------
     source : trimesh.Trimesh or trimesh.Scene or sequence of arrays
         Arrays are vertices, shape (V, 3), faces, shape (F, 3), from 0 and anticlockwise seen from outside,
-        and perhaps normals, one a vertex. Of trimesh's objects normals are kept if they are stored; all
-        faces have one material.
+        and perhaps normals, one a vertex. Of trimesh's objects stored normals are kept. All faces have one
+        material.
     crease_angle : float
-        As for `load_mesh`, where there are no normals.
+        As for `load_mesh`, for a mesh without normals.
 
     Raises
     ------
     InputError
-        If it is no mesh, has no faces or too many, an index out of range or a vertex that is not finite.
+        If the source is no mesh, or has no faces or too many, an index out of range or a vertex that is not
+        finite.
     """
     if any(base.__module__.partition(".")[0] == "trimesh" for base in type(source).__mro__):
         import trimesh

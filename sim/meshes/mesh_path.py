@@ -1,4 +1,4 @@
-"""Names of mesh files: which suffixes are read."""
+"""Names of mesh files, and the known suffixes."""
 
 import os
 from pathlib import Path
@@ -12,7 +12,7 @@ SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf")
 
 
 def check_mesh_path(path: Path) -> None:
-    """Check that a path leads to a file of a known suffix; it is not opened.
+    """Check that a path leads to a file of a known suffix, without opening it.
 
     Raises
     ------
@@ -35,9 +35,9 @@ def check_mesh_path(path: Path) -> None:
 
 
 def check_mesh_file(source: str | os.PathLike[str]) -> None:
-    """Refuse, before long work, a mesh file that is not there, or of an unknown type; it is not opened.
+    """Refuse, before long work, a mesh file that is missing or of an unknown type, without opening it.
 
-    The name ``teapot`` is accepted. What the system refuses of a name is left to `load_mesh`.
+    The name ``teapot`` is accepted. Names that the system refuses are left to `load_mesh`.
 
     Raises
     ------

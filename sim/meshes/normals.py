@@ -14,7 +14,7 @@ __all__ = [
 ]
 
 DEFAULT_CREASE = 40.0
-"""Angle between faces, in degrees, over which an edge is sharp; for meshes without normals."""
+"""Angle between faces, in degrees, over which an edge is sharp, for meshes without normals."""
 
 # The largest error of a stored normal's length that counts as rounding, itself stored in float32.
 _LENGTH_TOLERANCE = 1 / 256 + 1e-6
@@ -25,10 +25,10 @@ _COSINE_SLACK = 1e-6
 
 
 def face_directions(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit face normals, and which faces have one: a face without area takes that of a neighbour.
+    """Unit face normals, with flags. A face without area takes the normal of a neighbour.
 
-    The neighbour across its longest side goes first: a face over corners on a straight side then belongs to
-    the polygon of that side. A face with two corners at one position, or without a neighbour, has none.
+    The neighbour across its longest side goes first. So a face over corners on a straight side belongs to the
+    polygon of this side. A face with two corners at one position, or without a neighbour, has no normal.
 
     Parameters
     ----------
@@ -40,11 +40,11 @@ def face_directions(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray
     Returns
     -------
     directions : float64 array, shape (F, 3)
-        0 for a face that has none.
+        0 for a face without a normal.
     found : bool array, shape (F,)
-        Whether it has one.
+        Whether the face has a normal.
     solid : bool array, shape (F,)
-        Whether it has an area.
+        Whether the face has an area.
     """
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     sides = np.stack([b - a, c - b, a - c], axis=1)
@@ -111,7 +111,7 @@ def weighted_normals(
 def repaired_normals(
     vertices: np.ndarray, faces: np.ndarray, directions: np.ndarray, normals: np.ndarray, own: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Unit stored normals of the vertices ``own``, and how many were mended; directions are of faces."""
+    """Unit stored normals of vertices ``own``, and the number of mended normals; directions are of faces."""
     stored = normals[own]
     usable = np.isfinite(stored).all(axis=1) & stored.any(axis=1)
     # The largest component bounds the length without overflow.
@@ -130,7 +130,7 @@ def repaired_normals(
 def crease_normals(
     vertices: np.ndarray, faces: np.ndarray, directions: np.ndarray, crease_angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cut a mesh at its creases: the old vertex of each new one, the new faces, and the new normals.
+    """Cut a mesh at its creases: the old vertex of each new vertex, the new faces, and the new normals.
 
     ``directions`` are the unit normals of the faces.
     Two corners at one position share a new vertex if a chain of faces around the position leads from one to

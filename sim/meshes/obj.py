@@ -46,9 +46,9 @@ _IMAGE = re.compile(
 def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
     """An OBJ file with an object for each material, named by its number, and the names of its material files.
 
-    What is left are statements of positions, normals, faces and those objects, a line for each. Statements of
-    other kinds are told. A backslash at the end of a line continues it, but not in a comment. The text after
-    ``#`` is part of a material's name, as in ``usemtl Material #25``, and no comment.
+    Statements of positions, normals, faces and the objects stay, a line for each. Statements of other kinds
+    are told. A backslash at the end of a line continues the line, but not in a comment. The text after ``#``
+    is part of a material's name, as in ``usemtl Material #25``, and no comment.
     """
     numbers = {"": 0}
     libraries = []
@@ -93,7 +93,7 @@ def _joined(data: bytes) -> bytes:
 
 
 def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None:
-    """Find the materials' definitions in the material files; a definition is read if a face uses it."""
+    """Find the materials' definitions in the material files. A definition is read if a face uses it."""
     texts, commented = {}, {}
     for target in dict.fromkeys(file for name in libraries for file in _library_files(name, folder, found)):
         if target.stat().st_size > _MAX_LIBRARY:
@@ -218,10 +218,14 @@ _END = rb"[ \t]*+\r?$"
 
 
 def tidy_obj(data: bytes, found: Found) -> bytes:
-    """An OBJ file in the form that trimesh reads: positions of 3 numbers, and faces of 3 corners.
+    """An OBJ file in the form that trimesh reads, with positions of 3 numbers and faces of 3 corners.
 
-    Lines that trimesh would read wrongly are refused: numbers in another form than C's, positions with a
-    weight other than 1, indices that are 0, normals that are not there, for which it leaves out all others.
+    Lines that trimesh would read wrongly are refused:
+
+    - numbers in another form than C's;
+    - positions with a weight other than 1;
+    - indices that are 0;
+    - missing normals, for which trimesh leaves out all others.
     """
     if re.search(rb"^(?:[ \t]++(?:vn?|f)[ \t]|(?:vn?|f)(?:\t| [ \t]))", data, re.MULTILINE):
         data = re.sub(rb"^[ \t]*(v|vn|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)

@@ -63,8 +63,8 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
     Raises
     ------
     Refused
-        If the header is damaged, rows or bytes are missing, a list has another length than its count, or a
-        face has fewer than 3 corners or one that does not exist.
+        If the header is damaged, or rows or bytes are missing. If a list has another length than its count,
+        or a face has fewer than 3 corners or a missing corner.
     """
     order, elements, body = _header(data, found)
     columns: dict[str, _Columns] = {}

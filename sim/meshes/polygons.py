@@ -26,12 +26,12 @@ def check_corners(corners: np.ndarray, vertices: int) -> None:
 def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Cut polygons of equally many corners into triangles that keep all corners and sides.
 
-    Each side of a polygon of n corners is a side of exactly one of its n - 2 triangles. Each other side is
-    shared by two triangles, in opposite directions: polygons that share sides stay joined. A fan from a
-    corner is used if each of its triangles has an area and the polygon's orientation: the fan then covers a
-    polygon that does not cross itself. Other polygons are cut by ear clipping, in the plane at right angles
-    to their area vector ``sum(p_i x p_(i+1)) / 2``. A triangle without area is left only where nothing else
-    keeps a corner, as at the end of a spike.
+    Each side of a polygon of n corners is a side of exactly one of its n - 2 triangles. Two triangles share
+    each other side, in opposite directions. So polygons that share sides stay joined. A fan from a corner is
+    used if each of its triangles has an area and the polygon's orientation. The fan then covers a polygon
+    that does not cross itself. Other polygons are cut by ear clipping, in the plane at right angles to their
+    area vector ``sum(p_i x p_(i+1)) / 2``. A triangle without area is left only where nothing else keeps a
+    corner, as at the end of a spike.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray
     Returns
     -------
     corners : int ndarray, shape (T, 3)
-        The corners of its polygon, 0 to n - 1, that each triangle has; polygon after polygon.
+        The corners of each triangle, by their numbers in its polygon, 0 to n - 1, polygon after polygon.
     owners : int ndarray, shape (T,)
         The polygon of each triangle.
     """

@@ -17,7 +17,7 @@ ONE_MATERIAL = "mend it, or shade the mesh with one material"
 
 
 class Refused(Exception):
-    """A file is refused: reason and remedy, to which the caller adds the file's name."""
+    """A file is refused. It has reason and remedy, and the caller adds the file's name."""
 
     def __init__(self, reason: str, remedy: str = REEXPORT):
         super().__init__(reason)
@@ -26,12 +26,12 @@ class Refused(Exception):
 
 
 def shown(text: str) -> str:
-    """Text of a file for a message: in one line, and at most 60 characters."""
+    """Text of a file for a message, in one line of at most 60 characters."""
     return one_line(text, 60)
 
 
 def refers(folder: Path, *names: str) -> None:
-    """Record files that a file refers to, read or not, if they exist: no output replaces them."""
+    """Record existing files that a file refers to, read or not, so that no output replaces them."""
     for name in names:
         if os.path.isfile(folder / name):
             reads(folder / name)

@@ -16,12 +16,12 @@ _KNOWN = {"solid", "endsolid", "facet", "endfacet", "normal", "outer", "loop", "
 
 
 def read_stl(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices, three a triangle, and triangles of an STL file; facet normals follow from the vertices.
+    """Vertices, three a triangle, and triangles of an STL file. Facet normals follow from the vertices.
 
     Raises
     ------
     Refused
-        If it is cut short, or a facet of a text has not three vertices of three numbers.
+        If the file is cut short, or a facet of a text has other than three vertices of three numbers.
     """
     # The count of a binary file holds a byte of 0, unless it is of 17 million triangles.
     text = is_wide(data) or b"\0" not in data.rstrip(b"\0")

@@ -12,7 +12,7 @@ from blysk.sim.errors import InputError
 __all__ = ["DEFAULT_TRIANGLES", "MAX_TRIANGLES", "MIN_TRIANGLES", "control_points", "teapot"]
 
 DEFAULT_TRIANGLES = 10_000
-"""Triangles of the teapot, about."""
+"""Approximate number of triangles of the teapot."""
 
 MIN_TRIANGLES = 64
 MAX_TRIANGLES = 4_000_000
@@ -80,16 +80,16 @@ def teapot(triangles: int = 10_000) -> Mesh:
     """The Utah teapot in about ``triangles`` triangles, with exact normals.
 
     Each of the 32 bicubic patches ``S(u, v) = sum_ij B_i(u) B_j(v) P_ij`` becomes a grid of n x n
-    quadrilaterals of two triangles; the 8 n triangles without area, where the patches of the knob and of
-    the bottom meet in a point, are left out, and for n = 1 four more at the spout's lip. Normals are
-    ``dS/dv x dS/du``, of unit length, and at those two points their limit. Patches that join smoothly
-    share the vertices of their seam.
+    quadrilaterals of two triangles. The patches of the knob and of the bottom meet in a point each. The 8 n
+    triangles without area there are left out, and for n = 1 four more at the spout's lip. Normals are
+    ``dS/dv x dS/du``, of unit length, and at the two points their limit. Patches that join smoothly share the
+    vertices of their seam.
 
     Parameters
     ----------
     triangles : int
-        Triangles wanted, 64 to 4,000,000. The count made is the ``64 n^2 - 8 n`` nearest to it, at most
-        ``8 sqrt(triangles) + 32`` away; ``len(mesh.faces)`` tells it.
+        Wanted number of triangles, 64 to 4,000,000. The made number is the ``64 n^2 - 8 n`` nearest to it, at
+        most ``8 sqrt(triangles) + 32`` away. ``len(mesh.faces)`` tells it.
 
     Returns
     -------
