@@ -29,7 +29,7 @@ _OTHERS = (
     ),
     ("PixelForge", "Cyclone V", "not stated", "not stated", "at vertices, no highlight"),
 )
-"""As they state it: theory/references.md#other-hardware."""
+"""The others' own figures: theory/references.md#other-hardware."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _rows(head: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> Iterator[str]:
-    """A table in Markdown, its columns to the right but for the first ones."""
+    """A table in Markdown. The first columns are aligned left, the others right."""
     yield f"| {' | '.join(head)} |"
     yield f"| {' | '.join('---' if k < left else '---:' for k in range(len(head)))} |"
     yield from (f"| {' | '.join(row)} |" for row in rows)
@@ -61,7 +61,7 @@ def _named(entry: str) -> tuple[str, str]:
 
 
 def _known(entries: dict) -> Iterator[str]:
-    """What the records of the boards say of their bitstreams."""
+    """What is known of the bitstream of each board, from its record."""
     return _rows(["board", "bitstream"], [[name, board.known] for name, board in BOARDS.items()], left=2)
 
 
@@ -76,17 +76,17 @@ def _parts(entries: dict) -> Iterator[str]:
         for part in next(iter(built.values()))["parts"]
     ]
     rows += [
-        [told, *(f"{clock['reached']:.1f} of {clock['needed']:.1f} MHz" for clock in clocks)]
+        [told, *(f"{clock['reached']:.1f} MHz, needed {clock['needed']:.1f}" for clock in clocks)]
         for name, told in names.items()
         for clocks in [[each["clocks"][name] for each in built.values()]]
     ]
     rows.append(["bitstream, bytes", *(f"{each['bytes']:,}" for each in built.values())])
-    rows.append(["placement, of those tried", *(f"{each['seed']}" for each in built.values())])
+    rows.append(["number of the placement", *(f"{each['seed']}" for each in built.values())])
     return _rows(["", *built], rows)
 
 
 def _simulated(entries: dict) -> Iterator[tuple[str, str, dict, float]]:
-    """Board, triangles, figures and cycles of a frame at 60 Hz of what was simulated."""
+    """Board, triangles, figures, and cycles of a frame at 60 Hz, of each simulation."""
     for entry, values in entries.items():
         if "simulated" in values:
             figures = values["simulated"]
@@ -109,7 +109,7 @@ def _frames(entries: dict) -> Iterator[str]:
         "triangles",
         "drawing clock",
         "cycles a frame",
-        "of 60 Hz",
+        "share of a frame at 60 Hz",
         "late bands",
         "frames a second",
     ]
@@ -117,7 +117,7 @@ def _frames(entries: dict) -> Iterator[str]:
 
 
 def _others(entries: dict) -> Iterator[str]:
-    """The same beside others."""
+    """Frames a second of this design and of others."""
     rows = [
         [
             *("this design", f"{board}, {figures['clock']:.1f} MHz", triangles),
