@@ -1,7 +1,7 @@
-"""Beats of a stream as NumPy arrays, and their packed form: the words that both engines drive and read.
+"""Beats of a stream as NumPy arrays, and their packed form, the words that both engines drive and read.
 
-A beat's layout is an `amaranth.lib.data` structure or array, nested as needed, or a plain shape. A field
-whose shape is any other shape-castable (a fixed-point format, an enumeration) is given as its integer code.
+A beat's layout is an `amaranth.lib.data` structure or array, nested as needed, or a plain shape. Fields of
+all other shape-castables (a fixed-point format, an enumeration) are given as integer codes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -48,7 +48,7 @@ def dtype_of(layout) -> np.dtype:
     ValueError
         If a field has more than 64 bits.
     TypeError
-        If the layout has anything but structures, arrays and plain shapes (a union, say).
+        If the layout has anything but structures, arrays and plain shapes, such as a union.
     """
     shape = _resolve(layout)
     if isinstance(shape, StructLayout):
@@ -109,15 +109,15 @@ def _find(shape, beats, path: tuple = ()) -> Iterator[np.ndarray]:
 
 
 def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
-    """Beats as 32-bit words, least significant word first; bits above the width are 0.
+    """Beats as 32-bit words, least significant word first. Bits above the width are 0.
 
     Parameters
     ----------
     layout : Layout or shape
-        Layout of one beat; a plain shape takes a plain array.
+        Layout of one beat. A plain shape takes a plain array.
     beats : structured array, shape (count,), or mapping
-        Integer codes by field name; any integer type, whatever its width. A mapping of field names to
-        arrays (nested as the layout is) is accepted, too.
+        Integer codes by field name, of any integer type and width. A mapping of field names to arrays, nested
+        as the layout, is accepted, too.
 
     Returns
     -------
@@ -126,8 +126,8 @@ def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
     Raises
     ------
     ValueError
-        If a field is missing, unknown, of the wrong length or not integers, or a code does not fit its
-        field. The message names the field and the beat; no code wraps.
+        If a field is missing, unknown, of the wrong length or without integers, or a code outgrows its field.
+        The message names the field and the beat. No code wraps.
     """
     if not isinstance(beats, Mapping):
         beats = np.asarray(beats)
@@ -163,14 +163,14 @@ def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
 
 
 def unpack(layout, words: np.ndarray) -> np.ndarray:
-    """Beats from 32-bit words: the inverse of `pack`.
+    """Beats from 32-bit words, the inverse of `pack`.
 
     Parameters
     ----------
     layout : Layout or shape
         Layout of one beat.
     words : uint32 array, shape (count, `word_count`)
-        Packed beats; bits above the layout's width are ignored.
+        Packed beats. Bits above the layout's width are ignored.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Cache folders of the compiled models and of the tools that are started; the version of the code."""
+"""Cache folders of the compiled models and of the started tools; the version of the code."""
 
 import atexit
 import functools
@@ -48,7 +48,7 @@ def private_folder() -> Path:
     Raises
     ------
     InputError
-        If there is no temporary folder that can be written.
+        If no temporary folder can be written.
     """
     try:
         folder = Path(tempfile.mkdtemp(prefix="blysk-"))
@@ -70,18 +70,18 @@ def _unwritable(folder: Path) -> str | None:
 
 @functools.cache
 def provide_caches() -> None:
-    """Give the tools that are started a private cache folder, if the user's cannot be written.
+    """Give the started tools a private cache folder, if the user's cannot be written.
 
     Yosys (as WebAssembly), nextpnr, Zig and Matplotlib each have a cache below the user's cache or home
-    folder, and some end with an error where that cannot be written. The private folder is set in environment
-    variables, once in a process: in ``XDG_CACHE_HOME``, and in a tool's own variable only where it is not
-    set. A warning says that models and tools are compiled again. If only the home folder cannot be written,
+    folder. Some end with an error if it cannot be written. The private folder is set in environment
+    variables, once in a process: in ``XDG_CACHE_HOME``, and in a tool's own variable if it is unset. A
+    warning says that models and tools are compiled again. If only the home folder cannot be written,
     Matplotlib alone gets the private folder, without a warning.
 
     Raises
     ------
     InputError
-        If the temporary folder cannot be used, either.
+        If the temporary folder cannot be used, too.
     """
     folder = Path("of the user")
     try:
@@ -109,11 +109,11 @@ def provide_caches() -> None:
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled models: ``$BLYSK_CACHE``, or the user's cache folder.
+    """Folder of the compiled models, ``$BLYSK_CACHE``, or the user's cache folder.
 
-    A model is code that is executed. So a folder that belongs to another user, or that others can write, is
-    not used, nor is one that cannot be made or written: a warning says so, and the models are kept in a
-    private temporary folder until the process ends.
+    A model is code that is executed. So a folder is not used if it belongs to another user, if others can
+    write it, or if it cannot be made or written. A warning says so, and a private temporary folder keeps the
+    models until the process ends.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def warn_of_cache(folder: Path, reason: str) -> None:
 
 
 def version_of(package: str) -> str | None:
-    """Version of a package, ``None`` if it is not installed; the package is not imported."""
+    """Version of a package, without importing it; ``None`` if it is not installed."""
     from importlib import metadata
 
     try:
@@ -148,7 +148,7 @@ def version_of(package: str) -> str | None:
 
 @functools.cache
 def code_version(*libraries: str) -> str:
-    """Hash of the files of `golden`, `hdl` and `sim` and of the versions of the ``libraries`` installed."""
+    """Hash of the files of `golden`, `hdl` and `sim` and of the versions of the installed ``libraries``."""
     installed = {name: version for name in libraries if (version := version_of(name))}
     digest = hashlib.sha256(repr(installed).encode())
     for package in ("golden", "hdl", "sim"):

@@ -23,17 +23,17 @@ _REMEDY = f"install one, or {install_extra('native')}, or use the engine pysim"
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C++ compiler that is installed and prints its version.
+    """An installed C++ compiler, which prints its version.
 
     Parameters
     ----------
     name : str
         Name for messages.
     compile, link : tuple of str
-        Commands without the input file and ``-o`` with the output file, which the caller appends. ``link`` is
-        empty if ``compile`` makes the shared library in one step.
+        Commands. The caller appends the input file, and ``-o`` with the output file. ``link`` is empty if
+        ``compile`` makes the shared library in one step.
     identity : str
-        Path (or name of the package) and version; part of the key of a cached model.
+        Path (or name of the package) and version, a part of the key of a cached model.
     """
 
     name: str
@@ -107,14 +107,15 @@ def _zig() -> Compiler | None:
 
 
 def find_compilers() -> Iterator[Compiler]:
-    """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang; ``$CXX`` alone if set.
+    """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang. Only ``$CXX`` if it is
+    set.
 
     The flags in ``$CXXFLAGS`` are added after the optimisation flags, except for ziglang.
 
     Yields
     ------
     Compiler
-        Each one that is installed and prints its version.
+        Each compiler that is installed and prints its version.
     """
     chosen = os.environ.get("CXX", "").strip()
     for command in [shlex.split(chosen)] if chosen else [["c++"], ["g++"], ["clang++"]]:
@@ -128,7 +129,7 @@ def find_compilers() -> Iterator[Compiler]:
 
 
 def compiler_missing(failures: list[str]) -> CompilerMissing:
-    """The error that no compiler works; its message has the ``failures``, or which compilers were tried."""
+    """The error that no compiler works. Its message has the ``failures``, or the tried compilers."""
     chosen = os.environ.get("CXX", "").strip()
     if failures:
         reason = "; ".join(failures)

@@ -1,4 +1,4 @@
-"""The compiled engine: CXXRTL translates a component to C++, which is compiled, cached and run.
+"""The compiled engine. CXXRTL translates a component to C++, which is compiled, cached and run.
 
 Amaranth writes RTLIL; Yosys' CXXRTL makes a C++ class of it, which `parts`, `guards` and `words` rewrite.
 `cxxrtl_driver.cc` has the loop over the cycles, and returns to Python once in a million cycles. Before a
@@ -211,7 +211,8 @@ def _noted(note: Path) -> str:
 
 
 def sources_of(component: Component) -> tuple[str, str]:
-    """C++ of a component, and of the driver, which includes the file that the macro ``BLYSK_MODEL`` names.
+    """C++ of a component, and of the driver. The driver includes the file that the macro ``BLYSK_MODEL``
+    names.
 
     Parameters
     ----------
@@ -322,34 +323,34 @@ def _room(width: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 class Compiled:
     """A component compiled to machine code.
 
-    The library comes from the cache, or is built; a built one is compared with pysim on its first run and
-    only then put into the cache. The name of an entry has two hashes: the key, of netlist, Yosys script,
-    `parts`, `guards`, `words`, driver, compiler, flags, platform and version of Yosys, and the hash of the
-    entry's content. An entry is written under a temporary name and then renamed, so that no process reads
-    half of it. If the cache has no room, there is a warning, and the next process builds again. For an origin
-    the cache has a note, too: a file with the netlist's hash, named by the hash of component type, origin,
-    code and libraries.
+    The library comes from the cache, or is built. A built library is compared with pysim on its first run,
+    and only then put into the cache. The name of an entry has two hashes: the key, and the hash of the
+    entry's content. The key is made of netlist, Yosys script, `parts`, `guards`, `words`, driver, compiler,
+    flags, platform and version of Yosys. An entry is written under a temporary name and then renamed, so no
+    process reads half of it. If the cache has no room, there is a warning, and the next process builds again.
+    For an origin the cache has a note, too. This is a file with the netlist's hash, named by the hash of
+    component type, origin, code and libraries.
 
     Parameters
     ----------
     component : Component
-        Component to be simulated.
+        Component to simulate.
     origin : optional
-        All values that, with its type, determine the component: with them a cached model is found without
-        making the netlist. An origin is ignored if it cannot be pickled, or contains anything but built-in
-        values, those of NumPy and objects that `golden`, `hdl` and `sim` define.
+        All values that, with its type, determine the component. With them a cached model is found without
+        making the netlist. An origin may contain built-in values, values of NumPy and objects that `golden`,
+        `hdl` and `sim` define. It is ignored if it contains anything else, or cannot be pickled.
 
     Raises
     ------
     CompilerMissing
-        If no compiler is found, or each one found fails.
+        If no compiler is found, or every found compiler fails.
     InputError
-        If there is no temporary folder to build in, or no room there.
+        If there is no temporary folder to build in, or no room in it.
     SimulationError
         If Yosys cannot translate the component, or finds combinational feedback.
     ValueError
-        If the component has nothing in the clock domain ``sync``, or has other clock domains, other inputs,
-        assertions or print statements.
+        If the component has nothing in the clock domain ``sync``. If it has other clock domains, other
+        inputs, assertions or print statements.
     """
 
     def __init__(self, component: Component, origin: Any = None):

@@ -1,20 +1,23 @@
-"""One interface to the simulation engines: an array of beats in, an array of beats and their cycles out.
+"""One interface to the simulation engines, from an array of beats to an array of beats and their cycles.
 
-A component that can be simulated is an `amaranth.lib.wiring.Component` in the clock domain ``sync`` with
-the streams ``i`` (in) and ``o`` (out) and, where it wants them, ``constants`` (in, driven for the whole
-run), ``write`` (a stream in) and ``status`` (out, read after the run).
+A component that can be simulated is an `amaranth.lib.wiring.Component` in the clock domain ``sync``. It has
+the streams ``i`` (in) and ``o`` (out), and may have
 
-Both engines do the same on every clock, so they give equal beats at equal cycles:
+- ``constants``, an input, driven for the whole run;
+- ``write``, a stream in;
+- ``status``, an output, read after the run.
 
-1. The writes are offered first, each until it is taken. From the clock after the last of them on, the
-   source offers the next input beat unless ``input_stalls`` says otherwise on this clock; an offered beat
-   stays until it is taken. Writes that come after a number of beats are offered when these are taken; the
-   next beats are offered beside them. While ``valid`` is low, every payload bit of an input is 1: so a
-   component that uses a payload without ``valid`` gives wrong results.
+Both engines do the same on every clock. So they give equal beats at equal cycles:
+
+1. The writes are offered first, each until it is taken. From the clock after the last write on, the source
+   offers the next input beat, unless ``input_stalls`` says otherwise on this clock. An offered beat stays
+   until it is taken. Writes that come after a number of beats are offered when these are taken, beside the
+   next beats. While ``valid`` is low, every payload bit of an input is 1. So a component that uses a payload
+   without ``valid`` gives wrong results.
 2. The sink is ready unless ``output_stalls`` says otherwise on this clock.
-3. ``ready``, ``valid`` and payloads are read as they stand just before the rising edge; a beat moves at the
+3. ``ready``, ``valid`` and payloads are read as they stand just before the rising edge. A beat moves at the
    edge where its ``valid`` and ``ready`` are both high.
-4. The rising edge ends the cycle. Cycles are numbered: clock 0 is the first after power-up, when every
+4. The rising edge ends the cycle. Cycles are numbered. Clock 0 is the first after power-up, when every
    register holds its initial value.
 """
 
@@ -39,22 +42,22 @@ class Ports:
     Parameters
     ----------
     component : Component
-        Component to be simulated.
+        Component to simulate.
 
     Attributes
     ----------
     i, o : shape
         Payload shapes of the input and of the output stream.
     constants, write, status : shape or None
-        Shape of each, ``None`` where the component has none.
+        Shape of each, ``None`` if the component lacks it.
 
     Raises
     ------
     TypeError
         If ``component`` is not a `Component`.
     ValueError
-        If stream ``i`` or ``o`` is missing, a member is of another kind, a stream's payload has no bits, or
-        there is another input, or another member with a signature, which no engine drives.
+        If stream ``i`` or ``o`` is missing, a member is of another kind, or a stream's payload has no bits.
+        If there is another input, or another member with a signature, which no engine drives.
     """
 
     def __init__(self, component: Component):
@@ -97,7 +100,7 @@ class Ports:
 
 @dataclass(frozen=True)
 class Drive:
-    """All that an engine drives, packed by `beats.pack`, and when it stops.
+    """All words that an engine drives, packed by `beats.pack`, and the conditions of its stop.
 
     Parameters
     ----------
@@ -106,18 +109,18 @@ class Drive:
     constants : uint32 array, shape (1, words)
         Constants.
     input_stalls, output_stalls : bool array
-        Stall patterns, repeated; shape (1,) and ``False`` for none.
+        Stall patterns, repeated; shape (1,) and ``False`` without stalls.
     count : int or None
-        Number of output beats expected; ``None`` for as many as come.
+        Expected number of output beats; ``None`` for as many as come.
     idle_timeout : int
-        Cycles without a transfer after which the run ends: as ``DONE`` if ``count`` is ``None`` and all input
-        is taken, else as ``STUCK``.
+        Cycles without a transfer after which the run ends. It ends as ``DONE`` if ``count`` is ``None`` and
+        all input is taken, else as ``STUCK``.
     settle : int
         Cycles to go on after the last transfer of a complete run, at most ``idle_timeout``.
     limit : int or None
-        Number of cycles after which the run ends in any case (``LIMIT``).
+        Number of cycles after which every run ends (``LIMIT``).
     write_after : int64 array, shape (writes,), or None
-        Number of input beats taken before each write is offered, never decreasing; ``None`` for 0.
+        Number of input beats taken before each write is offered, in ascending order; ``None`` for 0.
     """
 
     input: np.ndarray
@@ -133,7 +136,7 @@ class Drive:
 
 
 class StopReason(IntEnum):
-    """Why an engine stopped; the compiled driver has the same numbers."""
+    """Reasons for an engine's stop. The compiled driver has the same numbers."""
 
     LIMIT = 0
     DONE = 1
@@ -145,14 +148,14 @@ class StopReason(IntEnum):
 
 @dataclass(frozen=True)
 class Trace:
-    """What an engine recorded, with packed beats; see `Run` for the same with unpacked beats.
+    """Record of an engine's run, with packed beats. `Run` has the same with unpacked beats.
 
     Parameters
     ----------
     end : StopReason
-        Why the engine stopped.
+        Reason for the stop.
     clock : int
-        Clock at which it stopped.
+        Clock of the stop.
     total_cycles : int
         Number of cycles up to and including the last transfer.
     write_count : int
@@ -175,7 +178,7 @@ class Trace:
     status: np.ndarray
 
     def differs(self, other: "Trace") -> str | None:
-        """Name of the first field that is not equal, or ``None``."""
+        """Name of the first unequal field, or ``None``."""
         for name in self.__dataclass_fields__:
             if not np.array_equal(getattr(self, name), getattr(other, name)):
                 return name
@@ -183,7 +186,7 @@ class Trace:
 
 
 class Prepared(Protocol):
-    """A component prepared for an engine: any number of runs, each from power-up."""
+    """A component prepared for an engine, for any number of runs, each from power-up."""
 
     def run(self, drive: Drive, progress: Callable[[int], object] | None) -> Trace:
-        """Run from power-up; ``progress`` gets the number of output beats so far, once a batch of cycles."""
+        """Run from power-up. ``progress`` gets the number of output beats so far, once a batch of cycles."""

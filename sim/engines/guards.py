@@ -2,8 +2,8 @@
 
 CXXRTL gives every register a statement of its own, ``r.next = (rst ? 0 : (advance ? d : r.curr))``, and
 copies every register on every clock. Most of a pipeline stands still most of the time, and most registers
-have the same few conditions. `group_registers` tests each condition once, and orders the statements so that
-all that read a register come before the one that writes it: then the register needs no copy from ``next``.
+have the same few conditions. `group_registers` tests each condition once. It orders the statements so that
+the readers of a register come before its writer. Then the register needs no copy from ``next``.
 
 In the names of this module a condition is a *question*, and its two results are the *answers*.
 """
@@ -228,20 +228,19 @@ class _Made:
 
 
 def group_registers(text: str) -> str:
-    """Rewrite the C++ of `write_cxxrtl`: register updates are grouped by condition, and written in place.
+    """Rewrite the C++ of `write_cxxrtl`, with register updates grouped by condition, and written in place.
 
-    The fields of a register are updated one by one where each has a value of its own. A memory's word is made
-    only where it is written, and a memory with one write port is written in place, too, after all statements
+    If each field of a register has a value of its own, the fields are updated one by one. A memory's word is
+    made only where it is written. A memory with one write port is written in place, too, after all statements
     that read it. The rewritten model behaves the same, for four reasons:
 
     - The statements at the edge read old register values, and combinational values that are complete before
       the first of them. So their order is free, and a register that no later statement reads may take its
       next value.
-    - Before every evaluation, ``next`` of a register that is copied equals its ``curr``, so that
-      ``r.next = r.curr`` may be left out.
-    - The driver reads outputs before the copies. So registers that are outputs are copied, not written in
-      place.
-    - The reset is an input that the driver never sets, so that it is always 0.
+    - Before every evaluation, ``next`` of a copied register equals its ``curr``. So ``r.next = r.curr`` may
+      be left out.
+    - The driver reads outputs before the copies. So registers that are outputs are copied.
+    - The reset is an input that the driver never sets, so it is always 0.
 
     A text or a statement for which this cannot be shown stays as it is.
 

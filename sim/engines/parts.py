@@ -1,9 +1,9 @@
 """CXXRTL's C++ with the fields of combinational words read from their sources.
 
-Amaranth joins the fields of a structure to a word, passes the word on from unit to unit under new names, and
-splits it where a field is used: on every clock, even for frame constants of 271 bits. `read_parts` follows
-each field to the word or register that it comes from, and removes the words that are no longer read. The
-status, which the driver reads in an evaluation without a clock edge, is computed only there.
+Amaranth joins the fields of a structure to a word. It passes the word on from unit to unit under new names,
+and splits it where a field is used. This happens on every clock, even for frame constants of 271 bits.
+`read_parts` follows each field to its source, a word or register, and removes the words that are no longer
+read. The status, which the driver reads in an evaluation without a clock edge, is computed only there.
 """
 
 import re
@@ -14,7 +14,7 @@ from typing import NamedTuple
 __all__ = ["NAME", "read_parts"]
 
 NAME = r"\b[pi]_\w+"
-"""Pattern of a name in CXXRTL's C++: ``p_`` precedes a name of the netlist, ``i_`` a generated one."""
+"""Pattern of a name in CXXRTL's C++. ``p_`` precedes a name of the netlist, ``i_`` a generated name."""
 
 _DECLARED = re.compile(rf"^\t+(?:/\*\w+\*/ )?(value|wire)<(\d+)> ({NAME})(?=;| \{{| =)", re.MULTILINE)
 _LOCAL = re.compile(rf"\tvalue<\d+> ({NAME});")
@@ -115,7 +115,7 @@ class _Reader:
 def read_parts(text: str) -> str:
     """Rewrite the C++ of `write_cxxrtl` so that fields are read from their sources.
 
-    The behaviour stays the same, as a combinational word is written once, before it is read, and registers
+    The behaviour stays the same: a combinational word is written once, before it is read, and registers
     change only in ``commit``. A word that is written under a condition is not followed to its sources.
 
     Parameters

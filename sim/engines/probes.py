@@ -1,4 +1,4 @@
-"""The pipeline with internal values in its status: number of gated pixels, words of its stages."""
+"""The pipeline with internal values in its status, the number of gated pixels and words of its stages."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -24,7 +24,7 @@ _GATED_BITS = 32
 
 @dataclass(frozen=True)
 class Probe:
-    """A word of the pipeline that is watched.
+    """A watched word of the pipeline.
 
     Parameters
     ----------
@@ -33,13 +33,13 @@ class Probe:
     title : str
         Short description of the word for a reader.
     block : str
-        Part of the pipeline that it belongs to: ``interpolator``, ``gate``, ``diffuse``, ``specular``,
+        Part of the pipeline that has the word: ``interpolator``, ``gate``, ``diffuse``, ``specular``,
         ``intensity`` or ``output``.
     shape : ShapeLike
-        Its shape; a `FixedShape` where it is a fixed-point number.
+        Its shape. A fixed-point number has a `FixedShape`.
     age : int
-        Cycles from the one in which the lights take a pixel's operands (``taken`` of `ObservedPipeline`) to
-        the one in which the word belongs to that pixel; negative where the word comes first.
+        Cycles from the lights' taking of a pixel's operands (``taken`` of `ObservedPipeline`) to the cycle in
+        which the word belongs to this pixel. Negative if the word comes first.
     exact : str
         Name of the exact quantity that the word approximates: ``normal_x``, ``normal_y``, ``normal_z``;
         ``cosine`` (N·L), ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H); ``product`` (the
@@ -61,26 +61,30 @@ class Probe:
 
 
 class ObservedPipeline(Component):
-    """A pipeline of one light with internal values in its status; its beats are the same as without them.
+    """A pipeline of one light with internal values in its status. They change no beat.
 
     Parameters
     ----------
     design : ShadingPipeline
-        Design of the pipeline; with one light, with a gate or without.
+        Design of the pipeline, with one light, with a gate or without.
 
     Members
     -------
     i, o, write
         Those of `ShadingPipelineUnit`.
     status : :py:`Out(StructLayout({..., "gated_pixels": 32}))`
-        The fields of its status; ``gated_pixels``, the number of pixels that the lights have taken of spans
-        in which the gate found no highlight, 0 without a gate; ``waits``, whether a pixel of the interpolator
-        is stalled; ``taken``, whether the lights take a pixel; and each word, by the name of its probe.
+        The fields of its status, and
+
+        - ``gated_pixels``: number of pixels that the lights have taken of spans in which the gate found no
+          highlight, 0 without a gate;
+        - ``waits``: whether a pixel of the interpolator is stalled;
+        - ``taken``: whether the lights take a pixel;
+        - each word, by the name of its probe.
 
     Raises
     ------
     ValueError
-        If the design has not exactly one light.
+        If the design has another number of lights than one.
     """
 
     def __init__(self, design: ShadingPipeline):
@@ -125,7 +129,7 @@ class ObservedPipeline(Component):
 
 
 def probes_of(unit: ShadingPipelineUnit) -> list[Probe]:
-    """Words that are watched in a pipeline of one light, from the interpolator to the output.
+    """Watched words of a pipeline of one light, from the interpolator to the output.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The interpreted engine: Amaranth's own simulator. Always there, slow, and writes waveforms."""
+"""The interpreted engine, Amaranth's own simulator. It is always there, is slow, and writes waveforms."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -48,9 +48,9 @@ class Interpreted:
     Parameters
     ----------
     component : Component
-        Component to be simulated.
+        Component to simulate.
     vcd : str, optional
-        VCD file for the waveforms; each run overwrites it.
+        VCD file for the waveforms. Each run overwrites it.
     """
 
     def __init__(self, component: Component, vcd: str | None = None):

@@ -1,4 +1,4 @@
-"""Send beats through a component, by either engine, and collect what comes out."""
+"""Send beats through a component, by one of the engines, and collect its output."""
 
 import operator
 from collections.abc import Callable, Mapping
@@ -30,7 +30,7 @@ _PIECE = 1 << 15
 
 @dataclass(frozen=True)
 class Run:
-    """What came out of a simulation.
+    """Result of a simulation.
 
     Parameters
     ----------
@@ -173,10 +173,10 @@ def simulate(
     progress: Callable[[int], object] | None = None,
     vcd: str | None = None,
 ) -> Run:
-    """Send beats through a component, and collect what comes out.
+    """Send beats through a component, and collect its output.
 
-    A compiled model is kept with its component (and, between processes, in the cache folder), so that the
-    second run of the same component starts at once.
+    A compiled model is kept with its component, and between processes in the cache folder. So the second run
+    of the same component starts at once.
 
     Parameters
     ----------
@@ -185,37 +185,37 @@ def simulate(
     beats : structured array or mapping
         Input beats, as `beats.pack` takes them.
     count : int or None
-        Number of output beats expected: the run ends when they, all writes and all input beats are
+        Expected number of output beats. The run ends when they, all writes and all input beats are
         transferred and ``settle`` more cycles have passed. ``None`` takes as many as come, until all input is
         taken and ``idle_timeout`` cycles have passed without a transfer.
     constants : scalar of the constants' type, or mapping of names to codes
-        Driven for the whole run; needed when the component has ``constants``.
+        Values for the whole run. Needed if the component has ``constants``.
     write : structured array or mapping, optional
         Beats for the ``write`` stream, delivered before the first input beat.
     write_after : int array, optional
-        Number of input beats that are taken before each write is offered; it never decreases. The next input
-        beats are offered beside a write that is not before the first: the component has to take the write
-        first if the beats depend on it.
+        Number of input beats that are taken before each write is offered, in ascending order. Beside a write
+        behind the first beat the next input beats are offered. If these depend on the write, the component
+        has to take the write first.
     engine : str
-        ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine or, with a warning that says why, pysim
-        where no compiler works.
+        ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine, or, with a warning, pysim if no
+        compiler works.
     origin : optional
-        What the component is made from, as for `cxxrtl.Compiled`. With it the component is found faster in
-        the cache.
+        Values that the component is made from, as for `cxxrtl.Compiled`. With them the component is found
+        faster in the cache.
     input_stalls, output_stalls : bool array, optional
-        One value a cycle, repeated for ever; ``True`` keeps the source from offering a new beat, or the sink
+        One value a cycle, repeated for ever. ``True`` keeps the source from offering a new beat, or the sink
         from being ready. At least one value must be ``False``.
     idle_timeout : int
-        Cycles without a transfer after which the component counts as stuck, or, where ``count`` is ``None``
-        and all input is taken, the run ends; at least 1.
+        Cycles without a transfer, at least 1, after which the component counts as stuck. If ``count`` is
+        ``None`` and all input is taken, the run then ends.
     settle : int
-        Cycles after the last transfer in which a surplus output beat is an error; at most ``idle_timeout``,
+        Cycles after the last transfer in which a surplus output beat is an error. At most ``idle_timeout``,
         unless ``count`` is ``None``.
     progress : callable, optional
         Called with the number of output beats so far, once a batch: a million cycles of ``cxxrtl``, 1000 of
         ``pysim``.
     vcd : str, optional
-        VCD file for the waveforms; ``pysim`` only.
+        VCD file for the waveforms. Only for ``pysim``.
 
     Returns
     -------
@@ -225,7 +225,7 @@ def simulate(
     ------
     SimulationError
         If the component withdraws or changes a beat that waits for ready, gives a surplus output beat, or
-        gets stuck; the message names the clock. If the engines differ in the first cycles of a newly built
+        gets stuck. The message names the clock. If the engines differ in the first cycles of a newly built
         model, or the compiled engine cannot translate the component.
     CompilerMissing
         If there is no working C++ compiler for ``"cxxrtl"``.

@@ -1,4 +1,4 @@
-"""Switching activity: how many register bits change, by submodule, while a component runs."""
+"""Switching activity: the number of register bits that change, by submodule, while a component runs."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -17,25 +17,25 @@ _WORD = 32
 
 
 class ToggleCounter(Component):
-    """A component with a counter for each of its submodules: toggles of register bits since reset.
+    """A component with a counter for each of its submodules, of toggles of register bits since reset.
 
-    A toggle is one bit that differs from its value in the cycle before. Counted are the bits of registers and
-    of the registered read data of memories; not those stored in a memory, nor those of combinational signals.
-    A register that changes at one clock edge is in the count after the next edge. Counters have 48 bits:
-    1000 registers of 18 bits make fewer than 2^48 toggles in 10^10 cycles.
+    A toggle is one bit that differs from its value in the cycle before. The bits of registers and of the
+    registered read data of memories are counted. Bits stored in a memory, and bits of combinational signals,
+    are left out. A register that changes at one clock edge is in the count after the next edge. Counters have
+    48 bits, because 1000 registers of 18 bits make fewer than 2^48 toggles in 10^10 cycles.
 
     Parameters
     ----------
     component : Component
-        Component to be watched.
+        Component to watch.
 
     Members
     -------
     i, o, constants, write
         Those of the component.
     status : :py:`Out(StructLayout({path: 48, ...}))`
-        Counts, by the path of the submodule, names with dots between; ``top`` for the component's own
-        registers. Submodules without registers have none.
+        Counts, by the path of the submodule, names with dots between them. ``top`` is for the component's own
+        registers. Submodules without registers have no count.
     """
 
     def __init__(self, component: Component):
@@ -90,12 +90,12 @@ def count_toggles(
         Those of `simulate`.
     engine : str
         As for `simulate`. The counters make a build of the compiled engine three times as long, half a minute
-        for a pipeline; for some hundred cycles ``pysim`` is faster.
+        for a pipeline. For some hundred cycles ``pysim`` is faster.
 
     Returns
     -------
     run : Run
-        What `simulate` gives, but with the counts as status.
+        Result of `simulate`, with the counts as status.
     toggles : dict of str to int
         Toggles in each submodule by its path, without its own submodules: "top", "datapath",
         "light_0.specular", ...

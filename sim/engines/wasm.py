@@ -1,4 +1,4 @@
-"""A component as a WebAssembly module: the compiled engine's model and driver, for a browser.
+"""A component as a WebAssembly module, with the compiled engine's model and driver, for a browser.
 
 The module imports nothing. Its exports are in `wasm_driver.cc`. Beats are words as `beats.pack` packs them;
 `fields_of` gives the place of each field.
@@ -38,7 +38,7 @@ def build(component: Component) -> bytes:
     Parameters
     ----------
     component : Component
-        As for `simulate`; with a stream ``write`` and a ``status``, and without ``constants``.
+        As for `simulate`, with a stream ``write`` and a ``status``, and without ``constants``.
 
     Raises
     ------
@@ -47,8 +47,8 @@ def build(component: Component) -> bytes:
     SimulationError
         If Yosys cannot translate the component, or the compiler refuses the result.
     ValueError
-        As `cxxrtl.Compiled` raises it; or if the component has constants, or lacks the stream ``write`` or a
-        status.
+        As `cxxrtl.Compiled` raises it. Also if the component has constants, or lacks the stream ``write`` or
+        a status.
     """
     ports = Ports(component)
     if ports.constants is not None or ports.status is None or ports.write is None:
@@ -90,8 +90,8 @@ def fields_of(layout: Any) -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict
-        For each field, by its path of names and indices with dots between: ``offset``, its lowest bit in the
-        beat, and what `format_of` gives for its format; a plain shape has 0 fraction bits.
+        For each field, by its path of names and indices with dots between them: ``offset``, its lowest bit in
+        the beat, and the result of `format_of` for its format. A plain shape has 0 fraction bits.
     """
     return dict(_fields(layout, (), 0))
 

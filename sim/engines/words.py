@@ -46,8 +46,9 @@ _SHIFTS = {
 
 
 LONG = 4096
-"""Length of a long expression's text, in characters. In a longer assignment the operands get names; a longer
-condition or memory access stays as it is."""
+"""Length of a long expression's text, in characters. In a longer assignment the operands get names. A longer
+condition or memory access stays as it is.
+"""
 
 
 class _Left(Exception):
@@ -453,10 +454,10 @@ def _reset(line: str) -> str:
 
 
 def plain_words(text: str) -> str:
-    """Rewrite the C++ of `write_cxxrtl`, statement by statement; one that is not understood stays as it is.
+    """Rewrite the C++ of `write_cxxrtl`, statement by statement. An unknown statement stays as it is.
 
     The driver's ``value`` and ``wire`` keep their bits in ``data``, words of 64 bits with 0 above the width.
-    The text includes CXXRTL's header only if it still needs CXXRTL's operations, those on wide operands.
+    The text includes CXXRTL's header only if it still needs CXXRTL's operations, on wide operands.
 
     Parameters
     ----------
