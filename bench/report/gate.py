@@ -292,11 +292,16 @@ def _print(rows: Sequence[GateRow]) -> None:
     type=click.Choice(METHODS),
     default=METHOD,
     show_default=True,
-    help="Interpolation along a span.",
+    help="Method of interpolation along a span.",
 )
-@click.option("--size", type=Size(), default="320x240", show_default=True, help="Of the frames.")
+@click.option("--size", type=Size(), default="320x240", show_default=True, help="Size of the frames.")
 @click.option(
-    "--model", "models", type=click.Choice(ALL_MODELS), multiple=True, default=MODELS, help="Repeat for more."
+    "--model",
+    "models",
+    type=click.Choice(ALL_MODELS),
+    multiple=True,
+    default=MODELS,
+    help="Model. Repeat for more.",
 )
 @click.option(
     "--exponent",
@@ -304,9 +309,9 @@ def _print(rows: Sequence[GateRow]) -> None:
     type=click.IntRange(1, MAX_EXPONENT),
     multiple=True,
     default=EXPONENTS,
-    help="Repeat for more.",
+    help="Exponent. Repeat for more.",
 )
-@click.option("--json", "figures", type=click.Path(), help="File for every figure.")
+@click.option("--json", "figures", type=click.Path(), help="JSON file with every figure.")
 def _command(meshes, method, size, models, exponents, figures) -> int:
     """Measure the savings of the highlight gate: pixels and cycles."""
     if figures:

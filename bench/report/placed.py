@@ -73,9 +73,12 @@ def placed(device: str, path: Path = STORE) -> dict[tuple[str, ...], dict[str, A
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path())
 @click.option("--date", default=lambda: datetime.now(UTC).date().isoformat(), show_default="today")
-@click.option("--command", "by", default="blysk fpga", show_default=True, help="What made the files.")
+@click.option("--command", "by", default="blysk fpga", show_default=True, help="Command that made the files.")
 @click.option(
-    "--store", type=click.Path(path_type=Path), default=STORE, help="In place of the committed one."
+    "--store",
+    type=click.Path(path_type=Path),
+    default=STORE,
+    help="Store to use in place of the committed store.",
 )
 def _merge(files: Sequence[str], date: str, by: str, store: Path) -> int:
     """Merge files of `blysk fpga --json` into the store of place and route."""
@@ -85,7 +88,7 @@ def _merge(files: Sequence[str], date: str, by: str, store: Path) -> int:
             entries = merged(entries, json.loads(Path(file).read_text(encoding="utf-8")), date, by)
         except (OSError, ValueError, KeyError, TypeError):
             raise InputError(
-                file, "has no figures of place and route", "write it by blysk fpga --json"
+                file, "has no figures of place and route", "write the file with blysk fpga --json"
             ) from None
     write_json(store, entries)
     click.echo(f"{'placed':<12}{len(entries)} designs in {store}")
