@@ -13,7 +13,7 @@ from blysk.bench.report.gate import METHOD, METHODS, MODELS, frames, same_pixels
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
-from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
@@ -99,7 +99,8 @@ def measure(
     results = []
     for exponent in exponents:
         scene = scene_for(mesh, exponent, width, height)
-        spans, (constants,) = prepare(scene, design).spans, constants_of(scene, design)
+        prepared = prepare(scene, design)
+        spans, (constants,) = prepared.spans, prepared.constants
         [run] = frames([counter], spans, constants, engine)
         results.append(
             {

@@ -22,7 +22,7 @@ from blysk.bench.speed.cycle_model import frame_cycles, unit_of
 from blysk.bench.speed.renderer import timed
 from blysk.golden.frames.compare import border_mask, method_in_float64
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.geometry import Mesh
@@ -183,7 +183,7 @@ def frames(
     for scene in scenes_of(view, exponents):
         frame = simulator.render(scene) if simulator else model_frame(scene, design)
         same_method = method_in_float64(scene, design, frame.cut_raster)
-        writes = sum(len(of.writes()["data"]) for of in constants_of(scene, design))
+        writes = frame.prepared.writes
         names = {"method": method, "model": model, "engine": simulator.engine if simulator else "model"}
         names |= {"operand": operand} if operand else {}
         results.append(

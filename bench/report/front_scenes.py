@@ -9,7 +9,6 @@ from blysk.bench.ring import ring
 from blysk.bench.speed.cycle_model import frame_cycles, unit_of
 from blysk.golden.frames.compare import compare_image
 from blysk.golden.frames.frame import model_frame
-from blysk.golden.frames.prepare import constants_of
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import Mesh
@@ -65,7 +64,7 @@ def measure(
             scene = scene_for(_mesh(mesh, triangles), exponent, *size)
             frame = model_frame(scene, design)
             errors = compare_image(scene, design, frame.image)
-            writes = sum(len(of.writes()["data"]) for of in constants_of(scene, design))
+            writes = frame.prepared.writes
             found.append(
                 {
                     "mesh": mesh,

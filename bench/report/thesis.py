@@ -13,7 +13,7 @@ from blysk.bench.report.claims import Claim, ClaimTable, Document, at_least
 from blysk.bench.report.counted import DEAR, Counted, fastest
 from blysk.bench.report.thesis_ways import DIVIDED, SCALED, SPANS, WAYS, WIDEST, random_operands
 from blysk.bench.tools.blocks import entry_of, row_of
-from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.metrics import error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import rasterise
@@ -282,7 +282,7 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     scene = scene_for(teapot(triangles), 50, width, height)
     design = preset(method, model_of(method))
     prepared = prepare(scene, design)
-    color = design.compute(prepared.spans, constants_of(scene, design)).color
+    color = design.compute(prepared.spans, prepared.constants).color
     exact = render(scene, raster=prepared.raster)
     image = np.zeros((height * width, 3))
     seen = prepared.cut_raster.visible

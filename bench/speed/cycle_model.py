@@ -6,7 +6,6 @@ import numpy as np
 from amaranth.hdl import UnusedElaboratable
 
 from blysk.bench.accuracy import scene_for
-from blysk.golden.frames.prepare import constants_of, prepare
 from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -102,5 +101,5 @@ def compare(design: ShadingPipeline, triangles: int, size: tuple[int, int]) -> t
     """Cycles of a teapot's frame by simulation and by the cycle model."""
     scene = scene_for(teapot(triangles), 50, *size)
     frame = FrameSimulator(design).render(scene)
-    writes = sum(len(of.writes()["data"]) for of in constants_of(scene, design))
-    return frame.cycles, frame_cycles(unit_of(design), prepare(scene, design).spans, writes)
+    prepared = frame.prepared
+    return frame.cycles, frame_cycles(unit_of(design), prepared.spans, prepared.writes)

@@ -31,7 +31,7 @@ from amaranth.lib.wiring import Component
 from blysk.bench.accuracy import scene_for
 from blysk.bench.speed.verilator import Verilated, free_stimulus
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import preset
 from blysk.hdl.emit.processes import run_program
@@ -232,10 +232,11 @@ def teapot_spans(
     pixels a second of a short run compare with those of a long run.
     """
     scene = scene_for(load_mesh("teapot").mesh, 20, width, height)
-    spans = prepare(scene, design).spans
+    prepared = prepare(scene, design)
+    spans = prepared.spans
     order = np.random.default_rng(20).permutation(np.flatnonzero(spans.length >= least))
     mixed = spans[order]
-    return mixed, constants_of(scene, design)[0]
+    return mixed, prepared.constants[0]
 
 
 def picture_seconds(triangles: int = 50_000, size: str = "640x480", repeats: int = 3) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
+from blysk.golden.frames.prepare import PreparedFrame, prepare
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
@@ -91,12 +91,12 @@ def model_frame(scene: Scene, design: ShadingPipeline) -> Picture:
     Raises
     ------
     ValueError
-        As `prepare` and `constants_of` do.
+        As `prepare` does.
     """
     start = perf_counter()
     prepared = prepare(scene, design)
     rastered = perf_counter()
-    pixels = design.compute(prepared.spans, constants_of(scene, design))
+    pixels = design.compute(prepared.spans, prepared.constants)
     return Picture(
         image=frame_buffer(scene, prepared.cut_raster, pixels.color),
         prepared=prepared,

@@ -32,7 +32,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class PreparedFrame:
-    """Spans of a scene, before and after the steps that a pipeline needs.
+    """Spans of a scene, before and after the steps that a pipeline needs, and its frame constants.
 
     Parameters
     ----------
@@ -44,6 +44,8 @@ class PreparedFrame:
         Spans of ``raster`` that were cut.
     spans : Spans
         Spans of ``cut_raster``, quantised: the pipeline's input.
+    constants : list of FrameConstants
+        Frame constants of each material, see `constants_of`.
     missed_spans : int
         For a method whose spans are cut by their angle alone: number of spans in which its curve is off by
         more than a quarter of an LSB.
@@ -53,7 +55,13 @@ class PreparedFrame:
     cut_raster: Raster
     spans_cut: int
     spans: Spans
+    constants: list[FrameConstants]
     missed_spans: int = 0
+
+    @property
+    def writes(self) -> int:
+        """Number of writes of frame constants."""
+        return sum(len(of.writes()["data"]) for of in self.constants)
 
 
 def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
@@ -63,7 +71,7 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
     ------
     ValueError
         If the scene has point lights or a near viewer, and the method does not take values. If a light that
-        fades has no factor in the design.
+        fades has no factor in the design. If `constants_of` refuses the scene.
     """
     if scene.local and not design.interpolator.serves_local:
         raise ValueError("point lights and a near viewer need the method chord-local")
@@ -71,12 +79,13 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
         for index, light in enumerate(scene.lights):
             if light.fades and index not in design.factors:
                 raise ValueError(f"light {index} fades, and the design has no factor for it: give factors")
+    constants = constants_of(scene, design)
     raster = rasterise(scene)
     cutter = cutter_of(scene, raster, design)
     cut, count = design.interpolator.cut(cutter)
     cut = sort_by_material(cut, scene.mesh.material)
     missed = design.interpolator.missed(cutter, cut)
-    return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), missed)
+    return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), constants, missed)
 
 
 def spans_for(scene: Scene, cut: Raster, design: ShadingPipeline) -> Spans:

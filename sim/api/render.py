@@ -152,8 +152,7 @@ def prepare_rendering(
             made = _built(settings, made)
             if design is None:
                 made = made.for_materials(scenes[0].materials, settings["geometry"] == "software")
-            _check_lobes(scenes[0], made, settings)
-            constants_of(scenes[0], made)
+            _check_scene(scenes[0], made, settings)
             stage(SPECIALISING if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
             stage(f"{BUILDING}{_large(smallest.design)}")
@@ -224,14 +223,22 @@ def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
         raise settings.refuse(error.option, error.reason, remedy, error.value) from None
 
 
-def _check_lobes(scene: Scene, design: ShadingPipeline, settings: Settings) -> None:
-    """Refuse materials with more lobes than the pipeline has tables, or with others than its fixed ones."""
-    counted = len(scene.materials) == design.materials and len(scene.lights) <= design.lights
-    if not (design.loads_tables and counted):
-        return
+def _check_scene(scene: Scene, design: ShadingPipeline, settings: Settings) -> None:
+    """Refuse a scene that the pipeline does not serve, before hardware is built for it.
+
+    Raises
+    ------
+    OptionError
+        If the materials have more lobes than the pipeline has tables, or other lobes than its fixed ones.
+    ValueError
+        As `constants_of` does, for other reasons.
+    """
     try:
         constants_of(scene, design)
     except ValueError as error:
+        counted = len(scene.materials) == design.materials and len(scene.lights) <= design.lights
+        if not (design.loads_tables and counted):
+            raise
         reason, _, remedy = str(error).partition("; ")
         raise settings.refuse("model", reason, remedy or "build the pipeline for it", design.model) from None
 

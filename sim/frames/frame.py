@@ -10,7 +10,7 @@ from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.frame import Picture, frame_buffer
-from blysk.golden.frames.prepare import constants_of, prepare, with_tables
+from blysk.golden.frames.prepare import prepare, with_tables
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.pixel_pipelines import PixelPipelines
@@ -166,14 +166,13 @@ class FrameSimulator:
             If the scene has more lights or other materials than the design, or a term is brighter than 8.
         """
         start = perf_counter()
-        constants = constants_of(scene, self.design)
         prepared = prepare(scene, self.design)
         rastered = perf_counter()
         raster = prepared.cut_raster
         count = len(raster.span)
         report = None if progress is None else lambda done: progress(min(done * self._pipes, count), count)
         y = raster.pixel // scene.width
-        run, beats = self._run(prepared.spans, constants, y, progress=report, vcd=vcd)
+        run, beats = self._run(prepared.spans, prepared.constants, y, progress=report, vcd=vcd)
         assert run.status is not None
         pixel = beats["y"].astype(np.int64) * scene.width + beats["x"]
         if not np.array_equal(pixel, raster.pixel):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.prepare import PreparedFrame, constants_of, prepare
+from blysk.golden.frames.prepare import PreparedFrame, prepare
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
@@ -108,8 +108,8 @@ def specialise(
     scenes, merged = _without_equal_materials(scenes, full)
     reductions = [*unlit, *merged]
     design = Specialisation(full, tuple(reductions), scenes).design
-    constants = constants_of(scenes[0], design)
     prepared = [prepare(scene, design) for scene in scenes]
+    constants = prepared[0].constants
     if not (exact and design.interpolator.lights_share_words):
         reductions += _without_highlights(design, prepared, constants)
     reductions += _with_fixed_values(design, constants, reductions)

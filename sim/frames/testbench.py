@@ -10,7 +10,7 @@ from string import Template
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
-from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.camera import Camera
@@ -75,11 +75,11 @@ def teapot_frame(
         material=materials,
         lights=lights,
     )
-    spans = prepare(scene, design).spans
+    prepared = prepare(scene, design)
+    spans = prepared.spans
     spans = spans[np.r_[0, : len(spans)]]
     spans.length[0] = 0
-    constants = constants_of(scene, design)
-    return spans, constants, design.compute(spans, constants)
+    return spans, prepared.constants, design.compute(spans, prepared.constants)
 
 
 def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[str, np.ndarray]]:

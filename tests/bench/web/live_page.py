@@ -85,7 +85,8 @@ def prepared(state):
     band = next(most for most in web_data.BANDS if exponent <= most)
     cut, spans = web_data.spans_of(state["mesh"], state["view"], band, design)
     scene = web_data.scene_of(state)
-    return scene, design, PreparedFrame(cut, cut, 0, web_data.with_vectors(spans, scene, design))
+    spans = web_data.with_vectors(spans, scene, design)
+    return scene, design, PreparedFrame(cut, cut, 0, spans, constants_of(scene, design))
 
 
 UNITS = {}
