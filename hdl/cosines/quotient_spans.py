@@ -57,8 +57,7 @@ class QuotientSpansUnit(wiring.Component):
     *Accumulators.* Second differences are taken while the last three pixels of a span leave, first
     differences with the last two, the start with the last. So spans follow each other without a gap: a run of
     n spans with p pixels takes p cycles, if at most a third of them have two pixels. A second difference
-    comes as its half into the first addition, and whole into the others. So ``D1 = 2 v·d + d·d`` takes no
-    adder.
+    comes halved into the first addition, whole into the others. So ``D1 = 2 v·d + d·d`` takes no adder.
 
     The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span. For
     a span of one pixel these are `short_latency` cycles. Payloads are registers.
