@@ -1,4 +1,4 @@
-"""Exceptions. Bad input has a thing, a reason and a remedy; a failed simulation has a line."""
+"""Exceptions. Bad input has a thing, a reason and a remedy. A failed simulation has one line."""
 
 __all__ = ["CompilerMissing", "InputError", "OptionError", "SimulationError", "one_line"]
 
@@ -6,15 +6,15 @@ __all__ = ["CompilerMissing", "InputError", "OptionError", "SimulationError", "o
 def one_line(text: str, most: int = 1000) -> str:
     """Make a text of a user, a file or another program fit for a message: one line, and not too long.
 
-    Characters that cannot be printed become ``?``: line breaks, escape sequences of a terminal, bytes that
-    are not text.
+    Characters that cannot be printed become ``?``. These are line breaks, escape sequences of a terminal, and
+    bytes that are not text.
 
     Parameters
     ----------
     text : str
         The text.
     most : int
-        Largest number of characters; a longer text is cut to it and ends with ``...``.
+        Largest number of characters. A longer text is cut to this number and ends with ``...``.
     """
     text = "".join(c if c.isprintable() else "?" for c in text[: most + 1])
     return text if len(text) <= most else f"{text[: most - 3]}..."
@@ -49,7 +49,7 @@ class InputError(Exception):
 class OptionError(InputError):
     """Bad value of an option, by the option's name in Python.
 
-    The value may come from a scene file or from the command line. `at` makes the error that names this place.
+    The value may come from a scene file or from the command line. `at` makes an error that names this place.
 
     Parameters
     ----------
@@ -69,16 +69,16 @@ class OptionError(InputError):
         super().__init__(f"{option} {self.value}".strip(), reason, remedy)
 
     def at(self, place: str) -> InputError:
-        """The same reason and remedy as an `InputError` whose thing is ``place``."""
+        """An `InputError` with this reason and remedy, whose thing is ``place``."""
         return InputError(place, self.reason, self.remedy)
 
 
 class SimulationError(Exception):
-    """A simulation failed: the component broke the rules of streams, it got stuck, or no engine can run it.
+    """A simulation failed: the component broke the rules of streams or got stuck, or no engine can run it.
 
     The message is one line.
     """
 
 
 class CompilerMissing(SimulationError):
-    """No C++ compiler works. The message says what was tried, and what to do."""
+    """No C++ compiler works. The message names the compilers that were tried, and a remedy."""

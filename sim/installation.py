@@ -1,4 +1,4 @@
-"""The command that installs what is missing, for the Python that runs and the place of this package."""
+"""The command that installs a missing package, for the running Python and the place of this package."""
 
 import importlib.metadata
 import json
@@ -15,7 +15,7 @@ def install_package(requirement: str) -> str:
     Parameters
     ----------
     requirement : str
-        Name of the package, or any other requirement of pip.
+        Name of the package, or another requirement of pip.
     """
     return shlex.join([sys.executable, "-m", "pip", "install", requirement])
 
@@ -23,8 +23,9 @@ def install_package(requirement: str) -> str:
 def install_extra(extra: str) -> str:
     """The shell command that installs an extra of this package, such as ``fpga``.
 
-    From a clone it names the clone's folder, as no package index has it. Of a package that pip installed from
-    a folder, a file or a repository it names that origin, which pip notes in ``direct_url.json`` (PEP 610).
+    In a clone the command names the clone's folder, because no package index has the clone. If pip installed
+    the package from a folder, a file or a repository, the command names this origin. Pip notes the origin in
+    ``direct_url.json`` (PEP 610).
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def install_extra(extra: str) -> str:
 
 
 def _origin() -> str:
-    """Where pip took this package from, as a URL; empty for a package index."""
+    """URL from which pip took this package. Empty for a package index."""
     try:
         text = importlib.metadata.distribution("blysk").read_text("direct_url.json")
     except importlib.metadata.PackageNotFoundError:

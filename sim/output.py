@@ -46,21 +46,21 @@ def _unwritable(path: Path, error: OSError) -> InputError:
 
 
 def check_writable(path: str | os.PathLike) -> None:
-    """Check, before long work, that a file can be written; leaves nothing behind.
+    """Check, before long work, that a file can be written. The check leaves nothing behind.
 
-    A temporary file is made in its folder and removed: permissions alone do not show that a file system is
+    A temporary file is made in the folder and removed. Permissions alone do not show that a file system is
     read-only or takes no files, and they do not restrict the superuser.
 
     Parameters
     ----------
     path : path
-        The output file, which may exist.
+        The output file. It may exist.
 
     Raises
     ------
     InputError
-        If the parent is missing, is no folder or may not be written, or the path is a folder or a file
-        that may not be written; or a file that the run reads, see `RunFiles`.
+        If the parent is missing, is no folder or may not be written. If the path is a folder, or a file that
+        may not be written, or a file that the run reads (see `RunFiles`).
     """
     writes(path)
     path = Path(path)
@@ -93,14 +93,15 @@ def files_within(folder: str | os.PathLike, first: str) -> list[str]:
     Parameters
     ----------
     folder : path
-        The output folder, which may exist.
+        The output folder. It may exist.
     first : str
         Name of a file that will be written.
 
     Returns
     -------
     list of str
-        Names of the files in it at any depth, in order, without hidden ones; none if there is no folder yet.
+        Names of the files in the folder at any depth, in order, without hidden files. Empty if there is no
+        folder yet.
 
     Raises
     ------
@@ -125,11 +126,11 @@ def files_within(folder: str | os.PathLike, first: str) -> list[str]:
 def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
     """Path of a temporary file that is renamed to ``path`` when the block ends without an error.
 
-    Within `all_or_none` it is renamed when that block ends. Until then an older file at ``path`` stays as it
-    was; an exception in the block (an interrupt, too) removes the temporary file. The new file has the
-    permissions of the file that it replaces, or those that the umask gives a new file. A link is followed:
-    its target is replaced. A path that is no regular file (``/dev/stdout``, a pipe) is yielded itself, and
-    written directly.
+    Within `all_or_none` the file is renamed when the outer block ends. Until then an older file at ``path``
+    stays unchanged. An exception in the block (an interrupt, too) removes the temporary file. The new file
+    has the permissions of the file that it replaces. If there is no older file, the umask gives the
+    permissions. If ``path`` is a link, its target is replaced. If ``path`` is no regular file
+    (``/dev/stdout``, a pipe), it is yielded itself and written directly.
 
     Parameters
     ----------
@@ -144,8 +145,8 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the file cannot be written; an `OSError` that the block raises about the temporary file, as on a
-        full disk, becomes one too.
+        If the file cannot be written. An `OSError` that the block raises about the temporary file, as on a
+        full disk, becomes an `InputError` too.
     """
     path = Path(path)
     check_writable(path)
@@ -182,10 +183,10 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
 
 @contextmanager
 def all_or_none() -> Iterator[None]:
-    """Within the block, files of `atomic_writer` take their names when the block ends, all of them together.
+    """All files of `atomic_writer` in the block take their names together, when the block ends.
 
-    If the block ends with an error, no new file is left, and older files stay as they were. Paths that are
-    no regular files are written at once.
+    If the block ends with an error, no new file is left, and older files stay unchanged. Paths that are no
+    regular files are written at once.
 
     Raises
     ------
@@ -222,7 +223,7 @@ def write_text(path: str | os.PathLike, text: str) -> None:
 def write_json(path: str | os.PathLike, value: Any) -> None:
     """Write a value as JSON, indented by two, keys in their own order, whole or not at all.
 
-    JSON has no NaN and no infinity: they are written as ``null``. NumPy scalars and arrays are written as
+    JSON has no NaN and no infinity, so both are written as ``null``. NumPy scalars and arrays are written as
     numbers and lists.
 
     Raises
@@ -230,7 +231,7 @@ def write_json(path: str | os.PathLike, value: Any) -> None:
     InputError
         If the file cannot be written.
     TypeError
-        If the value holds an object that JSON has no form for.
+        If the value holds an object that has no form in JSON.
     """
     write_text(path, json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 

@@ -1,4 +1,4 @@
-"""Files of a run: no output replaces a file that the run reads, nor a file beside it of another program."""
+"""Files of a run. No output replaces a file that the run reads, or a file beside it of another program."""
 
 import os
 from collections.abc import Iterable, Iterator
@@ -25,14 +25,14 @@ _Path = str | os.PathLike[str]
 
 
 class RunFiles:
-    """What a run reads and what it is to write, in any order; a link is the file that it leads to."""
+    """Files that a run reads and files that it will write, in any order. A link counts as its target."""
 
     def __init__(self) -> None:
         self._read: set[object] = set()
         self._written: list[_Path] = []
 
     def reads(self, path: _Path) -> None:
-        """Record a file that is read, or that one that is read names; `OutputIsInput` if it is written."""
+        """Record a file that is read, or that a read file names. `OutputIsInput` if the file is an output."""
         keys = _keys(path)
         self._read |= keys
         for output in self._written:
@@ -40,14 +40,14 @@ class RunFiles:
                 raise OutputIsInput(output)
 
     def writes(self, path: _Path) -> None:
-        """Record an output; `OutputIsInput` if it is read."""
+        """Record an output. `OutputIsInput` if the file is read."""
         if _keys(path) & self._read:
             raise OutputIsInput(path)
         self._written.append(path)
 
     @contextmanager
     def active(self) -> Iterator["RunFiles"]:
-        """Let `reads` and `writes` be of this run within the block."""
+        """Let the functions `reads` and `writes` record into this run within the block."""
         token = _CURRENT.set(self)
         try:
             yield self
@@ -56,7 +56,7 @@ class RunFiles:
 
     @staticmethod
     def current() -> "RunFiles":
-        """The run of the block around, or a new one."""
+        """The run of the surrounding block, or a new run."""
         return _CURRENT.get() or RunFiles()
 
 
@@ -64,7 +64,7 @@ _CURRENT: ContextVar[RunFiles | None] = ContextVar("run", default=None)
 
 
 def _keys(path: _Path) -> set[object]:
-    """What two names of one file have in common: the path without links, the file's number on its disk."""
+    """Keys that all names of one file share: the path without links, the file's number on its disk."""
     real = os.path.realpath(path)
     keys: set[object] = {os.path.normcase(real)}
     try:
@@ -78,14 +78,14 @@ def _keys(path: _Path) -> set[object]:
 
 
 def reads(path: _Path) -> _Path:
-    """The path of a file that the run around reads, recorded by `RunFiles.reads` if there is a run."""
+    """The path of a file that the current run reads. `RunFiles.reads` records it if there is a run."""
     if run := _CURRENT.get():
         run.reads(path)
     return path
 
 
 def writes(path: _Path) -> None:
-    """Record a file that the run around is to write, see `RunFiles.writes`."""
+    """Record a file that the current run will write, see `RunFiles.writes`."""
     if run := _CURRENT.get():
         run.writes(path)
 
@@ -96,7 +96,7 @@ def check_beside(paths: Iterable[_Path]) -> None:
     Raises
     ------
     InputError
-        If there is a file of that name without `MARK` in it: another program, or the user, wrote it.
+        If there is a file of this name without `MARK` in it, because another program or the user wrote it.
     """
     for path in map(Path, paths):
         try:

@@ -1,4 +1,4 @@
-"""Types of options and of the keys of scene files: how a text is read, and which values are accepted."""
+"""Types of options and of keys of scene files: reading of texts, and check of values."""
 
 import math
 import re
@@ -30,42 +30,42 @@ __all__ = [
 
 
 class Value(click.ParamType):
-    """Type of an option: text on the command line; numbers, lists and texts in a file and in Python.
+    """Type of an option. The command line gives texts; files and Python give numbers, lists and texts.
 
     Attributes
     ----------
     remedy : str
-        What to give on the command line instead of a refused value: "give a whole number from 1 to 9".
+        Advice for the command line after a refused value: "give a whole number from 1 to 9".
     """
 
     remedy: str
 
     @property
     def in_python(self) -> str:
-        """The same for Python."""
+        """`remedy` for Python."""
         return self.remedy
 
     @property
     def in_file(self) -> str:
-        """The same for a scene file."""
+        """`remedy` for a scene file."""
         return self.in_python
 
     def read(self, value: Any) -> Any:
-        """The value of a text of the command line, or of what a scene file or Python gives in place of it.
+        """The value of a text of the command line, or of a value of a scene file or of Python.
 
         Raises
         ------
         ValueError
-            With the reason, if it is not accepted.
+            If the value is not accepted. The message has the reason.
         """
         return self.check(self.parse(value) if isinstance(value, str) else value)
 
     def parse(self, text: str) -> Any:
-        """Value of a text of the command line, not yet checked; `ValueError` if the text has no such form."""
+        """Value of a text of the command line, not yet checked. `ValueError` if the text has another form."""
         return text
 
     def check(self, value: Any) -> Any:
-        """The value as the option takes it; `ValueError` with the reason if it is not accepted."""
+        """The value in the option's own type. `ValueError` with the reason if the value is not accepted."""
         raise NotImplementedError
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str | None:
@@ -73,7 +73,7 @@ class Value(click.ParamType):
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Checked value of a text; `InputError` with the option and the text."""
+        """Checked value of a text. `InputError` with the option and the text if it is not accepted."""
         try:
             return self.read(value)
         except ValueError as error:
@@ -84,7 +84,7 @@ class Value(click.ParamType):
 
 
 class PartError(ValueError):
-    """Bad part of a value, with a reason and a remedy; ``key`` names the part: ``[2].color``."""
+    """Bad part of a value, with a reason and a remedy. ``key`` names the part, such as ``[2].color``."""
 
     def __init__(self, key: str, reason: str, remedy: str):
         super().__init__(reason)
@@ -92,7 +92,7 @@ class PartError(ValueError):
 
 
 def plain(value: Any) -> Any:
-    """A value with lists in place of arrays, and numbers of Python in place of NumPy's, at any depth."""
+    """A value with lists in place of arrays, and Python's numbers in place of NumPy's, at any depth."""
     if hasattr(value, "tolist"):
         return value.tolist()
     if type(value) in (list, tuple):
@@ -101,7 +101,7 @@ def plain(value: Any) -> Any:
 
 
 def shown(value: Any) -> str:
-    """Text of a value for a message: in one line, and at most 40 characters."""
+    """Text of a value for a message: one line of at most 40 characters."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list | tuple):
@@ -119,7 +119,7 @@ def shown_key(name: str) -> str:
 
 
 def _finite(value: Any, least: float = -math.inf, most: float = math.inf) -> float:
-    """A number between two others, both included; up to 1e300, so that squares of thousandths are finite."""
+    """A number in a range, ends included, up to 1e300, so that squares of thousandths are finite."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError("not a number")
     # Comparison comes before the conversion, which a huge whole number would overflow.
@@ -129,7 +129,7 @@ def _finite(value: Any, least: float = -math.inf, most: float = math.inf) -> flo
 
 
 def _floats(text: str, reason: str) -> list[float]:
-    """Numbers of a text with commas between them."""
+    """Numbers of a text, separated by commas."""
     try:
         return numbers_of_text(text)
     except ValueError:
@@ -146,7 +146,7 @@ class Whole(Value):
         self.remedy = f"give a whole number from {least} to {most}"
 
     def parse(self, text: str) -> Any:
-        """Number of a text of up to 18 digits, with a sign or without; other texts unchanged."""
+        """Number of a text of up to 18 digits, with or without a sign. Other texts stay unchanged."""
         return int(text) if re.fullmatch(r"[+-]?[0-9]{1,18}", text) else text
 
     def check(self, value: Any) -> Any:
@@ -171,7 +171,7 @@ class Few(Whole):
         return f"[{'|'.join(map(str, self.numbers))}]"
 
     def check(self, value: Any) -> Any:
-        """An `int` among them."""
+        """An `int` among the few numbers."""
         if super().check(value) not in self.numbers:
             raise ValueError("not one of the choices")
         return value
@@ -196,7 +196,7 @@ class Number(Value):
 
 
 class Vector(Value):
-    """A tuple of finite numbers whose length is one of ``counts``; a direction is not 0."""
+    """A tuple of finite numbers whose length is one of ``counts``. A direction is not 0."""
 
     def __init__(
         self, kind: str, counts: tuple[int, ...] = (3,), metavar: str = "X,Y,Z", direction: bool = False
@@ -210,7 +210,7 @@ class Vector(Value):
         return self.remedy.replace(f"give {self.name}", f'give {self.kind} or "{self.name}"', 1)
 
     def parse(self, text: str) -> Any:
-        """Numbers with commas between them."""
+        """Numbers separated by commas."""
         return _floats(text, f"not {self.kind}")
 
     def check(self, value: Any) -> Any:
@@ -224,7 +224,7 @@ class Vector(Value):
 
 
 class Color(Value):
-    """A colour: ``#rrggbb``, three numbers, or one number for all channels; its value is three numbers."""
+    """A colour: ``#rrggbb``, three numbers, or one number for all channels. Its value is three numbers."""
 
     name = "COLOR"
 
@@ -294,7 +294,7 @@ class Choice(Value):
     Parameters
     ----------
     kind : str
-        What the names stand for, used in messages: ``"method"``.
+        Kind of thing that the names stand for, used in messages: ``"method"``.
     names : iterable of str
         The names.
     """
@@ -316,7 +316,7 @@ class Choice(Value):
 
 
 class OutputFile(click.Path):
-    """Name of a file to write; an empty name, as from a shell variable that is not set, is refused."""
+    """Name of a file to write. An empty name, as from a shell variable that is not set, is refused."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name."""

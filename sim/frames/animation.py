@@ -1,4 +1,4 @@
-"""Animations: a camera that goes once round its target, and frames rendered by processes or machines."""
+"""Animations: a camera that goes round its target, and frames rendered by processes or machines."""
 
 import functools
 import os
@@ -45,17 +45,17 @@ __all__ = [
 
 
 def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
-    """A vector turned once round an axis, in equal steps, counter-clockwise as seen from the axis' tip.
+    """A vector in equal steps of one turn about an axis, counter-clockwise as seen from the axis' tip.
 
-    Step k is ``v cos a + (u x v) sin a + u (u·v) (1 - cos a)`` with the axis' unit vector u and
-    ``a = 2 pi k / count`` (Rodrigues). The first is the vector itself, to the bit.
+    Step k is ``v cos a + (u x v) sin a + u (u·v) (1 - cos a)`` (Rodrigues). Here u is the axis' unit vector,
+    and ``a = 2 pi k / count``. Step 0 is the vector itself, to the bit.
 
     Parameters
     ----------
     vector, axis : three floats
-        The axis not 0.
+        The axis must not be 0.
     count : int
-        Steps, at least 1.
+        Number of steps, at least 1.
 
     Returns
     -------
@@ -64,7 +64,8 @@ def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
     Raises
     ------
     ValueError
-        If ``count`` is over 1 and the vector lies along the axis: all steps would be equal but for rounding.
+        If ``count`` is over 1 and the vector lies along the axis. All steps would then be equal, except for
+        rounding.
     """
     vector, unit = np.asarray(vector, dtype=np.float64), normalise(axis)
     if count > 1 and np.linalg.norm(np.cross(normalise(vector), unit)) < 1e-6:
@@ -77,7 +78,7 @@ def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
 def turntable(camera: Camera, count: int) -> list[Camera]:
     """Cameras that go once round the target of a camera, about the axis ``up``, in equal steps.
 
-    The first is the given camera. The lights do not move.
+    The first camera is the given camera. The lights do not move.
 
     Raises
     ------
@@ -90,10 +91,10 @@ def turntable(camera: Camera, count: int) -> list[Camera]:
 
 
 def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
-    """Cameras of `Camera.framing` with one target, moved to the distance of the furthest.
+    """Cameras of `Camera.framing` with one target, moved to the largest of their distances.
 
-    Without this a turntable would come nearer wherever the mesh is narrow. All get the largest height of
-    picture and the nearest near plane among them.
+    Without this move a turntable would come nearer at angles where the mesh is narrow. All cameras get the
+    largest height of picture and the nearest near plane among them.
     """
     if len(cameras) == 1:
         return list(cameras)
@@ -117,13 +118,13 @@ class Animation:
     Parameters
     ----------
     scene : Scene
-        The scene; each frame has a camera of its own.
+        The scene. Each frame has a camera of its own.
     design : ShadingPipeline
         The pipeline.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     full : ShadingPipeline, optional
-        The pipeline that ``design`` is a specialisation of: the frames' errors are against its method and
+        The pipeline that ``design`` is a specialisation of. The frames' errors are relative to its method and
         model. ``None``: ``design`` itself.
     """
 
@@ -166,7 +167,7 @@ def _triangle_simulator(design: ShadingPipeline, engine: str, size: tuple[int, i
 def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
     """Render one frame, and compare it with the frame of the golden renderer.
 
-    A process builds or loads its model at the first frame. Threads of a process share one model: they render
+    A process builds or loads its model at the first frame. Threads of a process share one model. They render
     one after the other.
     """
     with _ONE_AT_A_TIME:
@@ -203,9 +204,9 @@ class FrameExecutor:
     Parameters
     ----------
     submit : callable
-        Takes a camera, returns the `concurrent.futures.Future` of its `AnimationFrame`.
+        Function from a camera to the `concurrent.futures.Future` of its `AnimationFrame`.
     workers : int
-        Frames at a time.
+        Number of frames rendered at a time.
     name : str
         Text for the report: ``"4 processes"``.
     """
@@ -219,7 +220,7 @@ class FrameExecutor:
 def process_executor(animation: Animation, jobs: int) -> Iterator[FrameExecutor]:
     """Processes on this machine that render frames, see `local_executor`.
 
-    The model must be in the cache, or each process builds it for itself.
+    If the model is not in the cache, each process builds it for itself.
 
     Parameters
     ----------
@@ -240,7 +241,7 @@ def dask_executor(animation: Animation, address: str) -> Iterator[FrameExecutor]
     Parameters
     ----------
     animation : Animation
-        Common settings of all frames; sent to each worker once.
+        Common settings of all frames. They are sent to each worker once.
     address : str
         Address of the scheduler, ``tcp://host:8786``.
     """
@@ -256,16 +257,16 @@ def dask_executor(animation: Animation, address: str) -> Iterator[FrameExecutor]
 
 
 def render_frames(executor: FrameExecutor, cameras: Sequence[Camera]) -> Iterator[tuple[int, AnimationFrame]]:
-    """Render a frame for each camera: pairs of index and frame, in the order in which they are finished.
+    """Render a frame for each camera, and yield pairs of index and frame in order of completion.
 
-    At most two frames a worker are submitted at a time, so that finished ones do not fill the memory.
+    At most two frames a worker are submitted at a time, so that finished frames do not fill the memory.
 
     Parameters
     ----------
     executor : FrameExecutor
         The workers.
     cameras : sequence of Camera
-        One a frame.
+        A camera for each frame.
     """
     waiting = iter(enumerate(cameras))
     pending: dict[Future[AnimationFrame], int] = {}
@@ -290,11 +291,11 @@ def render_frames(executor: FrameExecutor, cameras: Sequence[Camera]) -> Iterato
 
 
 def write_gif(path: str | os.PathLike, frames: Iterable[str | os.PathLike], milliseconds: int = 50) -> None:
-    """Write pictures of one size as an animated GIF that repeats for ever; whole or not at all.
+    """Write pictures of one size as an animated GIF that repeats for ever. The file is whole or not there.
 
     A GIF has 256 colours. All frames share one palette, so that no colour flickers. Pillow's maximum coverage
-    finds it among the colours of a regular sample of about a million pixels. Each colour counts once, so
-    that a wide background does not take most of the palette.
+    finds the palette among the colours of a regular sample of about a million pixels. Each colour counts
+    once, so that a wide background does not take most of the palette.
 
     Parameters
     ----------

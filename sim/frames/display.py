@@ -1,4 +1,4 @@
-"""Frames of a display: a top module simulated to its four lanes, on one clock, and the lanes decoded."""
+"""Frames of a display: simulation of a top module on one clock, and decoding of its four lanes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,29 +19,30 @@ from blysk.sim.engines.simulate import simulate
 __all__ = ["OneClock", "Shown", "show"]
 
 CYCLES = 4
-"""Cycles of the serial clock in one output beat, which has 32 bits."""
+"""Cycles of the serial clock in one output beat of 32 bits."""
 
 
 class OneClock(wiring.Component):
     """A top module with the clocks ``sync``, ``pixel`` and ``serial``, driven by one clock, for the engines.
 
-    The one clock is the serial clock. The registers of ``pixel`` are enabled in every fifth of its cycles,
-    those of ``sync`` in a share ``rate`` of them, spread evenly: each register behaves as with a clock of its
-    own whose edges coincide with edges of the serial clock. The output cells are `OutputCells`, our models.
+    The one clock is the serial clock. The registers of ``pixel`` are enabled in every fifth cycle. The
+    registers of ``sync`` are enabled in a share ``rate`` of the cycles, spread evenly. So each register
+    behaves as with a clock of its own whose edges coincide with edges of the serial clock. The output cells
+    are the models `OutputCells`.
 
     Parameters
     ----------
     top : Component
         With the members ``pairs`` and ``status``, and perhaps ``buttons``.
     rate : Fraction
-        Rate of ``sync`` over that of ``serial``, at most 1.
+        Rate of ``sync`` over the rate of ``serial``, at most 1.
 
     Members
     -------
     i : :py:`In(stream.Signature(buttons))`
         State of the buttons from this cycle on.
     o : :py:`Out(stream.Signature(32))`
-        Bits of the lanes in four cycles; for each cycle two bits of lane 0, two of lane 1, and so on. The
+        Bits of the lanes in four cycles: for each cycle two bits of lane 0, two of lane 1, and so on. The
         sink must be ready in every cycle.
     status : :py:`Out(...)`
         The top's counters.
@@ -105,7 +106,7 @@ class OneClock(wiring.Component):
 
 @dataclass(frozen=True)
 class Shown:
-    """Frames that a display shows, and counters.
+    """The frames that a display shows, and the counters.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def show(
     engine: str = "cxxrtl",
     progress: Callable[[int], object] | None = None,
 ) -> Shown:
-    """Simulate a top for some frames of its display, and decode what its lanes send.
+    """Simulate a top for some frames of its display, and decode the bits of its lanes.
 
     Parameters
     ----------
@@ -141,16 +142,16 @@ def show(
     count : int
         Frames, from the first after power-up.
     buttons : int array, optional
-        State of the buttons from power-up on: a value for each cycle, the last one then stays.
+        State of the buttons from power-up on: a value for each cycle. The last value then stays.
     engine : str
-        As `simulate` has it.
+        ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     progress : callable, optional
         Called with the pixels sent so far.
 
     Raises
     ------
     LaneError
-        If a display would not show what the lanes send.
+        If a display would not show the bits of the lanes.
     SimulationError
         If the simulation goes wrong.
     """

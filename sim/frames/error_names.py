@@ -1,4 +1,4 @@
-"""Kinds of errors of a frame, and what each compares with."""
+"""Kinds of errors of a frame, and the frame that each compares with."""
 
 __all__ = ["ERRORS", "reference_of"]
 
@@ -7,7 +7,7 @@ ERRORS = {
     "method": "exact normals of every pixel, same model",
     "total": "exact normals of every pixel, model {}",
 }
-"""Name of each error, and the frame that it compares with; ``{}``: a model, see `reference_of`."""
+"""Name of each error, and the frame that it compares with. ``{}`` stands for a model, see `reference_of`."""
 
 
 def reference_of(error: str, target: str) -> str:

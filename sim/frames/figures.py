@@ -68,9 +68,9 @@ def triangle_figures(
 ) -> dict[str, Any]:
     """Figures of a frame by simulated geometry, ready for `write_json`.
 
-    There is no ``arithmetic_error``, as the hardware makes its own spans. ``cycles`` counts from the first
-    triangle until the hardware is empty, ``triangle_cycles`` to the cycle in which the last triangle is
-    taken.
+    There is no ``arithmetic_error``, because the hardware makes its own spans. ``cycles`` counts from the
+    first triangle until the hardware is empty. ``triangle_cycles`` ends in the cycle in which the last
+    triangle is taken.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def triangle_figures(
 
 
 def sharp_lobes(scene: Scene, design: ShadingPipeline) -> int:
-    """Number of lobes that the method ``quotient`` has over 0.25 LSB off between two entries of a table."""
+    """Number of lobes that are over 0.25 LSB off between two entries of a table of ``quotient``."""
     if design.specular is None:
         return 0
     return sum(map(design.specular.is_sharp, set(map(design.highlight_parameter, scene.materials))))
@@ -165,13 +165,13 @@ def _errors(comparison: Comparison, names: Iterable[str]) -> dict[str, Any]:
 
 
 def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Figures of several frames: sums, the worst errors, and those of each frame.
+    """Figures of several frames: sums, worst errors, and the figures of each frame.
 
     Parameters
     ----------
     frames : sequence of dict
         Figures of `frame_figures` or `triangle_figures`, all of one scene and pipeline. ``triangles`` of the
-        result is the largest of the frames.
+        result is the largest number of a frame.
     """
     same = ("method", "model", "exponent", "roughness", "lights", "materials", "style", "gate", "engine")
     same += ("width", "height", "target", "border", "step_lsb")
@@ -199,9 +199,10 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def worst_errors(figures: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
-    """The worst value of each error over several frames: the largest, but the least PSNR.
+    """The worst value of each error over several frames: the least PSNR, the largest of the others.
 
-    Frames that show no surface have no errors and do not count; if no frame shows one, every figure is NaN.
+    Frames that show no surface have no errors and do not count. If no frame shows a surface, every figure is
+    NaN.
 
     Parameters
     ----------
@@ -229,8 +230,8 @@ def saving_figures(specialisation: Specialisation) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``full`` and ``specialised``: number of each resource; ``reductions``: of each reduction its
-        ``reason``, and what it ``saves`` in addition to the reductions before it.
+        ``full`` and ``specialised`` have the number of each resource. ``reductions`` has the ``reason`` of
+        each reduction, and the resources that it ``saves`` in addition to the reductions before it.
     """
     full, steps = specialisation.costs()
     before = [full, *steps]

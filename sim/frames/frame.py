@@ -42,7 +42,7 @@ class SimulatedFrame(Picture):
 
 
 _IDLE = 1000
-"""Idle timeout of several pipelines: cycles without a beat after which they are done; a pixel takes less."""
+"""Idle timeout of several pipelines: cycles without a beat after which they are done. A pixel takes less."""
 
 
 def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dict[str, np.ndarray]:
@@ -68,9 +68,9 @@ def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dic
 
 
 def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Pixels of wide beats, sorted to the order of one pipeline, whose pixels have the scanlines ``y``.
+    """Pixels of wide beats, sorted to the order of one pipeline. ``y`` are the scanlines of its pixels.
 
-    Within a scanline both orders are that of its spans.
+    Within a scanline both orders are the order of its spans.
     """
     lanes = beats["pixels"].shape[1]
     pixels = beats["pixels"][(beats["present"][:, np.newaxis] >> np.arange(lanes) & 1).astype(bool)]
@@ -87,7 +87,7 @@ class FrameSimulator:
     Parameters
     ----------
     design : ShadingPipeline
-        The pipeline: method, reflection model, number of lights and so on; its `Build` has the number of
+        The pipeline: method, reflection model, number of lights and so on. Its `Build` has the number of
         pipelines.
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
@@ -97,12 +97,12 @@ class FrameSimulator:
     engine : str
         The engine in use: ``"cxxrtl"`` or ``"pysim"``.
     build_seconds : float
-        Time to build or load the model, its check included.
+        Seconds to build or load the model, its check included.
 
     Raises
     ------
     SimulationError
-        If the pixels of the new model are not those of the bit-accurate model.
+        If the pixels of the new model differ from the pixels of the bit-accurate model.
     CompilerMissing
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
@@ -147,16 +147,16 @@ class FrameSimulator:
         progress: Callable[[int, int], object] | None = None,
         vcd: str | None = None,
     ) -> SimulatedFrame:
-        """Send a scene's spans through the pipeline, and its pixels into a frame buffer.
+        """Send a scene's spans through the pipeline, and write the pixels into a frame buffer.
 
         Parameters
         ----------
         scene : Scene
-            What to draw; at most as many lights as the design has.
+            The scene, with at most as many lights as the design has.
         progress : callable, optional
             Called now and then with the number of pixels so far and in all.
         vcd : str, optional
-            File for the waveforms; engine ``"pysim"`` only.
+            File for the waveforms. Only for the engine ``"pysim"``.
 
         Raises
         ------

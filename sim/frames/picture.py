@@ -22,20 +22,20 @@ _EXACT: dict[str, dict[str, Any]] = {
     "PNG": {},
     "WEBP": {"lossless": True, "exact": True},
 }
-"""Formats that keep every pixel, with Pillow's options for it."""
+"""Formats that keep every pixel, with Pillow's options for this."""
 
 _LOSSY: dict[str, dict[str, Any]] = {
     "AVIF": {"quality": 100, "subsampling": "4:4:4"},
     "GIF": {"comment": MARK},
     "JPEG": {"quality": 95, "subsampling": "4:4:4"},
 }
-"""Formats that change pixels, which is told, with options for a small change."""
+"""Formats that change pixels, with options for a small change. A warning tells of the change."""
 
 _COLOR_MAP = "inferno"
 
 
 def check_image_path(path: str | os.PathLike) -> None:
-    """Check, before long work, that a picture can be written to a file; leaves nothing behind.
+    """Check, before long work, that a picture can be written to a file. The check leaves nothing behind.
 
     Raises
     ------
@@ -58,17 +58,17 @@ def _picture_format(path: str | os.PathLike) -> str:
 
 
 def write_image(path: str | os.PathLike, image: np.ndarray) -> None:
-    """Write a frame as a picture; the suffix chooses the format. The file is whole or not there at all.
+    """Write a frame as a picture in the format of the suffix. The file is whole or not there at all.
 
     PNG, WebP, TIFF, BMP, PPM, TGA, QOI, JPEG 2000, PCX, SGI and DDS keep every pixel to the bit. JPEG, AVIF
-    and GIF may not: a ``RuntimeWarning`` then tells how far a channel of the file is off at most.
+    and GIF may change pixels. A ``RuntimeWarning`` then gives the largest error of a channel in the file.
 
     Parameters
     ----------
     path : path
         The output file, with a suffix that Pillow can write.
     image : uint8 array, shape (height, width, 3)
-        Red, green, blue; row 0 is at the top.
+        Red, green, blue. Row 0 is at the top.
 
     Raises
     ------
@@ -99,13 +99,13 @@ def write_comparison(
     """Write one picture of three panels: simulated frame, golden frame, and error map with its scale.
 
     The error of a pixel is the largest of its three channels' ``|simulated - 255 golden|``, in units of the
-    last place (LSB) of the 8-bit channel. The golden frame is not rounded for it, so half an LSB is what
-    rounding alone costs. The golden panel shows ``round(255 golden)``. The scale of the map goes from 0 to
-    the largest error, or to 1 LSB if that is less.
+    last place (LSB) of the 8-bit channel. The golden frame is not rounded for this, so rounding alone makes
+    an error of up to half an LSB. The golden panel shows ``round(255 golden)``. The scale of the map goes
+    from 0 to the largest error, and at least to 1 LSB.
 
-    The panels show the frames pixel for pixel, from 1 x 1 to 4095 x 4095 and beyond. The text grows with
-    the frame's width, from 14 to 96 pixels; the margins widen where a small frame or a long title needs
-    it. The picture of a frame of 4095 x 4095 is 12,700 pixels wide.
+    The panels show the frames pixel for pixel, from 1 x 1 to 4095 x 4095 and beyond. The text grows with the
+    frame's width, from 14 to 96 pixels. The margins widen if a small frame or a long title needs more room.
+    The picture of a frame of 4095 x 4095 is 12,700 pixels wide.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def write_comparison(
     InputError
         If the suffix names no picture format, or the file cannot be written.
     ValueError
-        If a frame has another shape or type, or ``golden`` leaves [0, 1].
+        If a frame has another shape or type, or a value of ``golden`` is outside [0, 1].
     """
     _check_frame(simulated)
     if golden.shape != simulated.shape or golden.dtype != np.float64:
@@ -182,7 +182,7 @@ def write_comparison(
 
 
 def _drawable(text: str, weight: str) -> str:
-    """A text with ``?`` for what Matplotlib's font cannot draw, such as letters of a file's name."""
+    """A text with ``?`` for characters that Matplotlib's font lacks, such as letters of a file's name."""
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
     known = get_font(findfont(FontProperties(weight=weight))).get_charmap()

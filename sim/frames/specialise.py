@@ -1,4 +1,4 @@
-"""Specialisation: the smallest pipeline that draws given scenes, and the reason of each reduction."""
+"""Specialisation: the smallest pipeline that draws given scenes, and the reason for each reduction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,9 +25,9 @@ class Reduction(NamedTuple):
     Parameters
     ----------
     reason : str
-        One line that names the part and why it is not needed.
+        One line with the part, and the reason why the scenes do not need it.
     changes : dict
-        New values of fields of `ShadingPipeline`. For a field that is itself a record: a dict of its changed
+        New values of fields of `ShadingPipeline`. A field that is itself a record has a dict of its changed
         fields.
     """
 
@@ -54,7 +54,7 @@ class Specialisation:
     reductions : tuple of Reduction
         The parts that the scenes do not need.
     scenes : tuple of Scene
-        The scenes that `design` draws: lights without effect left out, and equal materials merged.
+        The scenes that `design` draws, without lights that have no effect, and with equal materials merged.
     """
 
     full: ShadingPipeline
@@ -67,7 +67,7 @@ class Specialisation:
         return reduce(_without, self.reductions, self.full)
 
     def costs(self) -> tuple[Cost, tuple[Cost, ...]]:
-        """Cost of the full pipeline, and of that with the first reduction, with the first two, and so on."""
+        """Costs of the full pipeline, with the first reduction, with the first two, and so on."""
         designs = accumulate(self.reductions, _without, initial=self.full)
         costs = [cost_of(ShadingPipelineUnit(design)) for design in designs]
         return costs[0], tuple(costs[1:])
@@ -78,13 +78,21 @@ def specialise(
 ) -> Specialisation:
     """The smallest pipeline for a scene, without the parts that the scene does not use.
 
-    These are left out: lights that light nothing; the specular path, if no span has specular light; the
-    highlight gate, if there is nothing to gate; the memory of materials, if all are equal; the PROM, if there
-    is one exponent; two of three channels, if all colours are grey; and the upper bits of coordinates and
-    lengths. The words of the arithmetic keep their widths, so that every pixel stays the same. Vectors of
-    spans depend on all lights and on the highlights: a method that takes them keeps both. If not
-    ``exact`` and all spans are short, the differences of ``chord-local`` also get fewer bits: the error
-    bound stays, pixels may change.
+    These parts are left out:
+
+    - lights that light nothing;
+    - the specular path, if no span has specular light;
+    - the highlight gate, if there is nothing to gate;
+    - the memory of materials, if all are equal;
+    - the PROM, if there is one exponent;
+    - two of three channels, if all colours are grey;
+    - the upper bits of coordinates and lengths.
+
+    The words of the arithmetic keep their widths, so that every pixel stays the same. Vectors of spans depend
+    on all lights and on the highlights. A method with vectors of spans therefore keeps both.
+
+    If ``exact`` is false and all spans are short, the differences of ``chord-local`` also get fewer bits. The
+    error bound stays, but pixels may change.
 
     Parameters
     ----------

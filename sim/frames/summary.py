@@ -41,7 +41,7 @@ _REMEDIES = {
     "out_of_range_spans": "their pixels are wrong: use another method, or divide the triangles",
     "sharp_lobes": "use method chord-local",
 }
-"""Remedy for a count; it follows a semicolon."""
+"""Remedy for a count, as a text behind a semicolon."""
 
 _WARNINGS = (
     *("opposed_faces", "repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals"),
@@ -181,7 +181,7 @@ def _bound(figures: Mapping[str, Any]) -> str:
 
 
 def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:
-    """The pixels that the largest error and the bound leave out."""
+    """The pixels that the largest error and the bound do not include."""
     count = figures["border_pixels"]
     if count:
         most = max(figures[f"{name}_error"]["border_lsb"] for name in ("total", "method"))
@@ -225,7 +225,7 @@ def _remedy(key: str) -> str:
 
 
 def _ignored_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """One line of everything in a mesh file that changes the picture and was not read."""
+    """One line that names everything in a mesh file that changes the picture but was not read."""
     if figures.get("ignored"):
         yield _line("ignored", "; ".join(figures["ignored"]))
 

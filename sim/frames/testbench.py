@@ -34,7 +34,7 @@ _TRIANGLES = 400
 def teapot_frame(
     design: ShadingPipeline, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
 ) -> tuple[Spans, list[FrameConstants], Pixels]:
-    """A teapot for a pipeline, with as many lights and materials as it has, and no term too bright.
+    """A teapot with as many lights and materials as a pipeline has, and with no term too bright.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ def teapot_frame(
     size : two ints
         Width and height of the picture.
     triangles : int
-        Number of triangles of the teapot, about.
+        Approximate number of triangles of the teapot.
 
     Returns
     -------
     spans : Spans
-        The input. The first span is of length 0, and gives no pixel.
+        The input. The first span has length 0, so it gives no pixel.
     constants : list of FrameConstants
         The constants of each material.
     pixels : Pixels
@@ -83,7 +83,7 @@ def teapot_frame(
 
 
 def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[str, np.ndarray]]:
-    """Inputs and expected outputs of a pipeline for a small frame, by the ports of its Verilog.
+    """Inputs and expected outputs of a pipeline for a small frame, by port of its Verilog.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[s
     Returns
     -------
     dict of dict of int arrays
-        For each of ``writes``, ``spans``, ``pixels`` and ``status`` a column of codes for each port, all of
+        For each of ``writes``, ``spans``, ``pixels`` and ``status``: a column of codes for each port, all of
         one length. See `teapot_frame`.
     """
     several = isinstance(unit.model, PixelPipelines)
@@ -121,7 +121,7 @@ def pixel_beats(pixels: Pixels) -> dict[str, np.ndarray]:
 
 
 def _columns(name: str, beats) -> Iterator[tuple[str, np.ndarray]]:
-    """Port and codes of every field of beats; the ports are those of `emit`."""
+    """Port and codes of every field of beats. The ports have the names of `emit`."""
     if np.ndim(beats) > 1:
         parts = ((index, beats[:, index]) for index in range(beats.shape[1]))
     elif isinstance(beats, Mapping):
@@ -136,7 +136,7 @@ def _columns(name: str, beats) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def check_folder(folder: str | os.PathLike) -> None:
-    """Check that a bench can be written into a folder; writes nothing.
+    """Check that a bench can be written into a folder. The check writes nothing.
 
     Raises
     ------
@@ -159,11 +159,11 @@ def write_testbench(
     Parameters
     ----------
     folder : path
-        New or empty, see `check_folder`.
+        A new or an empty folder, see `check_folder`.
     unit : ShadingPipelineUnit or MergedPipelinesUnit
         The pipeline, or several with one stream of pixels.
     name, text : str
-        Its top module, and its Verilog.
+        Name of its top module, and its Verilog.
     about : sequence of str
         Lines of README.md that describe the pipeline.
 

@@ -1,4 +1,4 @@
-"""Frames by triangles: scenes through simulated geometry, shading and depth test."""
+"""Frames from triangles: scenes through simulated geometry, shading and depth test."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -29,17 +29,17 @@ from blysk.sim.frames.frame import sample_constants
 __all__ = ["LARGEST_PICTURE", "SimulatedTriangleFrame", "TriangleSimulator", "sample_triangles"]
 
 LARGEST_PICTURE = 1 << 21
-"""Pixels of the largest simulated memory of depths: 3 kB each while its model is built."""
+"""Pixels of the largest simulated memory of depths. Each takes 3 kB while the model is built."""
 
 _IN_UNITS = 26
-"""Triangles inside the hardware, without those that wait in FIFOs of a throughput style, at most."""
+"""Largest number of triangles inside the hardware, except in FIFOs of the throughput style."""
 
 _PAUSE = 10_000
-"""Cycles without a beat at the end of a picture that shows everything."""
+"""Cycles without a beat at the end of a picture without hidden triangles."""
 
 
 class _Timed(wiring.Component):
-    """A `RendererUnit` with one counter more, ``busy``: the cycles in which something is inside it."""
+    """A `RendererUnit` with one more counter: ``busy`` counts the cycles in which the unit is not empty."""
 
     def __init__(self, unit: RendererUnit):
         self._unit = unit
@@ -69,17 +69,17 @@ class SimulatedTriangleFrame:
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     sent : SceneTriangles
-        The triangles that were sent, with the frame's constants.
+        The triangles that were sent, and the frame's constants.
     counts : dict of str to int
         `RendererUnit`'s counters, and `missed_pieces`.
     written : int
-        Pixels written, with those that a nearer surface replaced later.
+        Number of pixels written, including pixels that a nearer surface replaced later.
     visible : int
-        Pixels of the picture that show the surface.
+        Number of pixels of the picture that show the surface.
     cycles : int
         Cycles from the first triangle until the hardware is empty.
     input_cycles : int
-        Cycles until the last triangle was taken in.
+        Cycles until the last triangle was taken.
     engine : {"cxxrtl", "pysim"}
         The simulator.
     seconds : dict
@@ -108,7 +108,7 @@ class SimulatedTriangleFrame:
 
 
 def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
-    """Some triangles about the top left corner of a picture, inside the grid, to check a new model with.
+    """Some triangles around the top left corner of a picture, inside the grid, for the check of a new model.
 
     Parameters
     ----------
@@ -148,12 +148,12 @@ class TriangleSimulator:
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     angle : float, optional
-        Widest piece of a span in degrees; by default `SPAN_ANGLE`.
+        Widest piece of a span in degrees, by default `SPAN_ANGLE`.
 
     Raises
     ------
     SimulationError
-        If the pixels of the new model are not those of the bit-accurate model.
+        If the pixels of the new model differ from the pixels of the bit-accurate model.
     CompilerMissing
         If the engine is ``"cxxrtl"`` and no C++ compiler works.
     """
@@ -195,7 +195,7 @@ class TriangleSimulator:
             raise SimulationError("the simulated hardware's pixels are not those of its bit-accurate model")
 
     def _constants(self, frame: FrameSettings) -> dict[str, int]:
-        """Codes of the frame's constants, as for the first picture."""
+        """Codes of the frame's constants, as they are for the first picture."""
         return frame.codes | ({} if self.renderer.coarse is None else {"picture": 0})
 
     def render(
@@ -209,11 +209,11 @@ class TriangleSimulator:
         Parameters
         ----------
         scene : Scene
-            What to draw, of the simulator's size.
+            The scene, of the simulator's size.
         progress : callable, optional
-            Called at times; both numbers are the pixels written so far, as the total is unknown.
+            Called at times. Both numbers are the pixels written so far, because the total is unknown.
         vcd : str, optional
-            File for the waveforms; engine ``"pysim"`` only.
+            File for the waveforms. Only for the engine ``"pysim"``.
 
         Raises
         ------
@@ -273,10 +273,10 @@ class TriangleSimulator:
         )
 
     def _longest_silence(self, sent: SceneTriangles) -> int:
-        """Upper bound of the cycles without a beat, as all triangles inside the hardware may be hidden.
+        """Upper bound of the cycles without a beat, if all triangles inside the hardware are hidden.
 
-        The pixels of a triangle are at most its area, half its perimeter and 1. The triangles inside follow
-        one another among those that are drawn.
+        A triangle has at most as many pixels as the sum of its area, half its perimeter and 1. The triangles
+        inside follow one another among the drawn triangles.
         """
         geometry, frame, steps = self._render.geometry, sent.frame, self.renderer.geometry.grid.steps
         drawn, _ = VertexSort(geometry.grid).compute(sent.triangles, frame)

@@ -32,7 +32,7 @@ _START = "start one with `dask scheduler`, and give its address, as tcp://host:8
 
 
 def processors() -> int:
-    """Processors that this process may use."""
+    """Number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:
@@ -52,9 +52,9 @@ def local_executor(
     jobs : int
         Number of processes.
     begin : callable, optional
-        Called first in each process, with ``arguments``, which are sent once and not with every task.
+        Called first in each process, with ``arguments``. The arguments are sent once, not with every task.
     arguments : tuple
-        Of ``begin``.
+        Arguments of ``begin``.
 
     Raises
     ------
@@ -91,7 +91,7 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _end_with_parent() -> None:
-    """Wait until the process that started this one is gone, and end: SIGKILL left it no time to tell."""
+    """Wait until the parent process is gone, then end. A parent that gets SIGKILL cannot tell its workers."""
     multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
     os._exit(1)
 
@@ -118,12 +118,12 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def check_address(address: str) -> None:
-    """Check, before long work, that an address has the form of a scheduler's, and that Dask is installed.
+    """Check, before long work, that a text has the form of a scheduler's address, and that Dask is installed.
 
     Raises
     ------
     InputError
-        If the form is another, or Dask is missing.
+        If the text has another form, or Dask is missing.
     """
     option = f"--cluster {address}"
     # Dask's client, given what is no address, stays behind half built.
@@ -138,7 +138,7 @@ def cluster_client(address: str) -> Iterator["Client"]:
     """Dask's client of a scheduler whose workers have this version of blysk.
 
     Each worker builds its models in its own cache. An exception in the block cancels the waiting tasks; Dask
-    cannot stop the running ones. Dask's messages are pickled Python: use only an address that you trust.
+    cannot stop the running ones. Dask's messages are pickled Python, so use only an address that you trust.
 
     Parameters
     ----------
@@ -148,8 +148,8 @@ def cluster_client(address: str) -> Iterator["Client"]:
     Raises
     ------
     InputError
-        If Dask is not installed, no scheduler answers, or it has no workers, workers of another version, or
-        loses them.
+        If Dask is not installed, no scheduler answers, or the scheduler has no workers. Also if its workers
+        have another version of blysk or are lost.
     """
     option = f"--cluster {address}"
     check_address(address)
