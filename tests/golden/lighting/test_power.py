@@ -58,7 +58,7 @@ def test_error_of_a_cosine():
 
 
 def test_first_order_bound():
-    """The sum that the docstring states: every cut product's error times its way to the result."""
+    """The sum of docs/theory/bounds.md#power: every cut product's error times its way to the result."""
     worst, at = 0, None
     for n in range(1, 1001):
         bits = [j for j in range(10) if n >> j & 1]

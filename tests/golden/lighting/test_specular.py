@@ -155,7 +155,7 @@ def test_error_and_monotony_at_every_exponent(model, operand, step):
 
 @pytest.mark.parametrize("model", COSCOS_MODELS)
 def test_first_order_bound_of_coscos(model):
-    """The sum that the docstring states, up to x = 1.7: every cut, times how fast the term falls with w."""
+    """The sum of docs/theory/bounds.md#specular-terms, up to x = 1.7: every cut times the fall with w."""
     unit, (power, rule) = Specular(REFLECTION_MODELS[model]), COSCOS_MODELS[model]
     worst = 0
     for exponent in (*range(1, 33), *range(33, 1001, 31), 1000):
@@ -180,8 +180,8 @@ def test_first_order_bound_of_coscos(model):
 def test_boundaries_of_coscos(model):
     """The cosine at the last lit argument, and one step of the shifted word on, is the cutoff to 2^-14.
 
-    The base is read too high by at most 4.3e-5 there, the sum of the docstring with a slope of pi/4; a step
-    is up to 1.2e-5 of it. Not so for n = 1, whose lobe reaches where the chords of e fail.
+    The base is read too high by at most 4.3e-5 there, the sum of docs/theory/bounds.md#specular-terms with a
+    slope of pi/4. A step is up to 1.2e-5 of it. The lobe of n = 1 is left out: there the chords of e fail.
     """
     unit, exponents = Specular(REFLECTION_MODELS[model]), EVERY_EXPONENT[1:]
     scale = np.array([coscos_scale(n, *COSCOS_MODELS[model]) for n in exponents.tolist()])

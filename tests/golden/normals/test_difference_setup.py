@@ -12,7 +12,7 @@ UNIT, PUBLISHED = DifferenceSetup(), DifferenceSetup(as_published=True)
 LENGTHS = np.arange(1, 4096)
 STEP = 2.0**-17
 SQUARE = 2.0**-16 + 2.0**-17 + 2.0**-34
-"""Relative error of dt^2 and of a product with it; the docstring leaves out the term of second order."""
+"""Relative error of dt^2 and of a product with it."""
 
 
 def compute(g, p, length, unit=UNIT):
@@ -113,7 +113,7 @@ def test_zero_coefficients_stay_zero():
 
 
 def test_published_order():
-    """``(G dt + P) dt`` and ``2 (G dt) dt``: the end of the curve within the bound of the docstring.
+    """``(G dt + P) dt`` and ``2 (G dt) dt``: the end of the curve within its bound.
 
     For coefficients up to half of their words, where ``G dt + P`` does not saturate; every length.
     """
