@@ -142,7 +142,7 @@ def price(printed: float, own: dict[str, float], other: dict[str, float]) -> flo
 
 
 def _shown(counts: dict[str, float]) -> str:
-    return ", ".join(f"{count:.2g} {kind}" for kind, count in counts.items())
+    return ", ".join(f"{kind} {count:.2g}" for kind, count in counts.items())
 
 
 def software(way: str, baseline: str, pixels: int, printed: float, repeats: int) -> dict[str, Any]:
