@@ -31,8 +31,8 @@ WAITING_SPANS = 512
 
 Block RAMs hold 512 words. A memory of 32 words in look-up tables takes more logic than the block RAMs' ports.
 If the spans of a mesh have about as many pixels as there are pipelines, the span port has no cycle to spare.
-Each cycle on which a full FIFO stops it is then lost. For the 10,712 triangles of the teapot at 640x480 four
-pipelines give 3.3 times the pixels of one pipeline with 32 words, and 3.6 times with 512.
+Each cycle on which a full FIFO stops it is then lost. An example is the teapot of 10,712 triangles at
+640x480. Four pipelines give 3.3 times the pixels of one pipeline with 32 words, and 3.6 times with 512.
 """
 
 

@@ -261,17 +261,17 @@ def cut_by_error(
 
     - its angle is over the method's `Interpolator.widest_span`;
     - ``chord-local`` would flag it: a word of `ChordSetup` would overflow;
-    - it has pixels between the places of the method's curve, and either vectors turn farther along it than
-      `LocalChordInterpolator` allows, or the error of N·L or u is over its tolerance. The tolerance of u
-      depends on the exponent of the span's material and on the least u of the span, because dark spans may
-      have larger errors;
-    - N·L of a light changes its sign, or nearly, where its highlight shows, and N·L of a pixel might have
-      another sign than the exact value. Exact values within 2^-25 of 0 are left out;
+    - it has pixels between the places of the method's curve, and vectors turn farther than
+      `LocalChordInterpolator` allows;
+    - it has pixels between these places, and the error of N·L or u is over its tolerance;
+    - N·L of a light changes its sign, or nearly, where its highlight shows, so that N·L of a pixel might have
+      the wrong sign. Exact values within 2^-25 of 0 are left out;
     - the errors of a light that fades, with N·L times its factor, are over the budgets of
       `LocalChordInterpolator` at any pixel. Here every pixel is checked.
 
-    For a light that is behind the surface along the whole span only the turn counts. A light that is off has
-    no effect.
+    The tolerance of u depends on the exponent of the span's material. It also depends on the least u of the
+    span, because dark spans may have larger errors. For a light that is behind the surface along the whole
+    span only the turn counts. A light that is off has no effect.
 
     Parameters
     ----------

@@ -76,9 +76,9 @@ def _missed(
 def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dict[str, int]:
     """Numbers of the pieces that are off by more than the tolerances of `LocalChordInterpolator`.
 
-    Geometry cuts a span by an angle. The angle bounds the error of a method's curve only where the lengths of
-    N/W at both ends of a piece are equal. So N·L and u of the curve are compared with N·L and u of the
-    piece's own line at its quarters, as `cut_by_error` does before it cuts. The quarters give the error in
+    Geometry cuts a span by an angle. The angle bounds the error of a method's curve only if N/W has the same
+    length at both ends of a piece. So N·L and u of the curve are compared with their values on the piece's
+    own line, at its quarters. `cut_by_error` does the same before it cuts. The quarters give the error in
     between up to a factor, which was found by search, see `LocalChordInterpolator`.
 
     The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle. This error

@@ -42,8 +42,8 @@ class Edges:
     fraction : int64 array, shape (T,)
         Fraction of the long edge's step, ``floor(2^32 error_step / height)``.
     down : int64 array, shape (T,)
-        Distance from the first corner down to the centre of the first scanline, modulo a pixel, in 1/256
-        pixel on any grid: 0 to 255.
+        Distance from the first corner down to the centre of the first scanline, modulo a pixel. It is in
+        1/256 pixel on any grid, 0 to 255.
     along : int64 array, shape (T,)
         ``256 (x - x0 + 1/2) - down step`` of the long edge, x and x0 in pixels: see `GradientSetup`.
     """

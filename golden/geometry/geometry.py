@@ -123,8 +123,8 @@ class Geometry:
         Returns
         -------
         spans : TrueSpans, or with ``lines`` LineSpans, with ``vectors`` VectorSpans
-            In the order of the triangles, within a triangle from top to bottom, within a scanline from the
-            long edge on. Their ``triangle`` is the index in ``triangles``.
+            They are in the order of the triangles. Within a triangle they go from top to bottom, within a
+            scanline from the long edge on. Their ``triangle`` is the index in ``triangles``.
         counts : dict of str to int
             `COUNTERS`.
 

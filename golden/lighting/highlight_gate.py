@@ -19,8 +19,8 @@ __all__ = ["GateLimits", "HighlightGate"]
 class GateLimits:
     """Bounds of a method, for its spans up to an angle. A highlight gate relies on them.
 
-    With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of `ONE_SQUARED`,
-    no pixel has an N·H over ``c + excess``, or a 1 - N·H under ``shortest (1 - c) - excess``.
+    Let c be the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
+    `ONE_SQUARED`. No pixel has an N·H over ``c + excess``, or a 1 - N·H under ``shortest (1 - c) - excess``.
 
     Parameters
     ----------

@@ -60,9 +60,9 @@ class EndNormalInterpolator(Interpolator):
     def highlight_excess(self) -> float:
         """Bound of the excess of N·H over N·H of the great circle, for spans up to `gate_angle`.
 
-        With c the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
-        `ONE_SQUARED`, no pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under ``shortest_normal
-        (1 - c) - highlight_excess``. A highlight gate relies on it.
+        Let c be the largest cosine to H on the arc of the great circle from N_l to N_r, in units of
+        `ONE_SQUARED`. No pixel has an N·H over ``c + highlight_excess``, or a 1 - N·H under
+        ``shortest_normal (1 - c) - highlight_excess``. A highlight gate relies on this.
         """
         raise NotImplementedError
 

@@ -22,8 +22,8 @@ def face_normals(mesh: Mesh) -> np.ndarray:
     Returns
     -------
     float64 array, shape (F, 3)
-        A triangle without area (up to rounding) has the unit vector along the sum of its vertex normals, or 0
-        if the sum is 0.
+        Instead of a normal, a triangle without area (up to rounding) has the unit vector along the sum of its
+        vertex normals, or 0 if the sum is 0.
     """
     return planes_of(mesh)[0]
 

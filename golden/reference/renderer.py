@@ -277,9 +277,10 @@ def shade_spans(
 ) -> np.ndarray:
     """Picture from spans alone, as in hardware.
 
-    The normal of a fragment is the curve between its span's ends at ``t = offset / (length - 1)`` (0 for a
-    span of one pixel), with the length that the curve gives it. The line of the exact frame has ends with
-    lengths. So ``normalised`` with unit ends differs from it (docs/theory/interpolation.md#true-spans).
+    The normal of a fragment is the curve between its span's ends at ``t = offset / (length - 1)``. In a span
+    of one pixel t is 0. The normal keeps the length that the curve gives. The line of the exact frame has
+    ends with lengths. So ``normalised`` with unit ends differs from it
+    (docs/theory/interpolation.md#true-spans).
 
     Parameters
     ----------

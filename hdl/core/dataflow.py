@@ -73,8 +73,8 @@ class Dataflow:
     """The words of a `PipelinedUnit` and their functions of other words, before there is any hardware.
 
     Words are described first, each after its operands. The first request for a word's stage, or for the
-    number of instances, places them with `place`, in time and on shared functional units such as multipliers.
-    `build` makes the hardware. It copies a word that is read after its lifetime.
+    number of instances, calls `place`. This puts the words on cycles, and on shared functional units such as
+    multipliers. `build` makes the hardware. It copies a word that is read after its lifetime.
 
     Parameters
     ----------

@@ -287,11 +287,10 @@ class PipelinedUnit(wiring.Component):
     """A unit with a fixed latency and initiation interval, moved on by one common enable.
 
     A beat is on the output ``latency`` cycles after it was accepted. If the output is stalled, the whole unit
-    is disabled and holds its payloads (`skid_buffer`), from the cycle after the first on which a beat was not
-    accepted. While a beat is inside, the next is accepted a whole multiple of ``initiation_interval`` enabled
-    cycles after it. In a *spaced* unit it is accepted any number of enabled cycles from
-    ``initiation_interval`` on. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset
-    empties the unit.
+    is disabled and holds its payloads (`skid_buffer`). This begins in the cycle after the first refused beat.
+    While a beat is inside, the next is accepted a whole multiple of ``initiation_interval`` enabled cycles
+    after it. In a *spaced* unit it is accepted any number of enabled cycles from ``initiation_interval`` on.
+    ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
     from the *stage* of a beat: `at` tells whether a beat was accepted a number of enabled cycles ago.

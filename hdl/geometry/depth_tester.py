@@ -83,11 +83,11 @@ class DepthTesterUnit(wiring.Component):
 
     The initiation interval is 1. The latency of a drawn pixel, `latency`, is 3 cycles. A memory outside gives
     its words through a register, and the latency is 4. A pixel is also compared with the pixels of the last
-    two or three cycles at the same place, which the memory does not have yet. The unit has no multipliers.
+    two or three cycles at the same place. They are not in the memory yet. The unit has no multipliers.
 
-    A unit that clears writes `DepthTester.CLEARED` to each place of the picture, one a cycle, when the first
-    pixel comes after a reset, and after each change of ``picture.number``. Pixels wait meanwhile. A unit
-    without ``clears`` is right for one picture. Clear its memory outside between pictures.
+    With ``clears`` the unit writes `DepthTester.CLEARED` to each place of the picture, one a cycle. It does
+    so when the first pixel comes after a reset, and after each change of ``picture.number``. Pixels wait
+    meanwhile. A unit without ``clears`` is right for one picture. Clear its memory outside between pictures.
 
     Parameters
     ----------

@@ -61,8 +61,8 @@ class EdgeSetupUnit(PipelinedUnit):
     For each edge a non-restoring division of the difference in x by the height gives quotient and remainder.
     Then the start is summed up from them, bit by bit. The division of the long edge goes on for the 32 bits
     of the fraction. Three dividers work on the edges of a triangle side by side. With one divider the edges
-    take turns. The latency, `latency`, is 32 cycles with three dividers of two bits, 50 with one of two bits
-    and 80 with one of one bit (1/256 pixel). The unit has no multipliers.
+    take turns. On a grid of 1/256 pixel `latency` is 32 cycles with three dividers of two bits. It is 50 with
+    one divider of two bits, and 80 with one divider of one bit. The unit has no multipliers.
 
     Parameters
     ----------

@@ -170,12 +170,12 @@ class GeometryUnit(wiring.Component):
       that the sort drops takes 4 to 9 cycles, compact 5 to 15 (`VertexSortUnit`);
     - in the walk one cycle for each scanline without pixels in the picture;
     - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits. These are at least 1 for
-      1 pixel, 2 for 2 pixels and 3 for more (with ``lines`` or ``vectors`` at least 1), and never more than
-      its pixels. For n pixels cut off at the long edge it takes as many cycles more as n has bits. In the
-      compact style it takes four cycles for each scanline and for every two of these bits. At the same time
-      the normals take three cycles each. With ``vectors`` each time that a span does not fit, and each piece
-      behind the first, takes two cycles (`SpanHalverUnit`). In the compact style a piece takes 13 cycles or
-      more at the same time (`SerialVectorsUnit`).
+      1 pixel, 2 for 2 pixels and 3 for more, and never more than its pixels. With ``lines`` or ``vectors``
+      the least is 1 for any number of pixels. For n pixels cut off at the long edge it takes as many cycles
+      more as n has bits. In the compact style it takes four cycles for each scanline and for every two of
+      these bits. At the same time the normals take three cycles each. With ``vectors`` each time that a span
+      does not fit, and each piece behind the first, takes two cycles (`SpanHalverUnit`). In the compact style
+      a piece takes 13 cycles or more at the same time (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` or ``vectors``
     4 and 2. The second lane adds 4, in the compact style 2.

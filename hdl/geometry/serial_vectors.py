@@ -34,10 +34,10 @@ class SerialVectorsUnit(wiring.Component):
 
     Each component of a vector goes through one shifter, a subtraction, another shifter and a rounding.
 
-    A piece takes 13 cycles, six more each time that it does not fit, and five more each time that the shift
-    differs from the shift before. The words of the next piece begin when this piece was taken; the steps
-    before them go on meanwhile. A span that fits is offered at most `latency` cycles after its last attribute
-    was taken. The unit has no multipliers.
+    A piece takes 13 cycles. Each time that it does not fit it takes six more. Each time that the shift
+    differs from the shift before it takes five more. The words of the next piece begin when this piece was
+    taken. The steps before them go on meanwhile. A span that fits is offered at most `latency` cycles after
+    its last attribute was taken. The unit has no multipliers.
 
     Parameters
     ----------

@@ -69,9 +69,9 @@ class SpanAttributesUnit(wiring.Component):
 
     A scanline without pixels takes a cycle. Other scanlines take, for every piece of p pixels, as many cycles
     as ``p - 1`` has bits, at least one. For n pixels cut off at the long edge they take as many cycles more
-    as n has bits. So a piece never takes more cycles than it has pixels. A span of one or two pixels, in one
-    piece and with no pixel cut off at the long edge, is offered `latency` cycles, 3, after its scanline was
-    taken in. The unit adds shifted steps, modulo 4, and has no multipliers.
+    as n has bits. So a piece never takes more cycles than it has pixels. A span of one or two pixels leaves
+    soonest, if it is one piece and no pixel is cut off at the long edge. It is offered `latency` cycles, 3,
+    after its scanline was taken in. The unit adds shifted steps, modulo 4, and has no multipliers.
 
     In the *serial* form one attribute after the other goes through the same adders, and its words through
     rings of registers. A scanline comes four times, each time with another attribute's plane. It takes four
@@ -269,8 +269,9 @@ class SpanAttributesUnit(wiring.Component):
 class _AttributeTurns:
     """Control of the attributes' turns: all attributes on one cycle, or *serial* one a cycle, four in all.
 
-    In the serial form the first attribute decides whether a scanline comes in, for all four, and the control
-    of the walk moves on with the last one, `ends`. With ``ahead`` registers tell whether the walk advances.
+    In the serial form the first attribute decides for all four whether a scanline comes in. The control of
+    the walk moves on with the last attribute, `ends`. With ``ahead`` registers tell whether the walk
+    advances.
     """
 
     def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool, ahead: bool):

@@ -40,9 +40,10 @@ class VertexSortUnit(wiring.Component):
     digit on. It takes two Booth digits of each product a cycle. Low triangles have fewer digits. Results are
     exact. The unit has no multipliers.
 
-    On a grid of 1/256 pixel n is 3 for boxes of up to 6 scanlines, 4 for up to 126, 5 for up to 2046, and 6
-    for more. A triangle takes 4 cycles if its box is empty, else n + 3 cycles if it is dropped and n + 4 if
-    it is drawn, unless the output waits. A drawn triangle is offered n + 8 cycles after it was taken in.
+    On a grid of 1/256 pixel n depends on the scanlines of a box: 3 up to 6 scanlines, 4 up to 126, 5 up to
+    2046, and 6 for more. A triangle takes 4 cycles if its box is empty. Else it takes n + 3 cycles if it is
+    dropped, and n + 4 if it is drawn. A waiting output adds cycles. A drawn triangle is offered n + 8 cycles
+    after it was taken in.
 
     In the *compact* style there is one triangle inside, and its corners stay in the registers of the first
     stage. It takes 5 cycles if its box is empty, else n + 9 cycles. If it is drawn, it also takes the cycles

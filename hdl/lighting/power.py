@@ -21,10 +21,10 @@ class PowerUnit(PipelinedUnit):
 
     Method, formats and error bound are those of the bit-accurate model `Power`.
 
-    The pipelined form has a latency of 32 cycles (difference from 1, saturation, three for each bit of the
-    exponent), an initiation interval of 1 and 18 multipliers. The sequential form has one multiplier for nine
-    squares and ten products. Its latency is 44 cycles, its initiation interval 42. All multipliers have 17 by
-    17 bits.
+    The pipelined form has an initiation interval of 1 and 18 multipliers. Its latency is 32 cycles:
+    difference from 1, saturation, and three for each bit of the exponent. The sequential form has one
+    multiplier for nine squares and ten products. Its latency is 44 cycles, its initiation interval 42. All
+    multipliers have 17 by 17 bits.
 
     Parameters
     ----------

@@ -51,9 +51,9 @@ class SlopeUnit(wiring.Component):
     The bit-accurate models are `Specular.scale` and `Specular.boundaries`. ``slope`` follows the exponent
     after two cycles, the boundary after three.
 
-    One unit serves all lights. The slope costs a multiplier by a constant, no multiplier for ``k = n / 2^j``,
-    and a table of 1024 words of 27 bits for ``cosquad_q`` and the models by equal integrals. The PROM has
-    1024 words of 17 bits. The unit as published has no PROM.
+    One unit serves all lights. The slope costs a multiplier by a constant, or no multiplier if
+    ``k = n / 2^j``. For ``cosquad_q`` and the models by equal integrals it costs a table of 1024 words of 27
+    bits. The PROM has 1024 words of 17 bits. The unit as published has no PROM.
 
     Parameters
     ----------

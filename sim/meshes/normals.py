@@ -132,9 +132,8 @@ def crease_normals(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cut a mesh at its creases: the old vertex of each new vertex, the new faces, and the new normals.
 
-    ``directions`` are the unit normals of the faces.
-    Two corners at one position share a new vertex if a chain of faces around the position leads from one to
-    the other over edges that are no creases.
+    ``directions`` are the unit normals of the faces. Two corners at one position share a new vertex if a
+    chain of faces around the position joins them. The faces of the chain meet at edges that are no creases.
     """
     if not len(faces):
         return np.zeros(0, dtype=np.int64), faces, np.zeros((0, 3))
