@@ -29,7 +29,7 @@ AXES = {
     "arithmetic": "Against the same method and model in float64: what the words' widths cost.",
     "model": "The reflection model against Blinn's, both exact, in float64: no arithmetic cures it.",
     "max_lsb": "The largest over all pixels and channels; 1 LSB is a step of an 8-bit channel.",
-    "p999_lsb": "One value in a thousand is further off; 1 LSB is a step of an 8-bit channel.",
+    "p999_lsb": "One value in a thousand has a larger error; 1 LSB is a step of an 8-bit channel.",
     "rmse_lsb": "Root of the mean square over pixels and channels; 1 LSB is a step of an 8-bit channel.",
     "psnr_db": "Peak signal to noise ratio: more is better, so the axis runs the other way.",
     "flip_p99": "FLIP, a difference as seen by an eye, 0 to 1; one pixel in a hundred has more.",

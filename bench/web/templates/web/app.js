@@ -497,7 +497,7 @@ const blysk = (() => {
     byId("inside-title").textContent =
       `Column ${x}, row ${y}: pixel ${x - codes.x[span] + 1} of a span of ${inside.length}, columns ${codes.x[span]} to ` +
       `${codes.x[span] + inside.length - 1}, whose normal turns by ${shown((Math.acos(Math.min(cosine, 1)) * 180) / Math.PI, 3)}°. ` +
-      `It goes in on clock ${inside.firstClock}; its pixels come out on cycles ${trace.cycles[inside.start]} to ${inside.lastClock}.`;
+      `The span enters on clock ${inside.firstClock}; its pixels come out on cycles ${trace.cycles[inside.start]} to ${inside.lastClock}.`;
     const clock = byId("clock");
     clock.min = inside.firstClock;
     clock.max = inside.lastClock;
@@ -701,9 +701,9 @@ const blysk = (() => {
       });
       const isOwn = inHere.has(inside.start);
       card.querySelector(".note").textContent = isOwn
-        ? "This span is being set up: what its pixels share is worked out, once."
+        ? "This span is in its setup, which computes once what its pixels share."
         : inHere.size
-          ? "Another span is being set up while the pixels of this one go on."
+          ? "Another span is in its setup, while the pixels of this span go on."
           : "No span is in the setup.";
     } else {
       for (const [taken, n] of inside.taken) {
@@ -761,7 +761,7 @@ const blysk = (() => {
   document.documentElement.classList.add("scripted");
   for (const box of document.querySelectorAll("[data-color]")) box.style.background = `rgb(${box.dataset.color})`;
   if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function" || typeof Worker !== "function") {
-    failed("This browser has no WebAssembly, which the live view needs; all else on this page works.");
+    failed("This browser has no WebAssembly, which the live view needs. The rest of this page works.");
   } else {
     byId("view").hidden = false;
     startWorker();
