@@ -1,11 +1,10 @@
 # amaranth: UnusedElaboratable=no
-"""Highlight gate: multipliers and tables of several lights, refusals; `tests.test_units` has its results."""
+"""Highlight gate: what its record covers, and refusals; `tests.test_units` has its results."""
 
 import numpy as np
 import pytest
 
 from blysk.bench.units.lighting.highlight_gate import RECORD
-from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 
 GATE = RECORD.variants[RECORD.default].unit().model
@@ -18,14 +17,6 @@ def test_spans_of_the_record_are_decided_both_ways(variant):
     for run in RECORD.runs(unit, "spans"):
         share = (run.expected[:, np.newaxis] >> np.arange(unit.lights) & 1).mean(axis=0)
         assert np.all((share > 0.1) & (share < 0.9))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("lights", "exponent", "interval"), [(2, 60, 27), (3, None, 4), (1, 60, 6)])
-def test_multipliers_and_tables_of_several_lights(lights, exponent, interval):
-    cost = cost_of(HighlightGateUnit(GATE, lights, initiation_interval=interval, exponent=exponent))
-    assert cost.multiplier_count == -(-(3 + 12 * lights) // interval)
-    assert cost.rom_bits == (1024 * 17 if exponent is None else 0)
 
 
 def test_refusals():

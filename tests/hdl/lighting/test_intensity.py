@@ -1,14 +1,11 @@
 # amaranth: UnusedElaboratable=no
-"""Compact intensity unit: its cycles, resets, cost; `tests.test_units` holds both against their model."""
+"""Compact intensity unit: its cycles and resets; `tests.test_units` holds both against their model."""
 
 import numpy as np
 import pytest
 
 from blysk.bench.units.lighting.intensity import RECORD
 from blysk.bench.units.record import Case, first
-from blysk.golden.lighting.intensity import Intensity
-from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.sim.engines.simulate import simulate
 
 from ...checks import resets
@@ -45,18 +42,3 @@ def test_halves_of_the_record_are_halves(unit):
     beats = next(RECORD.runs(RECORD.variants[unit].unit(), "halves")).case.beats
     rest = ((5 << 17) + 8191 * beats["diffuse"] + 6003 * beats["specular"]) % (1 << 23)
     assert np.all(np.bincount((1 << 22) - rest[:, 0]) > 300)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("lights", [1, 2, 16])
-def test_compact_costs_one_multiplier(lights):
-    cost = cost_of(CompactIntensityUnit(Intensity(lights)))
-    assert cost.multipliers == {(17, 17): 1}
-    # As the docstring states.
-    stated = {1: (233, 652), 16: (811, 9008)}
-    if lights in stated:
-        assert (cost.register_bits, cost_of(IntensityUnit(Intensity(lights))).register_bits) == stated[lights]
-    # Terms and which are left and used; operands, product, rounded sum; sum; channels, twice, as one waits;
-    # seven flags; the rest.
-    growth = (2 * lights).bit_length()
-    assert cost.register_bits == 38 * lights + 34 + 34 + (12 + growth) + (34 + growth) + 2 * 24 + 20 + 9

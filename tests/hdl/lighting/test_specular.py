@@ -1,28 +1,20 @@
 # amaranth: UnusedElaboratable=no
-"""Specular unit: times, cost, every exponent, refusals; `tests.test_units` holds it against its model."""
+"""Specular unit: times, words of every exponent, refusals; `tests.test_units` holds it against its model."""
 
 import numpy as np
 import pytest
 from amaranth.hdl import Value
 from amaranth.sim import Simulator
 
-from blysk.bench.units.lighting.specular import expect, highlights
-from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.reference.reflection import REFLECTION_MODELS, AngleCosine, Exponential, PolynomialModel
+from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.emit.cost import cost_of
-from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
-from blysk.sim.engines.simulate import simulate
 
 from ...lists import FURTHER_MODELS, SPECULAR_MODELS
 from ..variants import mostly_long
 
 MODELS = SPECULAR_MODELS + FURTHER_MODELS
-
-# Latency at an interval of 1, by the family of a model and its squarings.
-LATENCY = {(PolynomialModel, 1): 7, (PolynomialModel, 2): 8, (PolynomialModel, 3): 9}
-LATENCY |= {(Exponential, 0): 9, (AngleCosine, 1): 11, (AngleCosine, 2): 12}
 
 # Products, and the latency at initiation intervals of 1, 2, 3, 4 and 6, as the docstring has them.
 TIMING = {
@@ -54,21 +46,6 @@ def test_times_and_multipliers_at_every_interval(reflection):
         if interval == 2:
             shared = {(18, 18): cost.multiplier_count - as_published}
             assert cost.multipliers == ({(18, 17): 1} | shared if as_published else shared)
-
-
-def test_latency_of_every_model():
-    for model in MODELS:
-        p = Specular(REFLECTION_MODELS[model])
-        assert SpecularUnit(p).latency == LATENCY[type(p.reflection), p.squarings]
-
-
-@pytest.mark.long
-def test_cost_of_coscos():
-    """Two products of 17 bits, two of chords, and the squarers; PROM, two tables, and one of slopes."""
-    for model, squarers, slopes in (("coscos2", 1, 0), ("coscos4", 2, 0), ("coscos4_integral", 2, 1)):
-        cost = cost_of(SpecularUnit(Specular(REFLECTION_MODELS[model])))
-        assert cost.multipliers == {(17, 17): 2 + squarers, (17, 11): 1, (14, 11): 1}
-        assert cost.rom_bits == 1024 * (17 + 27 * slopes) + 128 * 36 + 64 * 33
 
 
 @pytest.mark.parametrize("reflection", mostly_long(MODELS, "cosquad_lin", "cosquad_q", "exp"))
@@ -112,23 +89,6 @@ def test_shared_slope_saves_the_prom(reflection, tables, interval):
     assert cost_of(SlopeUnit(model)).rom_bits == 1024 * 17
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("reflection", ["cosquad", "cosquad_q", "lyon3", "exp"])
-def test_fixed_exponent_costs_less(reflection):
-    """No PROM, and one multiplier less: that of the slope is by a constant. No cycle more."""
-    model = Specular(REFLECTION_MODELS[reflection])
-    unit, fixed = SpecularUnit(model), SpecularUnit(model, exponent=37)
-    assert fixed.latency == unit.latency
-    assert not hasattr(fixed, "constants")
-    cost, full = cost_of(fixed), cost_of(unit)
-    assert cost.multiplier_count == full.multiplier_count - 1
-    assert (cost.constant_multipliers, cost.rom_bits) == (1, 64 * 32 if reflection == "exp" else 0)
-    # What the PROM gives, twice; the slope's normal form, and the boundary.
-    assert full.register_bits - cost.register_bits == 2 * 17 + 4 + 17 + (
-        0 if reflection == "cosquad_q" else 27
-    )
-
-
 def test_bad_options_are_refused():
     for exponent in (0, 1001):
         with pytest.raises(ValueError, match=rf"^exponent must be 1 to 1000, not {exponent}$"):
@@ -137,13 +97,3 @@ def test_bad_options_are_refused():
         SpecularUnit(exponent=20, shares_slope=True)
     with pytest.raises(ValueError, match=r"^interval must be at least 1, not 0$"):
         SpecularUnit(initiation_interval=0)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("model", [*MODELS, "blinn"])
-def test_every_exponent(model):
-    unit = PowerUnit(Power()) if model == "blinn" else SpecularUnit(Specular(REFLECTION_MODELS[model]))
-    for exponent in range(1, 1001):
-        case = highlights(unit, np.random.default_rng(exponent), 40, exponent)
-        run = simulate(unit, case.beats, count=40, constants=case.constants, engine="auto", settle=4)
-        np.testing.assert_array_equal(run.beats, expect(unit, case))
