@@ -137,8 +137,7 @@ class CompactIntensityUnit(wiring.Component):
     The results are those of `IntensityUnit`. A pixel takes ``c = 3 max(1, T)`` cycles, T the number of its
     diffuse and specular terms that are not 0 (`Intensity.cycles`). With one light these are 3 cycles without
     and 6 with a highlight, 3 in the dark. The next pixel is taken c cycles later. The pixel leaves after
-    ``c + 5`` cycles (input, operands, product, sum, rounding, saturation), without cycles of stall. With one
-    light the unit has 233 register bits, and `IntensityUnit` 652. With 16 lights these are 811 and 9008.
+    ``c + 5`` cycles (input, operands, product, sum, rounding, saturation), without cycles of stall.
 
     Parameters
     ----------
