@@ -18,7 +18,6 @@ from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, wri
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit, kind_of
-from blysk.hdl.lighting.lobe import LobeMemory
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 
@@ -217,11 +216,11 @@ class ShadingPipelineUnit(wiring.Component):
         diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
         if p.specular is None:
             return [DiffuseUnit(diffuse) for _ in range(p.lights)]
-        kind = kind_of(p.specular)
+        self._kind = kind = kind_of(p.specular)
         if exponent is None and kind.slope_unit:
             self._slope = kind.slope_unit(p.specular)
-        if p.loads_tables:
-            self._tables = LobeMemory(p.specular, p.specular.fixed_tables, p.lights)
+        if kind.memory:
+            self._tables = kind.memory(p.specular, p.lights)
         # In the compact style a colour takes a cycle a channel at least.
         interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
         return [
@@ -417,7 +416,7 @@ class ShadingPipelineUnit(wiring.Component):
             if self._slope is not None:
                 m.d.comb += light.constants.eq(self._slope.slope)
             elif "constants" in light.signature.members:
-                word = frame.constants.bank if p.loads_tables else frame.constants.exponent
+                word = frame.constants[self._kind.constant]
                 m.d.comb += Value.cast(light.constants).eq(word)
         m.d.comb += intensity.constants.ambient.eq(frame.constants.ambient)
         connect(m, intensity.o, self._assembler.colors)

@@ -78,6 +78,11 @@ class HighlightOperand:
         """Of a unit with a table: what the argument of the first one is."""
         return "u = 1 - N.H"
 
+    @property
+    def word_formats(self) -> dict[str, Format]:
+        """Formats of words of the unit that tools show, by the names of their registers."""
+        return {}
+
     def line_error(self, parameter: float | None) -> float:
         """Largest error of a table between its entries; 0 without a table."""
         return 0.0

@@ -212,6 +212,15 @@ class Specular(HighlightOperand):
         return (2.0**-12 + 2.0**-15, self.ERROR, 2.0**-12, 2.0**-11)[self.squarings]
 
     @property
+    def word_formats(self) -> dict[str, Format]:
+        """Argument, slope times argument, base, and powers of the base, see `HighlightOperand`."""
+        # A cosine is squared in place of the base.
+        names = ("square", "square_2", "square_3")[: 0 if self.is_coscos else self.squarings]
+        squares = dict.fromkeys(names, self.BASE_FORMAT * self.BASE_FORMAT)
+        product = self.SHIFTED_FORMAT * self.SCALE_FORMAT
+        return {"argument": self.ARGUMENT_FORMAT, "product": product, "base": self.BASE_FORMAT, **squares}
+
+    @property
     def cutoff(self) -> Fixed:
         """Smallest base that is not cut off: its term is 2^-14 at most."""
         if self.is_exponential:

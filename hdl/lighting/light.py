@@ -19,7 +19,7 @@ from blysk.hdl.core.memory import pass_beside
 from blysk.hdl.core.stream import PipelinedUnit, connect, connect_fifo
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.factor import FactorUnit
-from blysk.hdl.lighting.lobe import LobeUnit
+from blysk.hdl.lighting.lobe import LobeMemory, LobeUnit
 from blysk.hdl.lighting.power import PowerUnit
 from blysk.hdl.lighting.specular import SlopeUnit, SpecularUnit
 
@@ -41,11 +41,17 @@ class SpecularKind(NamedTuple):
     slope_unit : callable or None
         Makes, from the model, the unit of the words that depend on the exponent alone. This unit serves all
         lights. ``None``: no words depend on the exponent alone.
+    memory : callable or None
+        Makes, from the model and the number of lights, the memory of their tables. ``None``: no tables.
+    constant : str
+        Frame constant that the unit's port ``constants`` reads.
     """
 
     unit: Callable[..., PipelinedUnit]
     compact_interval: Callable[[Any, int | None], int]
     slope_unit: Callable[[Any], wiring.Component] | None = None
+    memory: Callable[[Any, int], wiring.Component] | None = None
+    constant: str = "exponent"
 
 
 def _specular_unit(model: Specular, **options) -> PipelinedUnit:
@@ -63,9 +69,15 @@ def _lobe_unit(model: Lobe, *, initiation_interval: int, shares_slope: bool, exp
     return LobeUnit(model, initiation_interval, tables=tables, shares_memory=shares_slope)
 
 
+def _lobe_memory(model: Lobe, lights: int) -> LobeMemory:
+    return LobeMemory(model, model.fixed_tables, lights)
+
+
+_LOBE = SpecularKind(_lobe_unit, lambda model, exponent: 1, memory=_lobe_memory, constant="bank")
+
 SPECULAR_KINDS: dict[type, SpecularKind] = {
-    Lobe: SpecularKind(_lobe_unit, lambda model, exponent: 1),
-    QuotientLobe: SpecularKind(_lobe_unit, lambda model, exponent: 1),
+    Lobe: _LOBE,
+    QuotientLobe: _LOBE,
     Specular: SpecularKind(_specular_unit, SpecularUnit.multiplications, SlopeUnit),
     Power: SpecularKind(_power_unit, lambda model, exponent: 42),
 }
@@ -80,10 +92,11 @@ def kind_of(model: HighlightOperand) -> SpecularKind:
     TypeError
         If there is no unit for the model.
     """
-    model = type(model)
-    if model not in SPECULAR_KINDS:
-        raise TypeError(f"{model.__name__} has no unit: SPECULAR_KINDS of {__name__} needs an entry for it")
-    return SPECULAR_KINDS[model]
+    described = type(model)
+    if described not in SPECULAR_KINDS:
+        reason = f"SPECULAR_KINDS of {__name__} needs an entry for it"
+        raise TypeError(f"{described.__name__} has no unit: {reason}")
+    return SPECULAR_KINDS[described]
 
 
 class LightUnit(wiring.Component):

@@ -156,7 +156,7 @@ class InterpolatorUnit(wiring.Component):
             design.lights,
             initiation_interval=min(setup_interval, 3 + 12 * design.lights),
             exponent=design.build.exponent,
-            takes_threshold=design.loads_tables,
+            takes_threshold=design.has_threshold,
         )
 
     @property

@@ -122,7 +122,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
             design.highlight_gate,
             design.lights,
             exponent=design.build.exponent,
-            takes_threshold=design.loads_tables,
+            takes_threshold=design.has_threshold,
         )
 
     @classmethod

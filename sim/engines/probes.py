@@ -9,7 +9,6 @@ from amaranth.lib import data
 from amaranth.lib.wiring import Component, In, Out
 
 from blysk.golden.lighting.intensity import Intensity
-from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
@@ -197,6 +196,18 @@ def _ages(fragment: Fragment, operands: Value) -> dict[str, int]:
     return {name: found for name, signal in registers.items() if (found := age(signal)) is not None}
 
 
+_SPECULAR_WORDS = {
+    "argument": ("1 − N·H, limited", "one_minus_cosine", float(ONE_SQUARED.values)),
+    "product": ("slope times it", "product", 1.0),
+    "base": ("base", "base", 1.0),
+    **{
+        name: (f"base to the power {power}", f"base_{power}", 1.0)
+        for name, power in (("square", 2), ("square_2", 4), ("square_3", 8))
+    },
+}
+"""Title, exact value and scale of words of a specular unit, by `HighlightOperand.word_formats`."""
+
+
 def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Probe, Value]]:
     """Each probe and the value that it watches."""
     design = unit.model
@@ -225,20 +236,10 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
     datapath = _part(fragment, "light_0.specular.datapath")
     words = _registers(datapath)
     ages = _ages(datapath, _unit(fragment, "light_0.specular").i.payload)
-    p = design.specular
-    if isinstance(p, Specular):
-        squares = ["square", "square_2", "square_3"][: p.squarings if "base" in words else 0]
-        formats = {
-            "argument": (p.ARGUMENT_FORMAT, "1 − N·H, limited", "one_minus_cosine", one_squared),
-            "product": (p.SHIFTED_FORMAT * p.SCALE_FORMAT, "slope times it", "product", 1.0),
-            "base": (p.BASE_FORMAT, "base", "base", 1.0),
-        }
-        for step, name in enumerate(squares, 1):
-            power, format = 2**step, p.BASE_FORMAT * p.BASE_FORMAT
-            formats[name] = (format, f"base to the power {power}", f"base_{power}", 1.0)
-        for name, (format, title, exact, scale) in formats.items():
-            if name in ages and len(words[name]) == format.width:
-                yield number(name, title, "specular", words[name], ages[name], exact, scale, format)
+    for name, format in design.specular.word_formats.items() if design.specular else ():
+        title, exact, scale = _SPECULAR_WORDS[name]
+        if name in ages and len(words[name]) == format.width:
+            yield number(name, title, "specular", words[name], ages[name], exact, scale, format)
     terms = light.o.payload
     yield number("diffuse", "diffuse term", "diffuse", terms.diffuse, light.latency, "diffuse")
     yield number("specular", "specular term", "specular", terms.specular, light.latency, "specular")
