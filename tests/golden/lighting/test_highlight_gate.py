@@ -9,7 +9,7 @@ from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.dot_product import DotProduct
-from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
+from blysk.golden.normals.middle_normal import MIDDLE_NORMAL_FITS, MiddleNormal
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise
@@ -56,36 +56,6 @@ def test_every_decision_at_reduced_width(bits):
         assert not needless.any()
         lit_of_all.append(lit.mean())
     assert 0.3 < np.mean(lit_of_all) < 0.8
-
-
-def test_every_pair_of_unit_codes_at_reduced_width():
-    """All vectors of about unit length on a grid, half-way vectors of an octant, all spans to 45 degrees."""
-    bits = 5
-    gate = HighlightGate(LIMITS, fraction_bits=bits)
-    one = (1 << bits) - 1
-    axis = np.arange(-one, one + 1)
-    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    length = np.linalg.norm(grid, axis=1)
-    units = grid[np.abs(length - one) < 0.02]
-    assert len(units) > 500
-    left, right = (units[k.ravel()] for k in np.indices((len(units), len(units))))
-    cosine = np.einsum("ij,ij->i", left, right) / one**2
-    near = cosine > np.cos(np.radians(MAX_SPAN_ANGLE + 4))
-    left, right, cosine = left[near], right[near], cosine[near]
-    format = gate.component_format
-    angle = np.arccos(np.minimum(cosine, 1 - 1e-9))
-    counts = np.zeros(2, dtype=int)
-    for halfway in units[
-        (units >= 0).all(axis=1) & (units[:, 0] <= units[:, 1]) & (units[:, 1] <= units[:, 2])
-    ]:
-        levels = [(end @ halfway) * 4.0**-bits for end in (left, right)]
-        maximum = arc_maximum(*levels, angle, 33)
-        for exponent in (4, 10, 40):
-            lit = gate.compute(Fixed(format, left), Fixed(format, right), Fixed(format, halfway), exponent)
-            threshold = gate.thresholds.values[exponent]
-            assert not (~lit & (maximum > 0) & (maximum**2 >= threshold)).any()
-            counts += np.bincount(lit, minlength=2)
-    assert counts.min() > 10**4
 
 
 def random_spans(rng, count, exponent, gate):
