@@ -12,7 +12,6 @@ from amaranth.lib.wiring import Component, In, Out
 
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.guards import _choice, group_registers
-from blysk.sim.engines.parts import read_parts
 
 from .components import both
 
@@ -100,80 +99,6 @@ def test_the_machine_is_the_same(monkeypatch):
     both(component, beats, 1500, **stalls)
 
 
-COPY = re.compile(r"if \((\w+)\.commit\(observer\)\) changed = true;")
-WRITTEN = re.compile(r"^\t+(\w+)\.(curr|next) = (.*);$", re.MULTILINE)
-
-
-def test_a_register_is_copied_or_written_in_place(monkeypatch):
-    plain = generated(Tangle(), monkeypatch)
-    grouped = group_registers(plain)
-    copied, edge = set(COPY.findall(grouped)), grouped[grouped.index("bool p_top::eval(") :]
-    in_place = {name for name, place, _ in WRITTEN.findall(edge) if place == "curr"}
-    aside = {name for name, place, _ in WRITTEN.findall(edge) if place == "next"}
-    at_once = set(re.findall(r"(memory_\w+)\.write\(", edge))
-    assert in_place | copied | at_once == set(COPY.findall(plain))
-    assert at_once == {"memory_p_memory"}
-    assert not at_once & copied
-    assert not in_place & (copied | aside)
-    assert aside <= copied
-    # What goes round in a circle needs one place more, no more; free of it nothing is copied.
-    assert sum(name.startswith("p_ring") for name in copied) <= 3
-    assert "p_free" in in_place
-    # Nothing is written to itself, and nobody asks for the reset.
-    assert not re.search(r"(\w+)\.next = \1\.curr;", grouped)
-    assert "p_rst ?" in plain
-
-
-def test_readers_come_before_the_writer(monkeypatch):
-    """Line by line, in the text: none reads a register, or a memory, that one above it wrote in place."""
-    grouped = group_registers(generated(Tangle(), monkeypatch))
-    lines = grouped[grouped.index("bool p_top::eval(") :].splitlines()
-    written, branches = set(), []
-    for line in lines:
-        code = line.strip()
-        if code.startswith("}"):
-            before, own = branches.pop() if branches else (set(), set())
-            if code == "} else {":
-                # The other answer: what the first wrote is not written here.
-                branches.append((before, own | written))
-                written = set(before)
-                continue
-            written |= own
-        if code.endswith("{"):
-            branches.append((set(written), set()))
-        _, equals, value = code.rpartition(" = ")
-        assert not written & set(re.findall(r"(\w+)\.curr", value)), line
-        if equals and (match := re.match(r"(\w+)\.curr = ", code)):
-            written.add(match[1])
-    assert written
-    assert edge_reads(grouped)[-1] < grouped.index("memory_p_memory.write(")
-
-
-def edge_reads(text):
-    """Places at which the memory is read."""
-    return [match.start() for match in re.finditer(r"memory_p_memory\[", text)]
-
-
-def test_fields_are_written_under_their_own_questions(monkeypatch):
-    plain = read_parts(generated(Tangle(), monkeypatch))
-    (word,) = re.findall(r"p_kept\.next = (\w+);", plain)
-    grouped = group_registers(plain)
-    stores = [re.match(r"(\t+)p_kept\.\w+(?:\.(\S+))? =", line) for line in grouped.splitlines()]
-    depth = {store[2]: len(store[1]) for store in stores if store}
-    assert depth == {"slice<15,0>()": 3, "slice<16>()": 4, "slice<63,17>()": 4}
-    assert not re.search(rf"\b{word}\b", grouped)
-
-
-def test_a_word_is_put_together_where_it_is_written(monkeypatch):
-    plain = read_parts(generated(Tangle(), monkeypatch))
-    part = re.compile(r"^(\t+)p_write____data\.slice<\d+,\d+>\(\) = ", re.MULTILINE)
-    assert part.findall(plain) == ["\t", "\t"]
-    grouped = group_registers(plain)
-    assert part.findall(grouped) == ["\t\t\t\t"] * 2
-    (question,) = re.findall(r"^(.*)\n.*\n.*\n\t{4}memory_p_memory\.write", grouped, re.MULTILINE)
-    assert question == "\t\t\tif (bool(p_write____en)) {"
-
-
 class Few(Component):
     """One register for each output."""
 
@@ -186,13 +111,6 @@ class Few(Component):
         with m.If(self.i.ready):
             m.d.sync += [self.o.valid.eq(self.i.valid), self.o.payload.eq(self.i.payload)]
         return m
-
-
-def test_outputs_are_copied(monkeypatch):
-    """The driver reads them between the evaluation and the copies."""
-    grouped = group_registers(generated(Few(), monkeypatch))
-    assert sorted(COPY.findall(grouped)) == ["p_o____payload", "p_o____valid"]
-    assert grouped.count(".next = ") == 2
 
 
 @pytest.mark.parametrize(
