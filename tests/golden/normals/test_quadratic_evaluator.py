@@ -178,18 +178,6 @@ def test_published_distance_from_the_great_circle(form, degrees, published):
     assert distance == pytest.approx(published, abs=arithmetic + half_digit)
 
 
-@forms
-def test_stiff_words_at_their_ends(form):
-    corners = np.array(np.meshgrid(*[[0, 1]] * 3, indexing="ij")).reshape(3, -1)
-    coefficients = [
-        Fixed(f, np.where(c, f.max_code, f.min_code)[:, np.newaxis].repeat(3, 1))
-        for f, c in zip((GPQ.G_FORMAT, GPQ.P_FORMAT, GPQ.Q_FORMAT), corners, strict=True)
-    ]
-    length = np.full(8, 33)
-    normals = evaluate(form, coefficients, length)
-    assert np.abs(normals.values - exact(coefficients, length, form)).max() <= SATURATED
-
-
 def test_refuses():
     with pytest.raises(ValueError, match=r"^form must be one of direct, horner, not 'cubic'$"):
         QuadraticEvaluator("cubic")
