@@ -1,1 +1,1 @@
-"""Records of the units: everything that a tool or a test needs to know of a unit, once."""
+"""Records of the units: the one place for everything that tools and tests need to know of a unit."""

@@ -1,6 +1,6 @@
-"""Names of the units that have a record, without the records: to import these takes a second.
+"""Names of the units that have a record. The records are not imported, because this takes a second.
 
-A unit has the name of its record's file. A file without a record holds parts that records share.
+The name of a unit is the name of its record's file. A file without a record holds parts that records share.
 """
 
 import pkgutil
@@ -14,7 +14,7 @@ from blysk.golden.methods.installed import installed_methods
 __all__ = ["ROOMS", "UNITS"]
 
 ROOMS = ("geometry", "normals", "cosines", "methods", "lighting", "video", "bus", "")
-"""Rooms in the order in which data pass them; the last is for records outside a room."""
+"""Rooms in the order in which data pass them. The last is for records outside a room."""
 
 _RECORD = re.compile(r"^RECORD = ", re.MULTILINE)
 
@@ -36,5 +36,5 @@ def _found() -> dict[str, str]:
 
 
 UNITS: dict[str, str] = _found()
-"""The file of each record by the unit's name, as it is imported: in the order of the rooms, within a room by
-name; then those of `installed_methods`."""
+"""The module of each record by the unit's name: by room, within a room by name, then `installed_methods`.
+"""

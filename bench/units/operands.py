@@ -1,4 +1,4 @@
-"""Operands for units: codes, unit vectors, spans and lengths, at random with their corner cases."""
+"""Operands for units: random codes, unit vectors, spans and lengths, with their corner cases."""
 
 from collections.abc import Callable, Iterator
 
@@ -69,7 +69,7 @@ def component_words(*codes: np.ndarray) -> tuple[Fixed, ...]:
 
 
 def any_codes(rng: np.random.Generator, format: Format, *shape: int) -> np.ndarray:
-    """Codes anywhere in a format; every third row has codes of every size, every 16th ends, 0 or 1."""
+    """Codes anywhere in a format. Every third row has codes of every size, every 16th row ends, 0 or 1."""
     codes = rng.integers(format.min_code, format.max_code, shape, endpoint=True)
     codes[1::3] >>= rng.integers(0, format.width, codes[1::3].shape)
     ends = [format.min_code, format.max_code, 0, 1]
@@ -78,17 +78,17 @@ def any_codes(rng: np.random.Generator, format: Format, *shape: int) -> np.ndarr
 
 
 def word_ends(rng: np.random.Generator, *shape: int) -> np.ndarray:
-    """Components that are the smallest or largest code, 0, 1 or -1."""
+    """Components: the smallest or the largest code, 0, 1 or -1."""
     return rng.choice([COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1], shape)
 
 
 def word_corners(*words: int) -> np.ndarray:
-    """Codes of pairs of vectors with components from a few codes: all combinations, shape (2, count, 3).
+    """Codes of all pairs of vectors whose components are a few codes, shape (2, count, 3).
 
     Parameters
     ----------
     words : int
-        The codes; without them the smallest and the largest one, 0, 1 and -1.
+        The codes. By default the smallest code, the largest code, 0, 1 and -1.
     """
     words = words or (COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1)
     pairs = np.stack(np.meshgrid(*[words] * 6), axis=-1).reshape(-1, 2, 3)
@@ -109,7 +109,7 @@ def unit_codes(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def turned(rng: np.random.Generator, vectors: np.ndarray, degrees: np.ndarray) -> np.ndarray:
-    """Unit vectors at given angles from others, in any direction."""
+    """Unit vectors at given angles from other vectors, in any direction."""
     across = rng.normal(size=vectors.shape)
     across = normalise(across - dot(across, vectors)[:, np.newaxis] * vectors)
     angle = np.radians(np.broadcast_to(degrees, len(vectors)))[:, np.newaxis]
@@ -135,7 +135,7 @@ def code_pairs_at(
 def pairs_of_length(
     rng: np.random.Generator, count: int, degrees: np.ndarray | float, length: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of pairs of vectors of a given length; pairs with a component over 1 are left out."""
+    """Codes of pairs of vectors of a given length. Pairs with a component over 1 are left out."""
     pairs = np.stack(pairs_at(rng, count, degrees)) * length
     left, right = np.rint(pairs[:, (np.abs(pairs) <= 1).all(axis=(0, 2))] * ONE).astype(np.int64)
     return left, right
@@ -144,16 +144,16 @@ def pairs_of_length(
 def pairs_chosen(
     left: np.ndarray, right: np.ndarray, choose: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of a vector of ``left`` and one of ``right`` whose ``1 - a . b`` is chosen.
+    """Pairs of a vector of ``left`` and a vector of ``right`` whose ``1 - a . b`` is chosen.
 
-    Finds, among many pairs, the few whose word of ``1 - a . b`` is at the border of a rounding.
+    A test can find, among many pairs, the few whose word of ``1 - a . b`` is at the border of a rounding.
 
     Parameters
     ----------
     left, right : int64 array, shape (count, 3)
         Codes of vectors.
     choose : callable
-        Takes the codes of ``1 - a . b`` with 34 fraction bits, gives booleans.
+        Function from codes of ``1 - a . b`` with 34 fraction bits to booleans.
     """
     # Products and sums have 36 bits, which float64 holds.
     difference = ONE_SQUARED.codes - (left.astype(float) @ right.T.astype(float)).astype(np.int64)
@@ -162,7 +162,7 @@ def pairs_chosen(
 
 
 def spread_angles(rng: np.random.Generator, count: int, widest: float) -> np.ndarray:
-    """Degrees: both ends, half spread evenly, half by their logarithm."""
+    """Angles in degrees, with both ends. Half of them are spread evenly, half by their logarithm."""
     angles = rng.uniform(0, widest, count)
     angles[::2] = widest * 10.0 ** rng.uniform(-6, 0, len(angles[::2]))
     angles[: count // 20] = 0
@@ -171,7 +171,7 @@ def spread_angles(rng: np.random.Generator, count: int, widest: float) -> np.nda
 
 
 def span_ends(rng: np.random.Generator, count: int, widest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of the end normals of spans up to ``widest`` degrees, some along an axis."""
+    """Codes of the end normals of spans up to ``widest`` degrees. Some normals are along an axis."""
     left = sphere(rng, count)
     left[: count // 20] = np.eye(3)[np.arange(count // 20) % 3]
     right = turned(rng, left, rng.permutation(spread_angles(rng, count, widest)))
@@ -179,7 +179,7 @@ def span_ends(rng: np.random.Generator, count: int, widest: float) -> tuple[np.n
 
 
 def any_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of pairs of unit normals at angles of every size; every sixteenth of arbitrary codes."""
+    """Codes of pairs of unit normals at angles of every size. Every sixteenth pair has arbitrary codes."""
     left = sphere(rng, count)
     right = normalise(left + 10.0 ** rng.uniform(-5, 1, (count, 1)) * rng.normal(size=(count, 3)))
     left, right = quantise(left), quantise(right)
@@ -189,7 +189,7 @@ def any_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndar
 
 
 def vectors_near(rng: np.random.Generator, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Codes of a unit vector for each span: anywhere, and for every second near the span's normals."""
+    """Codes of a unit vector for each span: near the span's normals for every second span, else anywhere."""
     vector = sphere(rng, len(left))
     vector[::2] = normalise((0.7 * left + 0.3 * right)[::2] / ONE + vector[::2] * 1e-3)
     return quantise(vector)
@@ -202,13 +202,13 @@ def degrees_between(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def exact_middle(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Exact middle of two vectors of codes, as long as a unit vector, and their cosine."""
+    """Exact middle of two vectors of codes, with the length of a unit vector, and their cosine."""
     cosine = dot(left, right) / ONE**2
     return (left + right) * COMPONENT.step / np.sqrt(2 + 2 * cosine)[:, np.newaxis], cosine
 
 
 def light_constants(unit: Component, direction: np.ndarray, halfway: np.ndarray) -> np.ndarray:
-    """Constants of a unit with the codes of L and H of each light."""
+    """Constants of a unit, with the codes of L and H of each light."""
     vectors = getattr(unit, "light_vectors", unit.constants)
     constants = np.zeros(len(direction), dtype_of(vectors.shape().elem_shape))
     constants["direction"], constants["halfway"] = direction, halfway
@@ -227,19 +227,19 @@ def log_lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndar
 
 
 def span_lengths(rng: np.random.Generator, pixels: int, least: int = 1) -> np.ndarray:
-    """Lengths of spans that have about ``pixels`` pixels or a few more in all, in any order."""
+    """Lengths of spans that have about ``pixels`` pixels in all, or a few more, in any order."""
     return rng.permutation(log_lengths(rng, max(pixels // 450, 16), least))
 
 
 def any_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Lengths of ``count`` spans, short ones as often as long ones."""
+    """Lengths of ``count`` spans, as many short as long ones."""
     lengths = np.floor(4096 ** rng.random(count)).astype(np.int64)
     lengths[:: max(count // 4, 1)] = 4095
     return lengths
 
 
 def short_lengths(rng: np.random.Generator, pixels: int, least: int = 0) -> np.ndarray:
-    """Lengths of spans that have exactly ``pixels`` pixels in all; most are short."""
+    """Lengths of spans that have exactly ``pixels`` pixels in all. Most are short."""
     longest = min(4096, 2 + pixels // 16)
     lengths = np.floor(longest ** rng.random(max(pixels // 8, 8)) ** 3).astype(np.int64)
     lengths = np.maximum(lengths - (1 - least), least)
@@ -249,7 +249,7 @@ def short_lengths(rng: np.random.Generator, pixels: int, least: int = 0) -> np.n
 
 
 def pixel_of(rng: np.random.Generator, length: np.ndarray) -> np.ndarray:
-    """Offset of a pixel in each span; in every fourth span that of the last."""
+    """Offset of a pixel in each span. In every fourth span it is the last pixel."""
     pixel = np.floor(rng.random(len(length)) * length).astype(np.int64)
     pixel[::4] = length[::4] - 1
     return pixel
@@ -258,18 +258,18 @@ def pixel_of(rng: np.random.Generator, length: np.ndarray) -> np.ndarray:
 def setup_spans(
     rng: np.random.Generator, count: int, widest: float, out_of_range: float
 ) -> dict[str, np.ndarray]:
-    """Spans for a setup: equal normals, every angle, some out of range, ends of the words; all lengths.
+    """Spans of all lengths for a setup: equal normals, every angle, some out of range, ends of the words.
 
     Parameters
     ----------
     rng : Generator
-        Of the random numbers.
+        Generator of the random numbers.
     count : int
-        Spans, 200 or more.
+        Number of spans, 200 or more.
     widest : float
         Largest angle of the spans in range, in degrees.
     out_of_range : float
-        Least angle of the spans out of range: 60 spans, opposite normals among them.
+        Least angle of the 60 spans out of range, in degrees. Opposite normals are among them.
     """
     angles = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 80), rng.uniform(0, widest, count - 200)]
     angles = np.r_[angles, rng.uniform(out_of_range, 180, 59), 180]
@@ -308,11 +308,11 @@ def any_curves(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
 def highlight_codes(
     rng: np.random.Generator, model: HighlightOperand, count: int, exponent: int
 ) -> np.ndarray:
-    """Operands of a specular unit: most where the term is not 0 or near its end, some at any 1 - cos gamma.
+    """Operands of a specular unit. Most have a term over 0 or are near its end, some have any angle.
 
-    In every fourth operand 1 - cos gamma is drawn by its logarithm. Every third operand is any code, every
-    twelfth differs from the last lit one by up to 3 units of any bit, and every sixteenth is the code of
-    cos gamma = 1, 0 or -1, or one next to it.
+    In every fourth operand 1 - cos gamma is drawn by its logarithm. Every third operand is any code. Every
+    twelfth differs from the last lit operand by up to 3 units of any bit. Every sixteenth is the code of cos
+    gamma = 1, 0 or -1, or a code next to it.
     """
     format = model.operand_format
     reach = 1.25 * model.last_lit_arguments[exponent] * 2.0**-25
@@ -335,7 +335,7 @@ def highlight_codes(
 
 
 def exponents(rng: np.random.Generator, count: int) -> Iterator[tuple[int, int]]:
-    """Exponents, and how many of the samples each has."""
+    """Exponents, and the number of samples of each."""
     chosen = [1, 2, 3, 10, 100, 500, 999, MAX_EXPONENT]
     chosen += rng.integers(1, MAX_EXPONENT + 1, 32).tolist()
     for exponent in chosen:

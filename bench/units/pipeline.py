@@ -53,10 +53,10 @@ from blysk.sim.frames.testbench import pixel_beats
 __all__ = ["DESIGNS", "LONG_DESIGNS", "RECORD", "case_of", "spans_of"]
 
 _GROUPS = 8
-"""Exponents of a measurement: the spans are divided into as many parts, with an exponent each."""
+"""Number of exponents of a measurement. The spans are divided into as many parts, with an exponent each."""
 
 _COUNTED = (1 << 16) + 2
-"""Number of spans that is over the range of a counter of 16 bits."""
+"""Number of spans over the range of a counter of 16 bits."""
 
 
 # Errors.
@@ -115,7 +115,7 @@ def _measure(rng, count, design):
 
 
 def spans_of(beats) -> Spans:
-    """Spans that input beats of a pipeline carry."""
+    """Spans in input beats of a pipeline."""
     none = np.zeros((len(beats["length"]), 3), dtype=np.int64)
     normals = (beats.get(name, none) for name in ("normal_left", "normal_right"))
     values = values_of(beats) if "values" in beats else None
@@ -129,7 +129,7 @@ def spans_of(beats) -> Spans:
 
 @once
 def _frames_of(unit, case):
-    """Pixels by frames: the spans between writes, each with what is written up to there."""
+    """Pixels by frame. A frame has the spans between writes, and all constants written before them."""
     design, spans = unit.model, spans_of(case.beats)
     after = np.zeros(len(case.write["address"]), int) if case.write_after is None else case.write_after
     starts = np.unique(np.r_[0, after])
@@ -159,7 +159,7 @@ def _status(unit, case):
 
 
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
-    """Input of spans, and the constants of each material, written over constants of the codes ``before``."""
+    """Input of spans and constants of each material. These are written over constants of codes ``before``."""
     write = writes_of(constants if isinstance(constants, list) else [constants])
     # Tables have an order of their own.
     kept = np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS))
@@ -273,18 +273,18 @@ def _brightest(unit, rng, count):
 
 
 _LOST = 700
-"""Number of values that no table takes, more than one has."""
+"""Number of values that no table takes. It is larger than a table."""
 
 
 def _disordered(rng, write, share):
-    """A share of the words of a frame, in any order, but none of tables."""
+    """A share of the words of a frame, in any order, without words of tables."""
     kept = ~np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS)) & (rng.random(len(write["data"])) < share)
     order = rng.permutation(np.flatnonzero(kept))
     return {name: words[order] for name, words in write.items()}
 
 
 def _lost(rng, design):
-    """Values past the end of a table, and for a bank that there is not."""
+    """Values past the end of a table, and values for a missing bank."""
     data = rng.integers(0, 1 << 17, 2 * _LOST)
     data[_LOST] = (1 << 17) + design.specular.banks
     return {"address": np.full(len(data), LOBE_ADDRESS), "data": data}
@@ -330,9 +330,9 @@ def _counters(unit, rng, count):
 
 _FULL = preset("chord-local", "cosquad", lights=2, gate=True)
 _BOTH = ("renormalise, blinn", "quadratic, cosquad")
-"""Variants of normals that get every stimulus: with a table of the default model, and of the documents."""
+"""Variants of normals that get every stimulus: one with the default model's table, one of the documents."""
 _ALL = ("quotient, blinn", *_BOTH)
-"""Variants that get the stimuli of any spans: with the default design."""
+"""Variants that get the stimuli of any spans, the default design among them."""
 _LESS = {"x_bits": 9, "y_bits": 8, "length_bits": 5}
 
 DESIGNS: dict[str, ShadingPipeline] = {
@@ -347,7 +347,7 @@ DESIGNS: dict[str, ShadingPipeline] = {
     "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
     "without lights": preset(model="cosquad", lights=0, materials=2),
 }
-"""Further pipelines by name: with other numbers of lights and materials, styles, gates or formats."""
+"""Further pipelines by name, with other numbers of lights and materials, styles, gates or formats."""
 
 LONG_DESIGNS: dict[str, ShadingPipeline] = {
     "16 lights": preset(model="cosquad", lights=16),

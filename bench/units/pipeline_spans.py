@@ -1,4 +1,4 @@
-"""Spans and constants for the pipeline: anywhere, and where the last bits of a result decide a pixel."""
+"""Spans and constants for the pipeline: arbitrary, or chosen so that last bits decide a pixel."""
 
 from dataclasses import replace
 
@@ -58,7 +58,7 @@ _LONG_AND_SHORT = ((200, 4095), (3000, 12))
 def any_constants(
     rng: np.random.Generator, design: ShadingPipeline, spans: Spans, brightness: float = 1.0
 ) -> list[FrameConstants]:
-    """Constants of each material; L and H are normals of spans, so that highlights are among the pixels."""
+    """Constants of each material. L and H are normals of spans, so that some pixels have a highlight."""
     lights = design.lights
     direction, halfway = (unit_codes(rng, lights) for _ in range(2))
     members = span_shape(design).members
@@ -91,7 +91,7 @@ def any_constants(
 def tabled(
     design: ShadingPipeline, constants: FrameConstants, parameter: float | None = None, bank: int = 0
 ) -> FrameConstants:
-    """Constants with the table of a parameter, by default of the exponent, where the pipeline has tables."""
+    """Constants with the table of a parameter, by default the exponent, if the pipeline has tables."""
     if not design.loads_tables:
         return constants
     table = design.specular.table(constants.exponent if parameter is None else parameter)
@@ -153,7 +153,7 @@ def constants_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> 
 
 
 def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndarray) -> Spans:
-    """Spans of given lengths; some flat, some of a larger angle than the method serves; by material."""
+    """Spans of given lengths and any material. Some are flat, some wider than the method serves."""
     count = len(length)
     largest = min(design.interpolator.MAX_ANGLE, 179.0)
     angles = np.where(rng.random(count) < 0.1, rng.uniform(largest, 180, count), largest * rng.random(count))
@@ -180,14 +180,14 @@ def vectors_for(rng: np.random.Generator, design: ShadingPipeline, length: np.nd
 
 
 def spans_in_frame(spans: Spans, light: np.ndarray, halfway: np.ndarray) -> tuple[Spans, np.ndarray]:
-    """Spans between unit normals with vectors in the frame of a light; and the light's codes in it, (1, 3).
+    """Spans between unit normals with vectors in the frame of a light, and the light's codes in it, (1, 3).
 
-    A span of two pixels, which no source gives, gets a third.
+    No source gives a span of two pixels. It gets a third pixel.
 
     Parameters
     ----------
     spans : Spans
-        With codes of unit normals.
+        Spans with codes of unit normals.
     light, halfway : int arrays, shape (1, 3)
         Codes of L and H.
     """
@@ -201,7 +201,7 @@ def spans_in_frame(spans: Spans, light: np.ndarray, halfway: np.ndarray) -> tupl
 
 
 def ends_for(design: ShadingPipeline, spans: Spans) -> Spans:
-    """Spans between unit normals, with the ends in the format that the method takes."""
+    """Spans between unit normals, with ends in the method's own format."""
     shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
     if not shift:
         return spans
@@ -209,7 +209,7 @@ def ends_for(design: ShadingPipeline, spans: Spans) -> Spans:
 
 
 def flat_spans(normals: np.ndarray) -> Spans:
-    """Spans of a pixel each, with normals of these codes."""
+    """Spans of one pixel, with normals of these codes."""
     zero = np.zeros(len(normals), dtype=np.int64)
     return Spans(zero, zero, zero + 1, normals, normals)
 
@@ -224,7 +224,7 @@ def joined(rng: np.random.Generator, *kinds: Spans) -> Spans:
 def spans_about(
     rng: np.random.Generator, largest: float, middles: np.ndarray, longest: int, decades: int = 4
 ) -> Spans:
-    """Spans whose middle normals are given, of angles and lengths by their logarithm.
+    """Spans with given middle normals. Angles and lengths are drawn by their logarithm.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def spans_about(
     longest : int
         Largest length in pixels.
     decades : int
-        Decades of the angles.
+        Number of decades of the angles.
     """
     count = len(middles)
     across = normalise(np.cross(middles, rng.normal(size=middles.shape)))
@@ -250,11 +250,11 @@ def spans_about(
 
 
 def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.ndarray) -> Spans:
-    """Spans on the terminator, the border of light and shade, of a light with a vector of this code.
+    """Spans on the terminator, the border of light and shade, of a light whose vector has this code.
 
-    Some start within a few last bits of it, as the sign of N.L, of 34 bits or rounded to 25, decides whether
-    there is a highlight. Some cross it as slowly as they can. Along some N.L rises by a whole number of steps
-    of 18 bits and half a step.
+    The sign of N.L, of 34 bits or rounded to 25, decides whether there is a highlight. So some spans start
+    within a few last bits of the terminator. Some cross it as slowly as possible. Along some, N.L rises by a
+    whole number of steps of 18 bits and half a step.
     """
     light = normalise(code)
 
@@ -283,10 +283,10 @@ def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.nda
 
 
 def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarray) -> Spans:
-    """Spans along the terminator whose 1 - cosine depends on its last bits.
+    """Spans along the terminator whose 1 - cosine depends on last bits.
 
-    Either this word is at the border of its rounding, or the number of segments into which bisection divides
-    the span is about to change.
+    Some have this word at the border of its rounding. For the others the number of segments of bisection is
+    about to change.
     """
     normaliser = AdaptiveNormaliser()
     across = normalise(np.cross(light, rng.normal(size=3)))
@@ -314,8 +314,9 @@ def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarra
 
 
 def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.ndarray, exponent: int) -> Spans:
-    """Spans inside a highlight, 1 - N.H up to 2/n: most where it is an eighth of its peak and less, some of
-    every distance by its logarithm.
+    """Spans inside a highlight, with 1 - N.H up to 2/n.
+
+    Most are in the part with an eighth of the peak or less. Some have any distance, drawn by its logarithm.
     """
     kinds = []
     for count, longest in _LONG_AND_SHORT:
@@ -329,7 +330,7 @@ def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.nda
 
 
 def axes_about(rng: np.random.Generator, largest: float) -> Spans:
-    """Spans about the axes, where a component of a normal is 1, which is rounded to the largest code."""
+    """Spans about the axes. There a component of a normal is 1, which is rounded to the largest code."""
     axes = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
     return spans_about(rng, largest, axes, 60)
 
@@ -340,6 +341,6 @@ def axes_about(rng: np.random.Generator, largest: float) -> Spans:
 def operands_of(
     design: ShadingPipeline, spans: Spans, constants: FrameConstants
 ) -> tuple[Fixed, Fixed, np.ndarray]:
-    """N.L, the specular operand, and whether the light is behind, by the bit-accurate model."""
+    """N.L, the specular operand, and a flag for a light behind the surface, by the bit-accurate model."""
     operands = design.operands(ends_for(design, spans), constants)
     return operands.cosine, operands.highlight, Diffuse(operands.cosine.format).dark(operands.cosine)

@@ -20,7 +20,7 @@ from blysk.sim.frames.testbench import pixel_beats
 __all__ = ["RECORD"]
 
 _COUNTED = (1 << 16) + 2
-"""Number of spans that is over the range of a counter of 16 bits."""
+"""Number of spans over the range of a counter of 16 bits."""
 
 _DEFAULT = "2 pipelines, without lights"
 

@@ -1,9 +1,9 @@
-"""What a record of a unit holds, and the runs that tests and tools make of it.
+"""Records of units, and the runs that tests and tools make from them.
 
-A record stands in the file of the unit's name in `blysk.bench.units`. Tables, pages, tests of the RTL,
-mutants, toggle coverage, other simulators and baselines iterate over `registry.RECORDS`; no other list of
-units exists. To add a unit: its model in `golden`, its component in `hdl`, its record, and a test of what is
-special about it.
+A record is in the file of the unit's name in `blysk.bench.units`. Tables, pages, tests of the RTL, mutants,
+toggle coverage, other simulators and baselines iterate over `registry.RECORDS`. No other list of units
+exists. To add a unit, write its model in `golden`, its component in `hdl`, its record, and a test of its
+special features.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -38,22 +38,22 @@ Beats = np.ndarray | Mapping[str, Any]
 """Beats of a stream: a structured array, or (nested) mappings of field names to arrays of codes."""
 
 PAUSE, PAUSED = 61, 40
-"""Cycles from a beat to the next, and number of beats, in the run with pauses that ends each stimulus."""
+"""Cycles from a beat to the next, and number of beats, in the run with pauses at the end of each stimulus."""
 
 STALLS = ((0.0, 0.0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9))
-"""Shares of the cycles on which the input and the output are stalled, a pair for each run."""
+"""Shares of the cycles with a stalled input and with a stalled output, a pair for each run."""
 
 OFFERED, TAKEN = 2.0, 0.6
-"""Rates at which beats are offered and taken in the run whose stalls end, over those without stalls.
+"""Rates of offered and of taken beats in the run whose stalls end, relative to the run without stalls.
 
-The sink holds up a unit at its full rate, and not at half of that: a unit that falls into half its rate stays
-there.
+The sink holds up a unit at its full rate, but not at half its rate. So a unit that falls into half its rate
+stays there.
 """
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Results of a unit, and what they should have been.
+    """Results of a unit, and the expected results.
 
     Parameters
     ----------
@@ -62,10 +62,10 @@ class Sample:
     exact : array, same shape
         The exact function of the same operands in float64.
     formula : array, same shape, optional
-        The unit's approximate formula in float64; ``None`` where its tables cannot be separated from its
+        The unit's approximate formula in float64. ``None`` if its tables cannot be separated from its
         arithmetic.
     at : array, broadcast to the same shape, optional
-        The operand that an error is drawn against, named by the variant's ``axis``.
+        The operand on the axis of a drawing of errors. The record's ``axis`` names it.
     """
 
     found: np.ndarray
@@ -87,7 +87,7 @@ class Sample:
 
     @property
     def extremes(self) -> "Sample":
-        """The three results or fewer that `errors` come from."""
+        """The results with the errors of `errors`, three or fewer."""
         pairs = [(self.found, self.exact)]
         if self.formula is not None:
             pairs += [(self.formula, self.exact), (self.found, self.formula)]
@@ -97,7 +97,7 @@ class Sample:
 
     @classmethod
     def joined(cls, samples: "Iterator[Sample]") -> "Sample":
-        """Several samples as one; each may have a shape of its own."""
+        """Several samples as one. Each may have its own shape."""
         samples = [
             s if s.at is None else replace(s, at=np.broadcast_to(s.at, np.shape(s.found))) for s in samples
         ]
@@ -111,15 +111,15 @@ class Sample:
 
 
 class Decisions(Sample):
-    """Decisions, 1 for yes and 0 for no, and what they should have been. Errors are their share of all.
+    """Decisions, 1 for yes and 0 for no, and the expected ones. An error is a share of all decisions.
 
-    The formula is yes where ``found`` or ``exact`` is: a model error is a yes that was not needed, an
+    The formula is yes if ``found`` or ``exact`` is yes. So a model error is a yes without need, and an
     arithmetic error a wrong no.
     """
 
     @classmethod
     def of(cls, found: np.ndarray, exact: np.ndarray, at: np.ndarray | None = None) -> "Decisions":
-        """Decisions and what they should have been, as booleans."""
+        """Decisions and expected decisions from booleans."""
         found, exact = (np.asarray(decision, dtype=np.int8) for decision in (found, exact))
         return cls(found, exact, np.maximum(found, exact), at)
 
@@ -135,33 +135,33 @@ class Decisions(Sample):
 
 @dataclass(frozen=True)
 class Variant:
-    """A structure of a unit: how it is made, and how its errors are measured.
+    """A structure of a unit, with the ways to make it and to measure its errors.
 
     Parameters
     ----------
     unit : callable
-        Makes the component; its ``model`` are the bit-accurate model.
+        Makes the component. Its ``model`` is the bit-accurate model.
     measure : callable, optional
-        Takes a random generator and a number of samples, gives a `Sample`. For units of whole spans a sample
-        is a pixel. ``None``: the variant is in no table of errors.
+        Function from a random generator and a number of samples to a `Sample`. For units of whole spans a
+        sample is a pixel. ``None``: the variant is in no table of errors.
     domain : str
         Operands over which errors are measured.
     scale : str
-        Unit of the errors: nothing (1 is a full term or the length of a vector), ``rad``, ``turn``, ``LSB``
-        or ``rate``, a share of the decisions.
+        Unit of the errors: ``rad``, ``turn``, ``LSB``, ``rate`` (a share of the decisions) or empty. If it is
+        empty, 1 is a full term or the length of a vector.
     exhaustive : bool
-        Every operand of the domain is measured, whatever the number of samples.
+        Whether every operand of the domain is measured, for any number of samples.
     beat : dict
-        Fields of the input beats of the simulation that finds the times, where the unit does not state
-        them; others are 0.
+        Fields of the input beats of the simulation that finds the times, if the unit does not state them.
+        Other fields are 0.
     note : str
         Further remark.
     source : str
         Document and figure, if they differ from the record's.
     as_published : bool
-        With the constants or in the form that a document prints.
+        Whether constants or form are as a document prints them.
     long : bool
-        Its RTL is simulated in the long run only.
+        Whether its RTL is simulated in the long run only.
     """
 
     unit: Callable[[], Component]
@@ -185,11 +185,12 @@ class Case:
     beats : Beats
         Input beats.
     constants : Beats, optional
-        Driven for the whole run, where the unit has a port ``constants``.
+        Constants for the whole run, if the unit has a port ``constants``.
     write : Beats, optional
         Beats of the stream ``write``.
     write_after : array, shape (writes,), optional
-        Number of input beats before each write, never decreasing; ``None``: all come before the first.
+        Number of input beats before each write, in ascending order. ``None``: all writes come before the
+        first beat.
     """
 
     beats: Beats
@@ -199,11 +200,11 @@ class Case:
 
     @property
     def sent(self) -> dict[str, Any]:
-        """Arguments of `simulate` for what is sent beside the beats."""
+        """Arguments of `simulate` for constants and writes."""
         return {name: getattr(self, name) for name in ("constants", "write", "write_after")}
 
     def first(self, count: int) -> "Case":
-        """The first input beats, and the writes up to the last of them."""
+        """The first input beats, and the writes up to the last of these beats."""
         few = replace(self, beats=first(self.beats, count))
         if self.write_after is None:
             return few
@@ -213,27 +214,28 @@ class Case:
 
 @dataclass(frozen=True)
 class Stimulus:
-    """A kind of input for a unit. Its docstring in the record says what it covers.
+    """A kind of input for a unit. The docstring of its function in the record says what the input covers.
 
     Parameters
     ----------
     make : callable
-        Takes the component, a random generator and a number of beats or pixels, gives a `Case`. Its
-        docstring is one sentence: what is covered.
+        Function from the component, a random generator and a number of beats or pixels to a `Case`. Its
+        docstring is one sentence that says what is covered.
     count : int
         Beats or pixels of a test.
     stalled : bool
-        Whether it is also sent under the patterns of `STALLS`; else without stalls alone.
+        Whether it is also sent with the stalls of `STALLS`. Else it is sent only without stalls.
     pace : callable, optional
-        Takes the component, gives the cycles from an output beat to the next without stalls, as the unit's
-        documentation has them for this input. ``None`` where the data decide: then no documented rate is
-        asserted but that of a `PipelinedUnit`, and after stalls the rate of the same beats from reset.
+        Function from the component to the cycles from an output beat to the next without stalls, as the
+        unit's documentation has them for this input. ``None`` if they depend on the data. Tests then check
+        only the documented rate of a `PipelinedUnit`. After stalls they check the rate of the same beats from
+        reset.
     long : bool
         Whether it belongs to the long run.
     repeats : int
-        How often it is made, each time by another seed.
+        Number of times that it is made, each time with another seed.
     variants : tuple of str
-        Names of the variants for which it is made; empty for all.
+        Names of the variants for which it is made. Empty: all variants.
     """
 
     make: Callable[[Component, np.random.Generator, int], Case]
@@ -246,14 +248,14 @@ class Stimulus:
 
     @property
     def covers(self) -> str:
-        """One sentence: what is covered."""
+        """One sentence that says what is covered."""
         make = getattr(self.make, "func", self.make)
         return (make.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
 
 
 @dataclass(frozen=True)
 class UnitRun:
-    """A run of a unit: its input, what is to come of it, and the stalls.
+    """A run of a unit: input, expected output, stalls.
 
     Parameters
     ----------
@@ -264,9 +266,9 @@ class UnitRun:
     status : dict or None
         Expected members of the status after the run, see `Record.status`.
     stalls : dict
-        Arguments ``input_stalls`` and ``output_stalls`` of `simulate`; empty for none.
+        Arguments ``input_stalls`` and ``output_stalls`` of `simulate`. Empty: no stalls.
     settles : bool
-        Whether a test that knows the times without stalls ends the stalls half-way, by `settled`.
+        Whether a test that knows the times without stalls ends the stalls half-way, with `settled`.
     """
 
     case: Case
@@ -281,19 +283,19 @@ class UnitRun:
         return length_of(self.expected)
 
     def settled(self, cycles: np.ndarray, input_cycles: np.ndarray) -> tuple["UnitRun", int]:
-        """The run with stalls of the unit's own rate on both sides for half of the beats, then without any.
+        """The run with stalls at the unit's own rate on both sides for half of the beats, then with none.
 
         Parameters
         ----------
         cycles, input_cycles : arrays
-            Clocks of the output and of the input beats in the run without stalls.
+            Clocks of the output beats and of the input beats in the run without stalls.
 
         Returns
         -------
         run : UnitRun
             The run, see `OFFERED` and `TAKEN`.
         end : int
-            Clock from which on nothing is stalled.
+            Clock from which there are no stalls.
         """
         rng, start = np.random.default_rng([2026, len(cycles)]), int(input_cycles[0])
         span = int(max(cycles.max(initial=0), input_cycles[-1])) + 1 - start
@@ -311,36 +313,37 @@ class UnitRun:
 
 @dataclass(frozen=True)
 class Record:
-    """Facts of a unit that tools and tests need.
+    """Facts about a unit that tools and tests need.
 
     Parameters
     ----------
     name : str
         Name of its files in `golden` and `hdl`.
     title : str
-        What the unit computes, in some words.
+        The unit's result, in some words.
     source : str
         Document and figure.
     variants : dict
-        Structures by name; the first is the default, which mutants and toggle coverage take.
+        Structures by name. The first is the default. Mutants and toggle coverage use it.
     expect : callable
-        Takes the component and a `Case`; gives the output beats by the bit-accurate model.
+        Function from the component and a `Case` to the output beats by the bit-accurate model.
     stimuli : dict
-        Stimuli by name; the first serves for any number of beats, in other simulators too.
+        Stimuli by name. The first serves for any number of beats, in other simulators too.
     status : callable, optional
-        Takes the component and a `Case`; gives expected members of the port ``status`` after a run, by name.
-        For a component without that port: the number of cycles on which each of the ports ``out_of_range``
-        and ``wide`` is high.
+        Function from the component and a `Case` to the expected members of the port ``status`` after a run,
+        by name. For a component without this port: the number of cycles on which each of the ports
+        ``out_of_range`` and ``wide`` is high.
     axis : str
-        Quantity that errors are drawn against; empty for no drawing.
+        Quantity on the axis of a drawing of errors. Empty: no drawing.
     logarithmic : bool
-        That axis is logarithmic.
+        Whether this axis is logarithmic.
     waivers : dict
-        Signals of the default variant; by name why a fault there may survive, or which test finds it.
+        By name of a signal of the default variant: the reason why a fault there may survive, or the test that
+        finds it.
     still : dict
-        Register bits of the default variant that cannot toggle: signals with their bits by reason.
+        Register bits of the default variant that cannot toggle: signals with their bits, by reason.
     remembers : bool
-        It has a memory of earlier beats, which a reset does not clear.
+        Whether the unit has a memory of earlier beats, which a reset does not clear.
     """
 
     name: str
@@ -372,7 +375,7 @@ class Record:
         return self.variants[variant].source or self.source
 
     def stimuli_of(self, variant: str) -> dict[str, Stimulus]:
-        """Stimuli that are made for a variant."""
+        """Stimuli for a variant."""
         return {
             name: stimulus
             for name, stimulus in self.stimuli.items()
@@ -380,7 +383,7 @@ class Record:
         }
 
     def example(self, variant: str, unit: Component, results: int = 3) -> UnitRun:
-        """Run of the first few beats of a variant's first stimulus, which shows the unit's times.
+        """A short run of a variant's first stimulus, which shows the unit's times.
 
         Parameters
         ----------
@@ -389,7 +392,7 @@ class Record:
         unit : Component
             Component of that variant.
         results : int
-            Output beats at least, if `PAUSED` input beats give as many.
+            Least number of output beats, if `PAUSED` input beats give as many.
         """
         make = next(iter(self.stimuli_of(variant).values())).make
         case = make(unit, np.random.default_rng(2026), 200)
@@ -401,9 +404,9 @@ class Record:
         return UnitRun(few, expected, None, {})
 
     def runs(self, unit: Component, stimulus: str, seed: int = 2026) -> Iterator[UnitRun]:
-        """The runs of a stimulus, always the same ones: without stalls, with them, and with pauses.
+        """The runs of a stimulus: without stalls, with stalls, and with pauses. They are always the same.
 
-        The second one is to settle, see `UnitRun`.
+        The second run settles, see `UnitRun`.
 
         Parameters
         ----------
@@ -412,7 +415,7 @@ class Record:
         stimulus : str
             Its name.
         seed : int
-            Of the random generator.
+            Seed of the random generator.
         """
         given = self.stimuli[stimulus]
         for repeat in range(given.repeats):
@@ -456,9 +459,9 @@ def together(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]
 
 
 def once(compute: Callable[[Component, Case], Any]) -> Callable[[Component, Case], Any]:
-    """A function of a unit and a case that keeps its last result, as long as the case is there.
+    """A function of a unit and a case that keeps its last result while the case exists.
 
-    What comes of a case and its status are often asked for one after the other, and made by the same model.
+    Output and status of a case are often needed one after the other, and come from the same model.
     """
     kept: dict[str, Any] = {}
 

@@ -1,11 +1,13 @@
-"""Every record, imported from its file: in the order of `UNITS`.
+"""Every record, imported from its file, in the order of `UNITS`.
 
-Components without a record: the frame constants, the
-pixel assembler and the pixel merger, whose ports are not a stream ``i`` to a stream ``o``, and the
-accumulator of ``chord-local``. The records of the pipelines and of this interpolator, of which they are
-parts, cover them. Beats of the pixel lanes depend on the cycles: they have tests of their own. So have
-units with other ports: band depths, controls, the draw unit, and the units of the display that have two
-clocks or never wait.
+These components have no record:
+
+- the frame constants, the pixel assembler and the pixel merger, because their ports are not a stream ``i`` to
+  a stream ``o``, and the accumulator of ``chord-local``. The records of the pipelines and of the interpolator
+  cover them as their parts;
+- the pixel lanes, because their beats depend on the cycles. They have tests of their own;
+- units with other ports: band depths, controls, the draw unit, and units of the display that have two clocks
+  or never wait. They have tests of their own, too.
 """
 
 from importlib import import_module

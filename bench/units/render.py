@@ -25,7 +25,7 @@ _SEED = 2026
 
 
 def _constants(rng, renderer):
-    """Frame constants of each material: lights from anywhere, in frames turned in any way."""
+    """Frame constants of each material, with lights from anywhere, in frames with any rotation."""
     design = renderer.design
     direction, halfway = (unit_codes(rng, design.lights) for _ in range(2))
     constants = []
@@ -56,7 +56,7 @@ def _status(unit, case):
 
 
 def _triangles(unit, rng, count, size=6.0, spread=0.2):
-    """Triangles of all kinds, one over the other in a small picture."""
+    """Overlapping triangles of all kinds in a small picture."""
     design = unit.model.design
     triangles = ended(random_triangles(rng, count, size=size, spread=spread))
     triangles.material[:] = rng.integers(0, design.materials, count)
@@ -70,12 +70,12 @@ def _triangles(unit, rng, count, size=6.0, spread=0.2):
 
 
 def _tiny(unit, rng, count):
-    """Triangles of a pixel or so."""
+    """Triangles of about one pixel."""
     return _triangles(unit, rng, count, 1.0)
 
 
 def _wide(unit, rng, count):
-    """Triangles larger than the picture, of normals near to each other."""
+    """Triangles larger than the picture, with normals near to each other."""
     return _triangles(unit, rng, count, 400.0, 0.02)
 
 

@@ -1,4 +1,4 @@
-"""Operands for units of geometry: triangles of all kinds, and the results of the units before."""
+"""Operands for units of geometry: triangles of all kinds, and results of the units before a unit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -47,7 +47,7 @@ def frame_of(constants: Mapping) -> FrameSettings:
 
 
 def triangles_with(**members: np.ndarray) -> Triangles:
-    """Triangles with the given members; the other members are 0."""
+    """Triangles with the given members. The other members are 0."""
     count = len(next(iter(members.values())))
     shapes = {"x": (3,), "y": (3,), "depth": (3,), "normal": (3, 3), "material": (), "two_sided": ()}
     zeros = {name: np.zeros((count, *shape), dtype=np.int64) for name, shape in shapes.items()}
@@ -55,7 +55,7 @@ def triangles_with(**members: np.ndarray) -> Triangles:
 
 
 def sorted_of(beats: Mapping) -> SortedTriangles:
-    """Sorted triangles from beats; members that the beats do not have are 0."""
+    """Sorted triangles from beats. Members that the beats do not have are 0."""
     members = {name: beats[name] for name in ("x", "y", "material") if name in beats}
     # Columns of edges are no corners.
     members = {name: value for name, value in members.items() if name != "x" or "height" not in beats}
@@ -68,7 +68,7 @@ def sorted_of(beats: Mapping) -> SortedTriangles:
 
 
 def edges_of(beats: Mapping) -> Edges:
-    """Edges from beats; members that the beats do not have are 0."""
+    """Edges from beats. Members that the beats do not have are 0."""
     zeros = np.zeros(len(beats["first"]), dtype=np.int64)
     return Edges(**{field.name: beats.get(field.name, zeros) for field in fields(Edges)})
 
@@ -108,7 +108,7 @@ def scales_of(beats: Mapping) -> PlaneScales:
 
 @dataclass(frozen=True)
 class Stages:
-    """Results of the units' models for triangles, one model after the other.
+    """Results of the models of all units for triangles, one model after the other.
 
     Parameters
     ----------
@@ -126,48 +126,48 @@ class Stages:
 
     @cached_property
     def drawn(self) -> SortedTriangles:
-        """By `VertexSort`."""
+        """Result of `VertexSort`."""
         return VertexSort(self.grid).compute(self.triangles, self.frame)[0]
 
     @cached_property
     def edges(self) -> Edges:
-        """By `EdgeSetup`."""
+        """Result of `EdgeSetup`."""
         return EdgeSetup(self.grid).compute(self.drawn)
 
     @cached_property
     def rows(self) -> Rows:
-        """By `EdgeWalk`."""
+        """Result of `EdgeWalk`."""
         return EdgeWalk().compute(self.edges, self.drawn, self.frame)
 
     @cached_property
     def clipped(self) -> ClippedRows:
-        """By `SpanClip`."""
+        """Result of `SpanClip`."""
         return SpanClip().compute(self.rows, self.frame)
 
     @cached_property
     def scales(self) -> PlaneScales:
-        """By `PlaneSetup`."""
+        """Result of `PlaneSetup`."""
         return PlaneSetup(self.grid).compute(self.drawn, self.edges)
 
     @cached_property
     def least(self) -> np.ndarray:
-        """By `AttributeSerialiser`."""
+        """Result of `AttributeSerialiser`."""
         return AttributeSerialiser().least(self.drawn.triangles)
 
     @cached_property
     def gradients(self) -> Gradients:
-        """By `GradientSetup`, of all attributes."""
+        """Result of `GradientSetup`, for all attributes."""
         values = self.drawn.triangles.attributes
         return GradientSetup().compute(*(Fixed(ATTRIBUTE, values[:, k]) for k in range(3)), self.scales)
 
     @cached_property
     def planes(self) -> Planes:
-        """By `PlaneAssembler`."""
+        """Result of `PlaneAssembler`."""
         return PlaneAssembler().compute(self.gradients, self.least, self.frame)
 
     @cached_property
     def pieces(self) -> Pieces:
-        """By `SpanAttributes`."""
+        """Result of `SpanAttributes`."""
         return SpanAttributes().compute(self.clipped, self.planes)[0]
 
 
@@ -183,7 +183,7 @@ def corners(rng: np.random.Generator, count: int, grid: Grid = GRID, size: float
     grid : Grid
         Fraction bits of the coordinates.
     size : float
-        Largest distance of most corners from a triangle's middle, along x and y, in pixels.
+        Largest distance of most corners from the triangle's middle, along x and y, in pixels.
     """
     step, reach = grid.steps, int(size * grid.steps)
     middle = rng.integers(-20 * step, 20 * step, (count, 1, 2))
@@ -246,9 +246,10 @@ def random_triangles(
 
 
 def ended(triangles: Triangles, grid: Grid = GRID) -> Triangles:
-    """Triangles, two of which now cover all of a small picture, so that their output ends a run.
+    """Triangles of which two are changed to cover a small picture, so that their output ends a run.
 
-    The last triangle is in front of all; the last one of the run with pauses is in front of most.
+    The last triangle is in front of all triangles. The last triangle of the run with pauses is in front of
+    most.
     """
     far = 100 * grid.steps
     for index, depth in ((PAUSED - 1, 1 << 21), (-1, 0)):

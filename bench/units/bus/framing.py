@@ -20,7 +20,7 @@ _RECORDS = {"span": SHADER, "frame": GEOMETRY, "run": RENDER}
 
 
 def _columns(layout: ByteLayout, beats) -> dict:
-    """Beats of a core as columns with the names of a layout; members of nested structures join names."""
+    """Beats of a core as columns with a layout's names. Names of nested members are joined."""
     found = {}
 
     def add(name, value):
@@ -41,7 +41,7 @@ def _columns(layout: ByteLayout, beats) -> dict:
 
 
 def _core_cases(unit, case) -> list[Case]:
-    """Input of the core inside a unit, frame by frame: nothing of a frame is left in the next."""
+    """Input of the core inside a unit, frame by frame. Nothing of a frame is left in the next frame."""
     data = np.asarray(case.beats["data"], dtype=np.uint8)
     beats = unit.model.given.unpack(data)
     ends = [*np.flatnonzero(case.beats["last"][:-1]) + 1, len(data)]

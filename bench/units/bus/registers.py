@@ -36,7 +36,7 @@ def _expect(unit, case):
 
 
 def _accesses(unit, rng, count, busy=0):
-    """Reads and writes at registers and elsewhere, of values that fit and others; values are read back."""
+    """Reads and writes at registers and elsewhere, of fitting and other values. Values are read back."""
     registers = unit.model.registers
     chosen = rng.integers(0, len(registers), count)
     address = np.array([register.address for register in registers])[chosen]
@@ -71,7 +71,7 @@ def _busy(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Least and largest values of each register, and those next to them; then each is read."""
+    """Least and largest values of each register, and the values next to them. Then each register is read."""
     accesses = []
     for register in unit.model.registers:
         half, whole = 1 << register.width - 1, 1 << register.width
@@ -92,7 +92,7 @@ def _borders(unit, rng, count):
 
 
 def _decoding(unit, rng, count):
-    """Reads and writes, some of no byte, at addresses a bit off those of registers."""
+    """Reads and writes, some of no byte, at addresses that differ in a bit from a register's address."""
     address = np.array([register.address for register in unit.model.registers])
     address = (address[:, np.newaxis] ^ 1 << np.arange(12)).ravel()
     thrice = np.tile(address, 3)

@@ -38,7 +38,7 @@ def half_angles(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _measure(rng, count, unit):
-    """Cosine of gamma at any pixel, by the angles that the setup gives."""
+    """Cosine of gamma at any pixel, from the setup's angles."""
     left, right = span_ends(rng, count, 150.0)
     vector = vectors_near(rng, left, right)
     length = log_lengths(rng, count, 2)
@@ -77,7 +77,7 @@ def _case(left, right, vector, length):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any distance, every sixteenth of arbitrary codes; any vector and length."""
+    """Pairs of normals at any distance, every sixteenth of arbitrary codes, with any vector and length."""
     return _case(*any_pairs(rng, count), unit_codes(rng, count), any_lengths(rng, count))
 
 

@@ -41,12 +41,12 @@ def _corners(unit, rng, count):
 
 
 def _every(unit, rng, count):
-    """Every operand there is."""
+    """Every operand."""
     return Case(np.arange(FORMAT.min_code, FORMAT.max_code + 1))
 
 
 def _thirteenth(unit, rng, count):
-    """Every thirteenth operand: each segment meets all values of the lower bits."""
+    """Every thirteenth operand, so that each segment gets all values of the lower bits."""
     return Case(np.arange(FORMAT.min_code, FORMAT.max_code + 1, 13))
 
 

@@ -38,7 +38,7 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Components that differ by 1 and a step less or more, the largest differences, ends of words."""
+    """Components that differ by 1 or by a step less or more, the largest differences, ends of words."""
     ends = word_ends(rng, count, 6)
     border = [[ONE, 0, 0, ONE - d, 0, 0] for d in (2**17 - 1, 2**17, 2**17 + 1)]
     border.append([COMPONENT.min_code] * 3 + [COMPONENT.max_code] * 3)
@@ -47,7 +47,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many pairs: a carry out of the bits that are cut off is rare."""
+    """Many pairs, because a carry out of the bits that are cut off is rare."""
     degrees = np.r_[10.0 ** rng.uniform(-4, 0, count // 4), rng.uniform(0, 180, count - count // 4)]
     return Case(dict(zip("ab", code_pairs_at(rng, count, degrees), strict=True)))
 

@@ -1,4 +1,4 @@
-"""Record of the chord setup, and the values of spans that it shares with the methods'."""
+"""Record of the chord setup, and values of spans for this record and the records of methods."""
 
 from collections.abc import Callable
 from functools import partial
@@ -70,7 +70,7 @@ def three_values(at, spans: int) -> tuple[np.ndarray, SpanValues]:
 
 
 def parabola(values: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Quadratic through values at t = 0, 1/2 and 1, which are along the last axis."""
+    """Quadratic through the values at t = 0, 1/2 and 1, along the last axis."""
     left, middle, right = np.moveaxis(values, -1, 0)
     return left + t * (4 * middle - right - 3 * left + t * 2 * (left + right - 2 * middle))
 
@@ -83,7 +83,7 @@ def value_at(differences, pixel) -> np.ndarray:
 
 
 def _measure(rng, count):
-    """N·L and u at any pixel, by the differences in exact arithmetic; 1 is the product of unit vectors."""
+    """N·L and u at any pixel, by the differences in exact arithmetic. The product of unit vectors is 1."""
     length = log_lengths(rng, count, 2)
     pixel = pixel_of(rng, length)
     exact, values = three_values(local_curves(rng, count), count)
@@ -96,14 +96,14 @@ def _measure(rng, count):
 
 
 def values_of(beats) -> SpanValues:
-    """Values that input beats carry; those of u are 0 in beats without highlights."""
+    """Values in input beats. In beats without highlights u is 0."""
     values = beats["values"]
     diffuse = values["diffuse"]
     return SpanValues(diffuse, values["highlight"] if "highlight" in values.dtype.names else 0 * diffuse)
 
 
 def factors_of(beats) -> np.ndarray | None:
-    """Codes of the factors that input beats carry, or ``None``."""
+    """Codes of the factors in input beats, or ``None``."""
     return beats["factors"] if "factors" in beats.dtype.names else None
 
 
@@ -127,7 +127,7 @@ def _expect(unit, case):
 
 
 def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
-    """Three values of each function, on curves of every size; every eighth span has arbitrary codes."""
+    """Three values of each function, on curves of every size. Every eighth span has arbitrary codes."""
     values = []
     for format in FORMATS.values():
         codes = any_codes(rng, format, count, lights, 3)
@@ -138,7 +138,7 @@ def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
 
 
 def any_factors(rng: np.random.Generator, count: int, factors: int) -> np.ndarray:
-    """Codes of factors on curves of every size, most in 0 to 1; every eighth span has arbitrary codes."""
+    """Codes of factors on curves of every size, most in 0 to 1. Every eighth span has arbitrary codes."""
     format = FORMATS["diffuse"]
     codes = any_codes(rng, format, count, factors, 3)
     start = rng.uniform(0, 1, (count, factors, 1))
@@ -149,7 +149,7 @@ def any_factors(rng: np.random.Generator, count: int, factors: int) -> np.ndarra
 
 
 def value_beats(unit, values: SpanValues, length: np.ndarray) -> np.ndarray:
-    """Input beats of a unit that takes values of spans; factors follow from the values."""
+    """Input beats of a unit that takes values of spans. Factors follow from the values."""
     beats = np.zeros(len(length), dtype_of(unit.i.payload.shape()))
     for name, codes in zip(FORMATS, values, strict=True):
         if name in beats["values"].dtype.names:
@@ -166,12 +166,12 @@ def _lengths(unit, rng, count):
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, every eighth span of arbitrary codes; lengths by their logarithm."""
+    """Curves of every size, every eighth span of arbitrary codes, with lengths by their logarithm."""
     return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
 
 
 def _corners(unit, rng, count):
-    """P and G in range, about the ends of their words and beyond; equal values; ends of words."""
+    """P and G in range, about the ends of their words and beyond. Equal values and ends of words."""
     values = []
     for format in FORMATS.values():
         start = rng.uniform(format.min_code * 0.9, format.max_code * 0.9, (count, unit.lights))
@@ -193,7 +193,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many spans: the last bits of products and of sums are rounded off and rarely matter."""
+    """Many spans, because the last bits of products and sums are rounded off and rarely matter."""
     return _corners(unit, rng, count)
 
 

@@ -15,11 +15,11 @@ __all__ = ["RECORD", "chord_of"]
 
 FORMAT = HalfChord.OPERAND_FORMAT
 LARGEST = 1 << 35
-"""Code of the squared chord of a right angle, 2; the supplement serves larger angles."""
+"""Code of the squared chord of a right angle, 2. The supplement serves larger angles."""
 
 
 def chord_of(left: np.ndarray, right: np.ndarray) -> tuple[Fixed, np.ndarray]:
-    """Squared chord between vectors, or to the opposite vector if that is shorter; and whether it is."""
+    """Squared chord between vectors, or to the opposite vector if this is shorter, and a flag for this."""
     obtuse = dot(left, right) < 0
     chord = np.where(obtuse[:, np.newaxis], left + right, left - right)
     return Fixed(FORMAT, np.minimum(dot(chord, chord), LARGEST)), obtuse
@@ -66,7 +66,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many chords: the last bits of the table, of products and of sums are rounded off and rarely matter."""
+    """Many chords, because the last bits of table, products and sums are rounded off and rarely matter."""
     size = np.trunc(2.0 ** rng.uniform(0, 35, count // 4)).astype(np.int64)
     return _case(rng, np.r_[size, rng.integers(0, LARGEST, count - len(size))])
 

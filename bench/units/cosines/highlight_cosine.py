@@ -57,7 +57,7 @@ def _expect(unit, case):
 
 
 def _spans(unit, rng, count):
-    """Spans of arbitrary codes; most are short, some have no pixel."""
+    """Spans of arbitrary codes. Most are short, and some have no pixel."""
     length = short_lengths(rng, count)
     beats = {name: any_codes(rng, format, len(length)) for name, format in FORMATS.items()}
     return Case({**beats, "length": length})
@@ -81,12 +81,12 @@ def spans_of(rng: np.random.Generator, length: np.ndarray) -> Case:
 
 
 def _corners(unit, rng, count):
-    """Peaks, both ends of each quarter of the wave, ends of words, carries, cos beta to 2; short spans."""
+    """Short spans with peaks, ends of each quarter of the wave, ends of words, carries, cos beta to 2."""
     return spans_of(rng, rng.integers(0, 40, count // 20))
 
 
 def _last_bits(unit, rng, count):
-    """Every bit of a length, and many spans: the last bits of products rarely matter."""
+    """Every bit of a length, and many spans, because the last bits of products rarely matter."""
     powers = 1 << np.arange(12)
     return spans_of(rng, np.r_[powers, powers + 1, rng.integers(1, 4, count // 2)])
 

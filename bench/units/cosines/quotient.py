@@ -17,7 +17,7 @@ __all__ = ["RECORD"]
 
 
 def _words_of(model, beats) -> PixelWords:
-    """Words of pixels that beats carry."""
+    """Words of pixels in beats."""
     format, count = model.square_format, len(beats["rest"])
     none = np.zeros((count, 0), dtype=np.int64)
     numerator = Fixed(format, beats["numerator"] if model.highlights else none)
@@ -48,7 +48,7 @@ def _squares(model, rng, count):
 
 
 def _pixels(model, rng, squares, cosine) -> PixelWords:
-    """Words of pixels from m and w of the first light and N·L of all."""
+    """Words of pixels from m and w of the first light and N·L of all lights."""
     m, w = squares
     numerator = Fixed.round(model.square_format, np.tile(m[:, np.newaxis], model.lights))
     if not model.highlights:
@@ -62,7 +62,7 @@ def _pixels(model, rng, squares, cosine) -> PixelWords:
 
 
 def _vectors(unit, rng, count):
-    """Vectors of every direction; some of a highlight's peak, some across it, some facing away."""
+    """Vectors of every direction, some at a highlight's peak, some across it, some facing away."""
     p = unit.model.spans
     *squares, _ = _squares(p, rng, count)
     pixels = _pixels(p, rng, squares, rng.uniform(-1, 1, (count, p.lights)))
@@ -74,7 +74,7 @@ def _beats(unit, pixels, count):
 
 
 def _words(unit, rng, count):
-    """Words of every size and sign, ends and powers of two among them: q is often too small, or wraps."""
+    """Words of every size and sign, with ends and powers of two, so that q is often too small or wraps."""
     p = unit.model.spans
     squares = any_codes(rng, p.square_format, count, p.lights * p.highlights + 1)
     squares = np.where(rng.random(squares.shape) < 0.7, np.abs(squares), squares)
@@ -89,7 +89,7 @@ def _words(unit, rng, count):
 
 
 def _measure(rng, count, model):
-    """N·L, and sin^2 as its place tells, relative to itself or to cos^2 where that is smaller."""
+    """N·L, and sin^2 by its place. The error of sin^2 is relative to the smaller of sin^2 and cos^2."""
     m, w, sine = _squares(model.spans, rng, count)
     exact = rng.uniform(-1, 1, (count, 1))
     pixels = _pixels(model.spans, rng, (m, w), exact)

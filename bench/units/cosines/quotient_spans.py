@@ -17,14 +17,14 @@ __all__ = ["RECORD", "any_vectors", "line_directions", "pixel_word_beats"]
 def any_vectors(
     rng: np.random.Generator, model: QuotientSpans, length: np.ndarray, near: bool = False
 ) -> SpanVectors:
-    """Vectors of spans of given lengths, as a source has to give them: ends in ratio and angle to the limits.
+    """Vectors of spans of given lengths, within a source's limits of the ends' ratio and angle.
 
     Parameters
     ----------
     rng : Generator
         Of the random numbers.
     model : QuotientSpans
-        Which components there are.
+        The components of a span.
     length : int array, shape (spans,)
         Pixels. The step of a span of two pixels is 0.
     near : bool
@@ -44,14 +44,14 @@ def any_vectors(
 
 
 def line_directions(rng: np.random.Generator, lights: int) -> np.ndarray:
-    """Codes of ``sin a`` and ``cos a`` of lights, shape (lights, 2); some at the viewer, some behind."""
+    """Codes of ``sin a`` and ``cos a`` of lights, shape (lights, 2). Some are at the viewer, some behind."""
     angle = rng.choice([0, np.pi / 2, np.nan], lights)
     angle = np.where(np.isnan(angle), rng.uniform(0, np.pi / 2, lights), angle)
     return QuotientSpans().codes_of(np.sin(angle), np.cos(angle))
 
 
 def pixel_word_beats(unit, pixels, span: np.ndarray) -> np.ndarray:
-    """Words of pixels as beats; ``span`` is the index of each pixel's span."""
+    """Words of pixels as beats. ``span`` is the index of each pixel's span."""
     stream = unit.o if isinstance(unit, QuotientSpansUnit) else unit.i
     beats = np.zeros(len(span), dtype_of(stream.payload.shape()))
     beats["rest"], beats["line"], beats["span"] = pixels.rest.codes, pixels.line.codes, 1 - span % 2
@@ -76,14 +76,14 @@ def _case(unit, vectors, length, constants):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, most short; ends in ratios to 1:2 and angles to 90 degrees."""
+    """Spans of every length, most short, with ends in ratios to 1:2 and angles to 90 degrees."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     vectors = any_vectors(rng, unit.model, length)
     return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
 def _words(unit, rng, count):
-    """Ends of words in every component and light; any steps and exponents: sums wrap, as in the model."""
+    """Ends of words in every component and light, any steps and exponents, so that sums wrap."""
     length = np.maximum(rng.choice([1, 1, 1, 2, 3, 4, 5, 6, 7, 9, 40], count) % (1 << unit.length_bits), 1)
     shape = count, len(unit.model.components)
     start, step = (np.maximum(word_ends(rng, *shape), 1 - (1 << 17)) for _ in range(2))

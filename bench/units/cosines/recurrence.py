@@ -75,12 +75,12 @@ def spans_of(unit: RecurrenceUnit, rng: np.random.Generator, length: np.ndarray)
 
 
 def _spans(unit, rng, count):
-    """Cosines of spans to 89 degrees, whose words do not wrap; most are short, some have no pixel."""
+    """Cosines of spans to 89 degrees, whose words do not wrap. Most are short, and some have no pixel."""
     return spans_of(unit, rng, short_lengths(rng, count))
 
 
 def _words(unit, rng, count):
-    """Cosines; every third span of arbitrary codes, every fifteenth of ends of words; lengths 0 to 39."""
+    """Cosines of lengths 0 to 39, every third span of arbitrary codes, every fifteenth of ends of words."""
     beats = spans_of(unit, rng, rng.integers(0, 40, count // 20)).beats
     any_size = np.arange(0, len(beats["length"]), 3)
     p = unit.model
@@ -102,7 +102,7 @@ def _longest(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Spans of nearly no angle which reach a border of the result's rounding, where one step decides."""
+    """Spans of nearly no angle that reach a border of the result's rounding, where one step decides."""
     p, length = unit.model, np.full(count // 12, 12)
     cut = p.state_format.fraction_bits - p.result_format.fraction_bits
     starts = []

@@ -71,14 +71,14 @@ def _vectors(unit, rng):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any distance, every sixteenth of arbitrary codes; lengths by their logarithm."""
+    """Pairs of normals at any distance, every sixteenth of arbitrary codes, at lengths by logarithm."""
     left, right = any_pairs(rng, count)
     beats = {"normal_left": left, "normal_right": right, "length": any_lengths(rng, count)}
     return Case(beats, light_constants(unit, *_vectors(unit, rng)))
 
 
 def _corners(unit, rng, count):
-    """Angles about 90 degrees, ends of words, N at the peak of a highlight, equal normals there."""
+    """Angles about 90 degrees, ends of words, N at the peak of a highlight, equal normals at the peak."""
     beats = setup_spans(rng, count, 90, 90.1)
     direction, halfway = _vectors(unit, rng)
     beats["normal_left"][:50] = beats["normal_right"][:10] = halfway[0]
@@ -86,7 +86,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many spans: the last bits of products and of sums are rounded off and rarely matter."""
+    """Many spans, because the last bits of products and sums are rounded off and rarely matter."""
     return Case(setup_spans(rng, count, 90, 90.1), light_constants(unit, *_vectors(unit, rng)))
 
 

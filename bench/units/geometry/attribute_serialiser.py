@@ -22,7 +22,7 @@ def _case(rng, count, spread):
 
 
 def _near(unit, rng, count):
-    """Normals of all lengths, those of a triangle's corners near to each other."""
+    """Normals of all lengths. The normals of a triangle's corners are near to each other."""
     return _case(rng, count, 0.3)
 
 

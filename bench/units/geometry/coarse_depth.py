@@ -13,7 +13,7 @@ __all__ = ["RECORD"]
 
 
 def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
-    """Overlapping spans of a small picture, with depths below ``most``, or the largest, at the ends."""
+    """Overlapping spans of a small picture. The depths of the ends are under ``most``, or the largest."""
     given = unit.model
     longest = min(longest, given.width)
     length = rng.integers(1, longest + 1, count)
@@ -33,12 +33,12 @@ def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
 
 
 def _short(unit, rng, count):
-    """Spans of one to six pixels in few blocks, whose words are needed before the memory has them."""
+    """Spans of one to six pixels in few blocks, so that words are needed before the memory has them."""
     return _spans(unit, rng, count, 6, lines=1)
 
 
 def _outside(unit, rng, count):
-    """Spans of a small picture, of which every fourth or so goes out of it, on the right or below."""
+    """Spans of a small picture. About every fourth leaves the picture on the right or below."""
     case = _spans(unit, rng, count, 20, lines=2)
     beats, given = case.beats, unit.model
     far, low = rng.random((2, count)) < 0.15
@@ -52,17 +52,17 @@ def _outside(unit, rng, count):
 
 
 def _near(unit, rng, count):
-    """Depths of 15 bits, which differ in few of the upper bits that are compared."""
+    """Depths of 15 bits that differ in few of the compared upper bits."""
     return _spans(unit, rng, count, 12, 1 << 15, lines=1)
 
 
 def _edges(unit, rng, count):
-    """Three spans a picture, of which the last is hidden, or is not, by the last bit of a depth.
+    """Three spans a picture. The last bit of a depth decides whether the third is hidden.
 
-    The first span marks pixels of a block; the second fills the block, and may go on to blocks where it is
-    nearer. In that block the deepest depths of both are the first code of a step of the bound, or the code
-    before it, and near each other. The nearest depth of the third span is in that block; it is the first code
-    of the step behind both, or the code before it.
+    The first span marks pixels of a block. The second span fills the block, and may go on to blocks where it
+    is nearer. In the first block the deepest depths of both spans are near each other. Each is the first code
+    of a step of the bound, or the code before it. The nearest depth of the third span is in the same block.
+    It is the first code of the step behind both, or the code before it.
     """
     given, groups = unit.model, -(-count // 3)
     shift, size, columns = SPAN_DEPTH.width - given.depth_bits, given.block, given.blocks_per_line

@@ -65,7 +65,7 @@ def _far(unit, rng, count):
 
 
 def _again(unit, rng, count):
-    """Pixels at two places that differ in a bit, a third at one of them, two depths that differ in a bit."""
+    """Pixels at two places that differ in a bit, a third at one of these, two depths that differ in a bit."""
     count = -(-count // 3)
     bits = (unit.x_bits, unit.y_bits)
     first = rng.integers(0, 1 << sum(bits), count)
@@ -82,7 +82,7 @@ def _again(unit, rng, count):
 
 
 def _nearer(unit, rng, count):
-    """Each span in front of those before it, its first depth at most 8/512 from a whole code."""
+    """Each span is in front of the spans before it. Its first depth is at most 8/512 from a whole code."""
     case = _case(rng, count, unit.size, min(8, unit.size[0]), 0)
     last = case.beats["pixel"]["last"]
     span = np.cumsum(last) - last

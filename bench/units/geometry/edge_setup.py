@@ -30,7 +30,7 @@ def _triangles(unit, rng, count, size=12.0):
 
 
 def _large(unit, rng, count):
-    """Triangles of any size, and with corners at the ends of the grid."""
+    """Triangles of any size, and triangles with corners at the ends of the grid."""
     case = _triangles(unit, rng, count, 1500.0)
     low, high = unit.grid.coordinate.min_code, unit.grid.coordinate.max_code
     case.beats["x"][::7] = rng.choice([low, high, 0], case.beats["x"][::7].shape)

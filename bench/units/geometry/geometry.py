@@ -21,7 +21,7 @@ def _spans(unit, case):
 
 
 def _small(unit, rng, count):
-    """Triangles of all kinds in a small picture, whose borders cut them on every side."""
+    """Triangles of all kinds in a small picture. Its borders cut them on every side."""
     return Case(
         ended(random_triangles(rng, count, unit.grid, 6.0, 0.3), unit.grid).beats, small_frame(rng).codes
     )
@@ -34,7 +34,7 @@ def _tiny(unit, rng, count):
 
 
 def _mesh(unit, rng, count):
-    """Fine meshes that share corners and edges, on pixel centres too, with slivers and folds."""
+    """Fine meshes with shared corners and edges, some on pixel centres, with slivers and folds."""
     side, step = 8, unit.grid.steps
     layers = -(-count // (2 * side * side))
     pitch = rng.integers(step // 8, 2 * step, (layers, 1, 1, 1))
@@ -54,13 +54,13 @@ def _mesh(unit, rng, count):
 
 
 def _drawn(unit, rng, count):
-    """Small triangles of which hardly any is dropped: they come faster than they are set up."""
+    """Small triangles, hardly any dropped, so that they come faster than they are set up."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
     return Case(ended(random_triangles(rng, count, unit.grid, 3.0, 0.1), unit.grid).beats, frame.codes)
 
 
 def _dense(unit, rng, count):
-    """Triangles of a pixel, all drawn: the setup alone sets the pace."""
+    """Triangles of one pixel, all drawn, so that the setup alone decides the rate."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
     triangles = random_triangles(rng, count, unit.grid, 1.0, 0.1)
     # Of a square of 5/4 pixels the half with the one centre.
@@ -77,7 +77,7 @@ def _large(unit, rng, count):
 
 
 def _largest(unit, rng, count):
-    """Triangles larger than a picture can be, flat ones, and ones with two long edges."""
+    """Triangles larger than the largest picture, flat triangles, and triangles with two long edges."""
     triangles = random_triangles(rng, count, unit.grid, 1900.0, 0.05)
     triangles.normal[::2] = triangles.normal[::2, :1]
     low, high = unit.grid.coordinate.min_code, unit.grid.coordinate.max_code

@@ -42,7 +42,7 @@ def _large(unit, rng, count):
 
 
 def _measure(rng, count):
-    """The step per pixel times the width of the triangle, against the same in float64."""
+    """The step per pixel times the width of the triangle, against the product in float64."""
     stages = Stages(random_triangles(rng, count, size=100.0), WHOLE)
     y = stages.drawn.triangles.y.astype(float)
     values = stages.drawn.triangles.attributes[:, :, 0] * 2.0**-23

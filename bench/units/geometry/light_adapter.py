@@ -22,7 +22,7 @@ def _addresses(unit):
 
 
 def _write(unit, codes):
-    """Writes of axes; those to lights that are not there, and to colours, change nothing."""
+    """Writes of axes, and writes of missing lights and colours, which change nothing."""
     beyond = AXES_ADDRESS + (unit.lights + 1) * LIGHT_STRIDE
     address = [*_addresses(unit).ravel(), beyond, AXES_ADDRESS, LIGHT_STRIDE, 2 * LIGHT_STRIDE]
     return {"address": np.array(address), "data": np.r_[codes.ravel(), 1:5] & 0x3FFFF}
@@ -56,7 +56,7 @@ def _spans(unit, rng, count):
 
 
 def _any(unit, rng, count):
-    """Words of any codes, also longer than 1: sums modulo 2. Most spans have one pixel."""
+    """Words of any codes, also longer than 1, so that sums are modulo 2. Most spans have one pixel."""
     vectors = {name: any_codes(rng, LightAdapter.FORMAT, count, 3) for name in ("start", "step")}
     codes = any_codes(rng, LightAdapter.FORMAT, unit.lights, unit.rows, 3)
     # Every bit of an axis's words changes.

@@ -36,12 +36,12 @@ def _case(rng, length, angle):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, the short ones mixed; sine and cosine of 26 degrees, which are odd codes."""
+    """Spans of every length, short spans mixed. Sine and cosine of 26 degrees have odd codes."""
     return _case(rng, np.maximum(4095 >> rng.integers(0, 13, count), 1), np.radians(26))
 
 
 def _points(unit, rng, count):
-    """Spans of one pixel, and seldom of two, of a light behind the surface's horizon."""
+    """Spans of one pixel, seldom of two, with a light behind the surface's horizon."""
     return _case(rng, 1 + (rng.random(count) < 0.1), np.radians(80))
 
 

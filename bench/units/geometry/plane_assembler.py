@@ -54,7 +54,7 @@ def _case(rng, count, limit):
 
 
 def _usual(unit, rng, count):
-    """Sizes of every power of two, bounds next to those where a piece gets longer, the default limit."""
+    """Sizes of every power of two, bounds next to the borders of a piece's length, the default limit."""
     return _case(rng, count, 267)
 
 

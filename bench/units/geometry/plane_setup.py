@@ -23,7 +23,7 @@ def _triangles(unit, rng, count):
 
 
 def _large(unit, rng, count):
-    """Triangles of any size, some with heights and areas of a single 1, or of ones alone."""
+    """Triangles of any size, some with heights and areas whose bits have a single 1, or are all 1."""
     case = _case(rng, count, unit.grid, 1500.0)
     bits = rng.integers(0, 2 * unit.grid.bits, count)
     area, height = 1 << bits, 1 << (bits // 2)

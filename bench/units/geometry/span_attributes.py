@@ -48,7 +48,7 @@ def _rows_of(unit, beats):
 
 
 def _beats_of(unit, planes, row):
-    """Input beats of a unit: scanlines with their planes; for a serial unit one beat for each attribute."""
+    """Input beats of a unit: scanlines with their planes. A serial unit gets a beat for each attribute."""
     if unit.serial:
         row = {name: np.repeat(value, ATTRIBUTES) for name, value in row.items()}
         planes = {
@@ -64,7 +64,7 @@ def _expect(unit, case):
 
 
 def attributes_of(spans):
-    """Beats of whole spans, one for each attribute."""
+    """Beats of whole spans, a beat for each attribute."""
     words = ("near", "far", "inward")
     return {
         name: value.reshape(-1) if name in words else np.repeat(value, ATTRIBUTES)
@@ -99,13 +99,13 @@ def _rows(unit, rng, count):
 
 
 def _narrow(unit, rng, count):
-    """Spans of few pixels, none cut into pieces."""
+    """Spans of few pixels, not cut into pieces."""
     frame = FrameSettings(-18, -22, 21, 19, limit=1023)
     return _case(unit, random_triangles(rng, count, size=1.5, spread=0.0), frame, count)
 
 
 def _any(unit, rng, count):
-    """Planes of any codes, and any pieces and lengths: sums modulo 4, saturation, the longest spans."""
+    """Planes of any codes, any pieces and lengths, with sums modulo 4, saturation, the longest spans."""
     triangles = rng.integers(1, 12, count)
     total = int(triangles.sum())
     last = np.zeros(total, dtype=bool)

@@ -33,7 +33,7 @@ def _rows(rng, count, frame):
 
 
 def _small(unit, rng, count):
-    """Scanlines about the borders of a small picture, and far from it."""
+    """Scanlines about the borders of a small picture, and far from the picture."""
     return _rows(rng, count, FrameSettings(-30, -20, 40, 50))
 
 

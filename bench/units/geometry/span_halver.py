@@ -55,7 +55,7 @@ def _lines(rng, length, near, far):
 
 
 def _spans(unit, rng, count):
-    """Ends of all lengths and angles, few of which need no cut, in spans of 1 to 4095 pixels."""
+    """Ends of all lengths and angles in spans of 1 to 4095 pixels. Few need no cut."""
     near, far = (sphere(rng, count) * 2.0 ** -rng.uniform(0, 9, (count, 1)) for _ in range(2))
     alike = rng.random((count, 1)) < 0.5
     far = np.where(alike, near * 2.0 ** rng.uniform(-1, 1, (count, 1)) + 0.2 * far, far)
@@ -64,7 +64,7 @@ def _spans(unit, rng, count):
 
 
 def _short(unit, rng, count):
-    """Spans of one to six pixels, most of which need no cut: they follow each other on every cycle."""
+    """Spans of one to six pixels. Most need no cut, so that they follow each other on every cycle."""
     near = sphere(rng, count) * 2.0 ** -rng.uniform(0, 9, (count, 1))
     return _lines(
         rng, rng.integers(1, 7, count), near, near + near[:, ::-1] * rng.uniform(-0.5, 0.5, (count, 1))
@@ -72,13 +72,13 @@ def _short(unit, rng, count):
 
 
 def _any(unit, rng, count):
-    """Attributes of any codes: sums modulo 4, saturation."""
+    """Attributes of any codes, with sums modulo 4 and saturation."""
     words = {name: any_codes(rng, SPAN_STEP, count, ATTRIBUTES) for name in _WORDS}
     return _case(rng, rng.integers(1, 20, count), **words)
 
 
 def _sizes(unit, rng, count):
-    """Powers of two and their halves and quarters, a step more or less, that decide each bit of the test."""
+    """Powers of two, their halves and quarters, and a step more or less. They decide each bit of the test."""
     length = rng.integers(1, 12, count)
     ends = []
     for _ in range(2):
@@ -91,7 +91,7 @@ def _sizes(unit, rng, count):
 
 
 def _steep(unit, rng, count):
-    """Spans of two pixels, a component of whose ends differs by about 9/16, of the largest or of less."""
+    """Spans of two pixels at four scales. Between the ends a component differs by about 9/16 of the length."""
     near = sphere(rng, count)
     apart = rng.uniform(-0.1, 0.1, (count, 3))
     apart[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-1, 1], count) * rng.uniform(

@@ -50,7 +50,7 @@ def _case(rng, **vectors):
 
 
 def _lines(unit, rng, count):
-    """Ends of all lengths, and the step that leads from the one to the other in 1 to 4095 pixels."""
+    """Ends of all lengths, and the step from the first end to the last in 1 to 4095 pixels."""
     start = sphere(rng, count) * 2.0 ** rng.uniform(-14, 0, (count, 1))
     end = start + np.linalg.norm(start, axis=1, keepdims=True) * rng.uniform(-0.5, 0.5, (count, 3))
     length = 4095 >> rng.integers(0, 12, count)
@@ -67,7 +67,7 @@ def _any(unit, rng, count):
 
 
 def _sizes(unit, rng, count):
-    """Powers of two, and one less, that decide each bit of a shift."""
+    """Powers of two, and a step less. They decide each bit of a shift."""
     beats = {}
     for name in _VECTORS:
         bits = _FORMATS[name].width - 1

@@ -49,17 +49,17 @@ def _corners(unit, rng, count):
 
 
 def deciding_vectors(rng: np.random.Generator, draws: int) -> np.ndarray:
-    """Random vectors of length 1 whose unit vector depends on a single bit: about one of 3,000.
+    """Random vectors of length 1 whose unit vector depends on a single bit, about one of 3,000.
 
-    A vector is chosen if one step of the squared length, up or down, changes the factor e, or if a component
-    of ``v + e v`` is a tie for the rounding, or differs from a tie in one bit.
+    A vector is chosen if a step of the squared length, up or down, changes the factor e. It is also chosen if
+    a component of ``v + e v`` is a tie of the rounding, or differs from a tie in one bit.
 
     Parameters
     ----------
     rng : Generator
         Random generator.
     draws : int
-        Number of vectors among which to choose.
+        Number of vectors to choose from.
 
     Returns
     -------

@@ -25,12 +25,12 @@ def _flipped(unit, rng, count, back_faces="flip"):
 
 
 def _culled(unit, rng, count):
-    """The same with back faces culled."""
+    """Triangles of all kinds in a small picture, back faces culled."""
     return _flipped(unit, rng, count, "cull")
 
 
 def _shown(unit, rng, count):
-    """The same with back faces shown as they are."""
+    """Triangles of all kinds in a small picture, back faces unchanged."""
     return _flipped(unit, rng, count, "show")
 
 
@@ -40,7 +40,7 @@ def _whole(unit, rng, count):
 
 
 def _near(unit, rng, count):
-    """Two corners on one height, some steps of the grid apart: their order is in the lowest bits."""
+    """Two corners at one height, a few steps of the grid apart. The lowest bits decide their order."""
     triangles = random_triangles(rng, count, unit.grid, 500.0)
     rows, first = np.arange(count), rng.integers(0, 3, count)
     second = (first + rng.integers(1, 3, count)) % 3
@@ -52,7 +52,7 @@ def _near(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """A picture anywhere; boxes that begin or end at its borders or 2^k pixels off, or are 2^k high."""
+    """A picture anywhere, and boxes that begin or end at its borders or 2^k pixels off, or are 2^k high."""
     grid, first = unit.grid, rng.integers(-2048, 2047, 2)
     end = np.minimum(first + 2 ** rng.integers(0, 11, 2), 2048)
     frame = FrameSettings(*(int(end) for end in (*first, *end)))

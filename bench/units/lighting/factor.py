@@ -29,7 +29,7 @@ def _expect(unit, case):
 
 
 def _words(unit, rng, count):
-    """Words of every size, their ends among them; factors of 0 and 1 with any term."""
+    """Words of every size, with their ends, and factors of 0 and 1 with any term."""
     beats = {name: any_codes(rng, FORMAT, count) for name in unit.i.payload.shape().members}
     if unit.has_factor:
         beats["factor"][::8] = FORMAT.max_code

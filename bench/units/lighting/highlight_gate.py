@@ -33,7 +33,7 @@ _GATE = HighlightGate(_METHOD.gate_limits)
 
 
 def _measure(rng, count):
-    """Whether a span is let through, and whether any of its pixels has a term."""
+    """Decisions: spans that the gate lets through, and spans with a term at any pixel."""
     gate, interpolator = _GATE, _METHOD
 
     def samples():
@@ -72,7 +72,7 @@ def _expect(unit, case):
 
 
 def spans_about(rng, halfway, cosine, degrees, spread):
-    """Unit normals of spans at angles, the largest N·H on whose great circle is about a cosine.
+    """Unit normals of spans of given angles. The largest N·H on a span's great circle is about a cosine.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def spans_about(rng, halfway, cosine, degrees, spread):
     degrees : array, shape (spans,)
         Angles of the spans.
     spread : float
-        Mean deviation of N·H from it.
+        Mean deviation of N·H from the cosine.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def _near(unit, rng, count, exponent, spread, degrees):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Spans of every angle to 90 degrees whose largest N·H is about the threshold; ends of the words."""
+    """Spans of every angle to 90 degrees with a largest N·H about the threshold, and ends of the words."""
     degrees = rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 75, 90], count)
     case = _near(unit, rng, count, exponent, 1e-3, degrees)
     format = unit.model.component_format
@@ -131,17 +131,17 @@ def _spans(unit, rng, count, exponent=EXPONENT):
 
 
 def _any(unit, rng, count):
-    """Such spans under another exponent in each run: a power of two, the largest, or any."""
+    """Spans about the threshold, with another exponent in each run: a power of two, the largest, or any."""
     return _spans(unit, rng, count, any_exponent(rng))
 
 
 def _last_bits(unit, rng, count):
-    """The largest N·H off the threshold by the normals' rounding: last bits of products and sums decide."""
+    """Spans as near to the threshold as rounding allows, so that last bits of products and sums decide."""
     return _near(unit, rng, count, any_exponent(rng), 1e-5, np.geomspace(0.1, 45, count))
 
 
 def _ties(unit, rng, count):
-    """Of many such spans those that are decided otherwise if a dot product is 2^9 of its last bits off."""
+    """Spans whose decision changes if a dot product is off by 2^9 of its last bits, chosen from many."""
     p, exponent = unit.model, any_exponent(rng)
     case = _near(unit, rng, count, exponent, 1e-5, 45 * rng.random(count) ** rng.choice([1, 3]))
     left, right = (Fixed(p.component_format, case.beats[f"normal_{end}"]) for end in ("left", "right"))

@@ -50,7 +50,7 @@ def _case(unit, terms, ambient, colors):
 
 
 def _terms(unit, rng, count, brightness=1):
-    """Terms of which some or all are 0, or all are the largest; colours up to a full channel."""
+    """Terms of which some or all are 0, or all are the largest, with colours up to a full channel."""
     lights = unit.model.lights
     terms = rng.integers(0, _TERM.max_code, (2, count, lights), endpoint=True)
     terms *= rng.random(terms.shape) < rng.random((1, count, 1))
@@ -62,12 +62,12 @@ def _terms(unit, rng, count, brightness=1):
 
 
 def _bright(unit, rng, count):
-    """Such terms with colours up to eight full channels: saturation, and every bit of a colour."""
+    """The same terms with colours up to eight full channels, for saturation and every bit of a colour."""
     return _terms(unit, rng, count, 8)
 
 
 def _sizes(unit, rng, count):
-    """Terms and colours of every size: the last bits of products, which are rounded off."""
+    """Terms and colours of every size, for the last bits of products, which are rounded off."""
     terms = rng.integers(0, _TERM.max_code, (2, count, 1), endpoint=True)
     terms >>= rng.integers(0, 12, terms.shape)
     ambient, *colors = rng.integers(0, _FULL * rng.choice([1, 2, 8]), (3, 1, 3))
@@ -75,7 +75,7 @@ def _sizes(unit, rng, count):
 
 
 def _halves(unit, rng, count):
-    """Sums of a half LSB, and of the least step less, where every bit of a product and of the sum counts."""
+    """Sums of a half LSB or the least step less, where every bit of a product and of the sum counts."""
     colors = np.repeat([[[8191]], [[6003]]], 3, axis=-1)
     ambient = np.array([3, 100, 40]) * 64 + 5
     wanted = (1 << 22) - np.arange(2)[:, np.newaxis]

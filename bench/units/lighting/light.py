@@ -30,7 +30,7 @@ __all__ = ["RECORD"]
 
 
 def _measure(rng, count):
-    """Both terms of normals about H; the highlight's exact term is Blinn's."""
+    """Both terms of normals about H. The exact term of the highlight is Blinn's."""
     unit, product = Specular(), DotProduct()
 
     def samples():
@@ -73,7 +73,7 @@ def _expect(unit, case):
 
 
 def _operands(unit, rng, count, exponent=None):
-    """N.L and the highlight's operand anywhere, half of N.L near 0; runs of spans without a highlight."""
+    """N.L and the highlight's operand anywhere, half of N.L near 0, and runs of spans without highlight."""
     case = highlights(unit, rng, count, exponent)
     cosine = any_codes(rng, _cosine_format(unit), count)
     cosine[::4] >>= 20
@@ -86,12 +86,12 @@ def _operands(unit, rng, count, exponent=None):
 
 
 def _exponents(unit, rng, count):
-    """Such beats under another exponent in each run: a power of two, the largest, or any."""
+    """Any operands, with another exponent in each run: a power of two, the largest, or any."""
     return _operands(unit, rng, count, any_exponent(rng))
 
 
 def _terminator(unit, rng, count):
-    """The highlight's peak where N·L is 0, next to 0, one bit, or less than 0: it comes and goes with N·L."""
+    """A highlight's peak with N·L 0, next to 0, of one bit, or under 0, so that N·L switches the highlight."""
     bits = 1 << np.arange(34)
     cosine = rng.permutation(np.r_[0, bits, -bits, _cosine_format(unit).min_code])
     highlight = np.full(len(cosine), ONE**2)
@@ -99,13 +99,13 @@ def _terminator(unit, rng, count):
 
 
 def _black(unit, rng, count):
-    """A light of which L and H are 0."""
+    """A light with L and H of 0."""
     zero = np.zeros(count, dtype=np.int64)
     return Case({"cosine": zero, "highlight": zero}, {"exponent": 1})
 
 
 _CHORD = Diffuse(SQ(2, 25))
-"""Diffuse model with the format that N·L has in methods that give 1 - N·H."""
+"""Diffuse model with the format of N·L in methods that give 1 - N·H."""
 
 
 def _variants():

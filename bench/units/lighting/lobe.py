@@ -26,7 +26,7 @@ _STEP = TabulatedModel("step", function=lambda cosine: (cosine > 0.7).astype(flo
 
 
 def _parameters(rng, model, count):
-    """Parameters over the range of a model, and how many of the samples each has."""
+    """Parameters over the range of a model, and the number of samples of each."""
     if model.PARAMETER == "exponent":
         yield from exponents(rng, count)
     else:
@@ -52,7 +52,7 @@ def _measure(rng, count, lobe):
 
 
 def _operands(model, rng, count):
-    """The first ``count`` of corner cases, any codes, ends of every table step, and codes of every octave."""
+    """``count`` operands: corner cases, any codes, ends of every table step, and codes of every octave."""
     if model.operand == "place":
         return _places(model, rng, count)
     format, bits = model.operand_format, model.fraction_bits
@@ -69,7 +69,7 @@ def _operands(model, rng, count):
 
 
 def _places(model, rng, count):
-    """Places of the first ``count`` of ends of every step of all parts, any, and some past the end."""
+    """``count`` places: ends of every step of all parts, any places, and some past the end."""
     format, rows = model.operand_format, model.rows * model.steps
     steps = np.arange(rows) << model.fraction_format.width
     past = (rows << model.fraction_format.width) + np.r_[0, 1, 1 << rng.integers(0, 12, 6)]
@@ -78,7 +78,7 @@ def _places(model, rng, count):
 
 
 def _case(unit, rng, count, tables):
-    """Beats, a tenth of them dark, for tables that are written, and one of the banks."""
+    """Beats, a tenth of them dark, for written tables and one of the banks."""
     codes = _operands(unit.model, rng, count)
     beats = {"operand": codes, "dark": (rng.random(len(codes)) < 0.1).astype(np.uint8)}
     write = None
@@ -92,7 +92,7 @@ def _case(unit, rng, count, tables):
 
 
 def _highlights(unit, rng, count):
-    """Every step of the table, all octaves, and the ends of the operand; a tenth of the beats dark."""
+    """Every step of the table, all octaves, and ends of the operand. A tenth of the beats is dark."""
     p = unit.model
     first = _USUAL[p.reflection.PARAMETER]
     tables = [p.table(first if first is None else first / (1 + bank)) for bank in range(p.banks)]
@@ -100,7 +100,7 @@ def _highlights(unit, rng, count):
 
 
 def _tables(unit, rng, count):
-    """Tables of any curve, others in each run, one of them replaced; values that are lost; single values."""
+    """Tables of any curve, others in each run, one of them replaced. Also lost values and single values."""
     p = unit.model
     tables = []
     for _ in range(p.banks):
@@ -130,7 +130,7 @@ def _tables(unit, rng, count):
 
 
 def _loaded(unit, case):
-    """Tables that are fixed, or that writes load, by bank."""
+    """Fixed tables, or tables loaded by writes, by bank."""
     if unit.tables is not None:
         return dict(enumerate(unit.tables))
     p = unit.model

@@ -19,12 +19,12 @@ __all__ = ["RECORD"]
 
 
 def _last_bits(unit, rng, count):
-    """Many operands: the last bits of products are rounded off, each decides once in thousands."""
+    """Many operands, because the last bits of products are rounded off and decide once in thousands."""
     return exponent_bits(unit, rng, count)
 
 
 def _ties(unit, rng, count):
-    """Of many operands those whose complement is a few of its last bits from the next step of the result."""
+    """Operands whose complement is a few last bits from the next step of the result, chosen from many."""
     p = unit.model
     case = highlights(unit, rng, count, int(rng.integers(1, 1001)))
     operand = Fixed(p.operand_format, case.beats["operand"])

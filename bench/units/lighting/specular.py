@@ -1,4 +1,4 @@
-"""Record of the specular unit, and what the records of all units of highlights share."""
+"""Record of the specular unit, and parts that the records of all units of highlights share."""
 
 from functools import partial
 
@@ -29,7 +29,7 @@ HIGHLIGHTS = "n 1 to 1000, N.H 0 to 1"
 
 
 def measure_highlights(rng, count, model):
-    """Terms of cosines of the highlight, about where it ends, and anywhere; exact is Blinn's power."""
+    """Terms of cosines in the highlight, about its end, and anywhere. The exact term is Blinn's power."""
 
     def samples():
         for exponent, share in exponents(rng, count):
@@ -53,7 +53,7 @@ def any_exponent(rng) -> int:
 
 
 def exponent_of(unit, constants) -> int:
-    """Exponent of a run: fixed at build time, a constant, or one that has the given slope."""
+    """Exponent of a run: fixed at build time, a constant, or an exponent with the given slope."""
     if constants is None:
         return unit.exponent
     if "exponent" in constants:
@@ -68,7 +68,7 @@ def _slopes(model, exponent):
 
 
 def highlights(unit, rng, count, exponent=None):
-    """Operands of the highlight, where it ends and anywhere, a tenth of the beats dark; one exponent."""
+    """Operands in the highlight, about its end and anywhere, for one exponent. A tenth of the beats is dark."""
     exponent = getattr(unit, "exponent", None) or exponent or EXPONENT
     constants = {"exponent": exponent}
     if "constants" not in unit.signature.members:
@@ -80,7 +80,7 @@ def highlights(unit, rng, count, exponent=None):
 
 
 def exponent_bits(unit, rng, count):
-    """Such beats under another exponent in each run: a power of two, the largest, or any."""
+    """Operands with another exponent in each run: a power of two, the largest, or any."""
     return highlights(unit, rng, count, any_exponent(rng))
 
 
@@ -94,7 +94,7 @@ def expect(unit, case):
 _SERVED = tuple(model for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED))
 _PUBLISHED = ("cosquad", "cosquad7", "cosquad_lin")
 _QUICK = ("cosquad", "exp")
-"""Models of the short run, one for each structure; a variant below has another number of squares."""
+"""Models of the short run, one for each structure. A variant below has another number of squares."""
 
 
 def _models():

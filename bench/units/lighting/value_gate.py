@@ -29,14 +29,14 @@ FORMAT = ChordSetup.HIGHLIGHT_FORMAT
 
 
 def parabolas_near(rng: np.random.Generator, least: np.ndarray, largest_bulge: float = 2.0**-5) -> np.ndarray:
-    """Codes of three values of u on parabolas of any size, with a least value near given ones.
+    """Codes of three values of u on parabolas of any size, with a least value near a given value.
 
     Parameters
     ----------
     rng : Generator
         Of the random numbers.
     least : float64 array, shape (count,)
-        Least value of u along the whole parabola, if its vertex is on the span; else on the span.
+        Least value of u on the span, or along the whole parabola if its vertex is on the span.
     largest_bulge : float
         Largest ``|u_l + u_r - 2 u_m|``.
     """
@@ -54,7 +54,7 @@ def parabolas_near(rng: np.random.Generator, least: np.ndarray, largest_bulge: f
 
 
 def _measure(rng, count):
-    """Whether a span is let through, and whether any of its pixels has a term."""
+    """Decisions: spans that the gate lets through, and spans with a term at any pixel."""
     gate, method = ValueGate(), LocalChordInterpolator()
 
     def samples():
@@ -98,25 +98,25 @@ def _near(unit, rng, count, exponent, spread, largest_bulge=2.0**-5):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Parabolas of every size with the least u about the threshold; every eighth of arbitrary codes."""
+    """Parabolas of every size with the least u about the threshold, every eighth of arbitrary codes."""
     values, exponent = _near(unit, rng, count, exponent, 1e-3, 2.0**-4)
     values[::8] = any_codes(rng, FORMAT, *values[::8].shape)
     return _case(unit, values, exponent)
 
 
 def _exponents(unit, rng, count):
-    """Such spans under another exponent in each run: a power of two, the largest, or any."""
+    """Spans about the threshold, with another exponent in each run: a power of two, the largest, or any."""
     return _spans(unit, rng, count, any_exponent(rng))
 
 
 def _last_bits(unit, rng, count):
-    """The least u off the threshold by a few codes: the last bits of the sums decide."""
+    """The least u a few codes off the threshold, so that the last bits of the sums decide."""
     values, exponent = _near(unit, rng, count, any_exponent(rng), 2 * FORMAT.step)
     return _case(unit, values, exponent)
 
 
 def _borders(unit, rng, count):
-    """Spans far from every highlight, with a bulge or a rise up to 3 units of any bit off its limit."""
+    """Spans far from every highlight. A bulge or a rise is up to 3 units of any bit off its limit."""
     p, shape = unit.model, (count, unit.lights)
     left = rng.integers(FORMAT.max_code // 2, FORMAT.max_code // 4 * 3, shape)
     off = rng.integers(-3, 4, (2, *shape)) << rng.integers(0, 22, (2, *shape))
@@ -129,7 +129,7 @@ def _borders(unit, rng, count):
 
 
 def _thresholds(unit, rng, count):
-    """Thresholds that no exponent has, the least and the largest code among them; the least u about them."""
+    """Thresholds of no exponent, with the least and the largest code, and a least u about them."""
     format = unit.model.THRESHOLD_FORMAT
     code = rng.choice([0, 1, format.max_code, rng.integers(format.max_code), 1 << rng.integers(format.width)])
     nearest = min(code * format.step / 2, 2.0)

@@ -25,7 +25,7 @@ def _pole(unit, rng, count):
 
 
 def _longest_words(unit, rng, count):
-    """Normals and L whose codes are longest by rounding, opposite, at 60 and 90 degrees."""
+    """Normals and L whose codes are longest by rounding: opposite, at 60 and at 90 degrees."""
 
     def rounded(about):
         codes = np.rint(normalise(about + rng.uniform(-0.002, 0.002, (200_000, 3))) * ONE).astype(int)

@@ -45,14 +45,14 @@ SPAN = {"normal_left": AXIS, "normal_right": AXIS, "length": 64}
 """Beat for the simulation that finds the times."""
 
 _GROUPS = 32
-"""Lights of a measurement: the spans are divided into as many parts, with a light each."""
+"""Number of lights of a measurement. The spans are divided into as many parts, with a light each."""
 
 
 # Variants.
 
 
 def _measure(rng, count, method):
-    """N·L and 1 - N·H along spans; 1 is the product of two unit vectors."""
+    """N·L and 1 - N·H along spans. The product of two unit vectors is 1."""
 
     def samples():
         for length in np.array_split(span_lengths(rng, count), _GROUPS):
@@ -130,7 +130,7 @@ def options(method: Interpolator, lights: int = 1, *, as_published: bool = False
 
 
 def operand_beats(unit: Component, operands: Operands, **others: np.ndarray) -> np.ndarray:
-    """Output beats of a unit with these operands, and with codes of the fields that are no operands."""
+    """Output beats of a unit with these operands, and with codes of the other fields."""
     beats = np.zeros(operands.cosine.codes.shape, dtype_of(unit.o.payload.shape().elem_shape))
     for name in beats.dtype.names:
         if name == "factor":
@@ -164,7 +164,7 @@ def status(unit: Component, case: Case) -> dict[str, int]:
 def case_of(
     unit: Component, rng: np.random.Generator, left: np.ndarray, right: np.ndarray, length: np.ndarray
 ) -> Case:
-    """Spans between normals of these codes, under lights from anywhere; H of the first light is a normal."""
+    """Spans between normals of these codes, with lights from anywhere. H of the first light is a normal."""
     length = np.maximum(length % (1 << unit.length_bits), 1)
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[0] = left[len(left) // 2]
@@ -173,20 +173,20 @@ def case_of(
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at angles of every size, every sixteenth of arbitrary codes; most spans are short."""
+    """Normals at angles of every size, every sixteenth pair of arbitrary codes. Most spans are short."""
     length = short_lengths(rng, count, 1)
     return case_of(unit, rng, *any_pairs(rng, len(length)), length)
 
 
 def _angles(unit, rng, count):
-    """Equal normals, every angle up to the largest and over it, ends of the words; short spans."""
+    """Short spans: equal normals, every angle up to the largest and over it, ends of the words."""
     largest = min(unit.model.MAX_ANGLE, 179)
     spans = setup_spans(rng, count, largest, largest)
     return case_of(unit, rng, spans["normal_left"], spans["normal_right"], rng.integers(1, 8, count))
 
 
 def long_lengths(rng: np.random.Generator, pixels: int) -> np.ndarray:
-    """Lengths of spans of about ``pixels`` pixels in all: 3000 to 4095, each before a shorter one."""
+    """Lengths of spans of about ``pixels`` pixels in all. Each of 3000 to 4095 is before a shorter one."""
     length = rng.integers(3000, 4096, (pixels // 3800, 2))
     length[:, 1] = np.floor(2000 ** rng.random(len(length)))
     length[:2, 0] = 4095
@@ -194,7 +194,7 @@ def long_lengths(rng: np.random.Generator, pixels: int) -> np.ndarray:
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels in range, where the last bits of the differences count; shorter ones."""
+    """Spans of 3000 to 4095 pixels in range, where last bits of differences count, and shorter spans."""
     length = long_lengths(rng, count)
     left = sphere(rng, len(length))
     angles = unit.model.MAX_ANGLE * 10.0 ** rng.uniform(-3, 0, len(length))
@@ -202,7 +202,7 @@ def _long_spans(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many short spans: a bit that is rounded off decides a result once in thousands."""
+    """Many short spans, because a bit that is rounded off decides a result once in thousands."""
     left = sphere(rng, count)
     angles = unit.model.MAX_ANGLE * rng.choice([10.0 ** rng.uniform(-5, 0, count), rng.random(count)])
     return case_of(unit, rng, quantise(left), quantise(turned(rng, left, angles)), rng.integers(1, 8, count))
@@ -221,7 +221,7 @@ def of_setup(record: Record, count: int = 500) -> Stimulus:
     Parameters
     ----------
     record : Record
-        Of the setup.
+        Record of the setup.
     count : int
         Spans.
     """

@@ -49,7 +49,7 @@ _METHOD = LocalChordInterpolator()
 
 
 def _measure(rng, count):
-    """N·L and 1 - N·H along spans; 1 is the product of two unit vectors."""
+    """N·L and 1 - N·H along spans. The product of two unit vectors is 1."""
     length = span_lengths(rng, count)
     curves = local_curves(rng, len(length))
     values, codes = three_values(curves, len(length))
@@ -87,8 +87,8 @@ def _gated_beats(
 ) -> np.ndarray:
     """Output beats of a unit with these operands, and the decisions of its gate, if it has one.
 
-    The gate decides a pixel of a span of one or two pixels by its own u, the pixels of a longer span
-    together. It uses the threshold's code, if there is one, in place of the exponent.
+    In a span of one or two pixels the gate decides each pixel by its own u. In a longer span it decides all
+    pixels together. It uses the threshold's code, if present, in place of the exponent.
     """
     if unit.gate is None:
         return operand_beats(unit, operands)
@@ -127,7 +127,7 @@ def _case(unit, rng, length, values=None, exponent=EXPONENT):
 
 
 def mixed_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Lengths of 1 to 4 pixels in runs and mixed, and every tenth up to 40."""
+    """Lengths of 1 to 4 pixels, in runs and mixed. Every tenth length is up to 40."""
     length = rng.integers(1, 5, count)
     runs = rng.integers(1, 5, count // 12 + 1).repeat(12)[:count]
     length[: count // 2] = runs[: count // 2]
@@ -136,19 +136,19 @@ def mixed_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, every eighth span of arbitrary codes; most spans are short."""
+    """Curves of every size, every eighth span of arbitrary codes. Most spans are short."""
     return _case(unit, rng, short_lengths(rng, count, 1))
 
 
 def _short_spans(unit, rng, count):
-    """Spans of 1 to 4 pixels in runs and mixed; u fits in every second span, and is arbitrary in others."""
+    """Spans of 1 to 4 pixels, in runs and mixed. In every second span u fits, in others it is arbitrary."""
     values = any_values(rng, count, unit.lights)
     values.highlight[::2] = any_codes(rng, FORMATS["highlight"], *values.highlight[::2].shape)
     return _case(unit, rng, mixed_lengths(rng, count), values)
 
 
 def _gate(unit, rng, count):
-    """The least u about the threshold of the gate, spans of 1 to 40 pixels; any exponent."""
+    """Spans of 1 to 40 pixels with the least u about the threshold of the gate, for any exponent."""
     exponent = unit.gate.exponent or any_exponent(rng)
     nearest = min(unit.gate.model.thresholds.values[exponent] / 2, 2.0)
     least = nearest + 1e-3 * rng.normal(size=count * unit.lights)
@@ -158,17 +158,17 @@ def _gate(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of the differences count; shorter ones."""
+    """Spans of 3000 to 4095 pixels, where the last bits of differences count, and shorter spans."""
     return _case(unit, rng, long_lengths(rng, count))
 
 
 def _last_bits(unit, rng, count):
-    """Many short spans: a bit that is rounded off decides a result once in thousands."""
+    """Many short spans, because a bit that is rounded off decides a result once in thousands."""
     return _case(unit, rng, rng.integers(1, 8, count))
 
 
 class _Gated:
-    """Makes the unit with a gate; a gate belongs to one unit."""
+    """Makes the unit with a gate of its own."""
 
     def __init__(self, lights, exponent=None, **build):
         self.arguments = lights, exponent, build

@@ -22,7 +22,7 @@ _RECURRENCE = RecurrenceInterpolator()
 
 
 def _words(unit, rng, count):
-    """Vectors L and H that are no unit vectors: results saturate, and no span after them changes."""
+    """Vectors L and H of any length, so that results saturate. No later span may change."""
     ends = word_ends(rng, 2, count, 3)
     ends[:, ::2] = unit_codes(rng, 2 * len(ends[0, ::2])).reshape(2, -1, 3)
     case = case_of(unit, rng, *ends, rng.integers(1, 20, count))
@@ -33,7 +33,7 @@ def _words(unit, rng, count):
 
 
 def _radian(unit, rng, count):
-    """Spans of a radian: half its square is 1/2 but for rounding, which brings some words to 1."""
+    """Spans of a radian. Half its square is 1/2 except for rounding, which makes some words 1."""
     return case_of(unit, rng, *code_pairs_at(rng, count, np.degrees(1)), rng.integers(1, 20, count))
 
 

@@ -32,7 +32,7 @@ _LARGEST = 120.0
 
 
 def _measure(rng, count):
-    """N·L and 1 - N·H along spans, of ends in any proportion to 1:4; 1 is the product of two unit vectors."""
+    """N·L and 1 - N·H along spans with ends of ratios to 1:4. The product of two unit vectors is 1."""
     length = span_lengths(rng, count)
     spans = len(length)
     around = sphere(rng, 1)
@@ -78,17 +78,17 @@ def _case(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Ends in any proportion and at any angle, some nearly opposite; most spans are short."""
+    """Ends in any proportion and at any angle, some nearly opposite. Most spans are short."""
     return _case(unit, rng, short_lengths(rng, count, 1))
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of the step count; shorter ones."""
+    """Spans of 3000 to 4095 pixels, where the last bits of the step count, and shorter spans."""
     return _case(unit, rng, long_lengths(rng, count))
 
 
 def _last_bits(unit, rng, count):
-    """Many short spans: a bit that is rounded off decides a result once in thousands."""
+    """Many short spans, because a bit that is rounded off decides a result once in thousands."""
     return _case(unit, rng, rng.integers(1, 8, count))
 
 

@@ -34,7 +34,7 @@ def straight_lines(left: np.ndarray, right: np.ndarray, levels: np.ndarray, t: n
     left, right : array, shape (pixels, 3)
         Ends of each pixel's span.
     levels, t : array, shape (pixels,)
-        Number of levels of its span, and its parameter, 0 to 1.
+        Number of levels of the pixel's span, and the pixel's parameter, 0 to 1.
     """
     parts = 2.0**levels
     segment = np.minimum(np.floor(t * parts), parts - 1)
@@ -75,13 +75,13 @@ def spans_of(ends, length):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at angles of every size, and of arbitrary codes; short spans, some without a pixel."""
+    """Normals at angles of every size, and arbitrary codes, in short spans, some without a pixel."""
     length = short_lengths(rng, count)
     return spans_of(any_pairs(rng, len(length)), length)
 
 
 def _corners(unit, rng, count):
-    """Every number of levels, angles 0, 45, 90 and 180; lengths about powers of two, 0 and 4095."""
+    """Every number of levels, angles 0, 45, 90 and 180, and lengths about powers of two, 0 and 4095."""
     length = np.r_[1, 2, 3, 16, 0, 1, 1, 2, 2, 5, 17, 33, 64, 65, 100, 0, 0, 129, rng.integers(0, 80, count)]
     angles = rng.uniform(0, 95, len(length))
     angles[::5] = 10.0 ** rng.uniform(-4, 1, len(angles[::5]))
@@ -91,7 +91,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many spans, some long; middles of spans whose u is at the border of its rounding."""
+    """Many spans, some long, and middles of spans whose u is at the border of its rounding."""
     few = count // 100
     length = np.r_[rng.integers(1, 70, count), rng.integers(1000, 4096, few)]
     angles = rng.uniform(0, 95, len(length))

@@ -30,7 +30,7 @@ def factor_of(model: Bisection, cosine: np.ndarray, first_step: np.ndarray) -> n
     model : Bisection
         The polynomials.
     cosine : array
-        r, of unit vectors of length 1.
+        Cosine r of unit vectors of length 1.
     first_step : bool array, same shape
         Whether to use the polynomial of the first step.
     """
@@ -70,7 +70,7 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles 0, 45, 90 and 180, small ones, to 90 degrees and beyond; word ends; u on a tie, its least."""
+    """Angles 0, 45, 90 and 180, small angles, to 90 degrees and beyond, word ends, u on a tie, its least."""
     angles = np.r_[np.zeros(20), np.full(20, 45), np.full(20, 90), 10.0 ** rng.uniform(-4, 0, 100)]
     angles = np.r_[angles, rng.uniform(0, 90, count), rng.uniform(90, 180, 60), 180]
     a, b = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))
@@ -83,9 +83,9 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """The last bits of products and sums, which are rounded off; u at the border of its rounding.
+    """Last bits of products and sums, which are rounded off, and u at the border of its rounding.
 
-    The first pairs are any; later ones lie within a shrinking distance of the border, some on it.
+    The first pairs are arbitrary. Later pairs lie within a shrinking distance of the border, some on it.
     """
     a, b = code_pairs_at(rng, count, rng.uniform(0, 100, count))
     border = (ONE_SQUARED.codes - dot(a, b)) % (1 << 17) - (1 << 16)

@@ -31,7 +31,7 @@ _LENGTH = ONE * COMPONENT.step
 
 
 def _weights(chain, cosine, level, limit):
-    """Weights ``l`` and ``m`` by the polynomials in float64; where u exceeds the limit, of the first step."""
+    """Weights ``l`` and ``m`` by the polynomials in float64, of the first step if u exceeds the limit."""
     model, u = chain.bisection, 1 - cosine
     weight_l, weight_m = np.zeros(len(u)), np.ones(len(u))
     for k in range(1, _LEVELS + 1):
@@ -83,13 +83,13 @@ def _case(ends, level):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at angles of every size, and of arbitrary codes; most chains are short."""
+    """Pairs of normals at angles of every size, and of arbitrary codes. Most chains are short."""
     # A level takes 17 cycles.
     return _case(any_pairs(rng, count), 1 + (rng.zipf(2, count) - 1) % _LEVELS)
 
 
 def _corners(unit, rng, count):
-    """Angles 0, 45, 90 and 180, small ones, to 100 degrees; ends of words; every level as often."""
+    """Angles 0, 45, 90 and 180, small angles, to 100 degrees, and ends of words, every level as often."""
     angles = np.r_[0, 45, 90, 180, 10.0 ** rng.uniform(-4, 0, count // 4), rng.uniform(0, 100, count)]
     ends = (
         np.vstack([end, word_ends(rng, count // 4, 3)]) for end in code_pairs_at(rng, len(angles), angles)

@@ -33,7 +33,7 @@ def _expect(unit, case):
 
 
 def _case(unit, rng, length):
-    """Curves of any coefficients with lengths; those of a straight line have no G."""
+    """Curves of any coefficients with lengths. For a straight line there is no G."""
     beats = any_curves(rng, len(length)) | {"length": length}
     if unit.order == 1:
         del beats["g"]
@@ -41,20 +41,20 @@ def _case(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Coefficients of any size; lengths by their logarithm."""
+    """Coefficients of any size, with lengths by their logarithm."""
     length = any_lengths(rng, count) % (1 << unit.length_bits)
     return _case(unit, rng, np.maximum(length, 1))
 
 
 def _every_length(unit, rng, count):
-    """Every length that fits, short ones again."""
+    """Every length that fits, and short lengths again."""
     longest = 1 << unit.length_bits
     length = np.r_[np.arange(1, longest), rng.integers(1, min(longest, 40), count)]
     return _case(unit, rng, rng.permutation(length))
 
 
 def _last_bits(unit, rng, count):
-    """Many spans: the last bits of products and reciprocals are mostly shifted out."""
+    """Many spans, because the last bits of products and reciprocals are mostly shifted out."""
     return _case(unit, rng, np.floor(2 ** rng.uniform(0, LENGTH_BITS, count)).astype(np.int64))
 
 

@@ -28,13 +28,13 @@ def _expect(unit, case):
 
 
 def _words(unit, rng, count):
-    """Words of every size, their ends among them."""
+    """Words of every size, with their ends."""
     p = unit.model
     return Case({"a": any_codes(rng, p.a_format, count, 3), "b": any_codes(rng, p.b_format, count, 3)})
 
 
 def _corners(unit, rng, count):
-    """Every combination of the words' ends in a and the first component of b, whose others are a's."""
+    """Every combination of the words' ends in a and the first component of b. The others are those of a."""
     ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
     a0, a1, a2, b0 = (grid.ravel() for grid in np.meshgrid(ends, ends, ends, ends))
     return Case({"a": np.stack([a0, a1, a2], axis=1), "b": np.stack([b0, a1, a2], axis=1)})

@@ -16,7 +16,7 @@ _FORMAT = LineSetup.VECTOR_FORMAT
 
 
 def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of the ends of lines: lengths to 1:100, any angle; every eighth of arbitrary codes."""
+    """Codes of the ends of lines at any angle, in ratios to 1:100, every eighth of arbitrary codes."""
     ends = [sphere(rng, count) * 10.0 ** -rng.uniform(0, 2, (count, 1)) for _ in range(2)]
     left, right = quantise_line(*ends)
     left[::8], right[::8] = any_codes(rng, _FORMAT, 2, *left[::8].shape)
@@ -46,7 +46,7 @@ def _lengths(unit, rng, count):
 
 
 def _lines(unit, rng, count):
-    """Ends in any proportion, at any angle, every eighth of arbitrary codes; lengths by their logarithm."""
+    """Ends in any proportion and angle, every eighth of arbitrary codes, with lengths by logarithm."""
     left, right = any_lines(rng, count)
     return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
 

@@ -50,12 +50,12 @@ def spans_of(rng, length):
 
 
 def _spans(unit, rng, count):
-    """Coefficients of any size; short spans and a few long ones, some without a pixel."""
+    """Coefficients of any size, in short and a few long spans, some without a pixel."""
     return spans_of(rng, short_lengths(rng, count))
 
 
 def _corners(unit, rng, count):
-    """Curves of real spans at every angle, opposite normals too, and ends of all words; every length."""
+    """Curves of real spans at every angle and length, opposite normals too, and ends of all words."""
     angles = np.repeat([0, 1e-4, 1, 45, 89.9, 90, 90.01, 135, 180], 5)
     length = np.r_[np.tile([1, 2, 3, 16, 4095], 9), np.full(8, 33)]
     real = curves_of(*component_words(*code_pairs_at(rng, len(angles), angles)))
@@ -69,7 +69,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Lengths over their whole range and many short spans: the last bits of products and steps."""
+    """Lengths over their whole range and many short spans, for the last bits of products and steps."""
     return spans_of(rng, np.r_[rng.permutation(4096)[:60], rng.integers(0, 40, count // 20)])
 
 

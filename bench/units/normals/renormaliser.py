@@ -46,7 +46,7 @@ def _lengths(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Ends of the words, 0 and its neighbours; a largest component next to every power of two; axes."""
+    """Ends of the words, 0 and its neighbours, largest components next to every power of two, axes."""
     words = [_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code]
     ends = np.array(np.meshgrid(*[words] * 3)).reshape(3, -1).T
     powers = (1 << np.arange(_FORMAT.fraction_bits))[:, np.newaxis] + np.arange(-1, 2)

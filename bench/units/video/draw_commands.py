@@ -31,7 +31,7 @@ def _expect(unit, case):
 
 
 def _walks(unit, rng, count):
-    """Lists in any order, some for a frame's first band."""
+    """Lists in any order, some for the first band of a frame."""
     starts = np.array(unit.model.starts)
     return Case({"start": rng.choice(starts, count), "first_band": rng.integers(0, 2, count)})
 

@@ -9,7 +9,7 @@ __all__ = ["any_memory"]
 
 
 def any_memory(vertices: int = 40, triangles: int = 77, seed: int = 2026) -> MeshMemory:
-    """A memory of random vertices and triangles; by default neither number is a power of two."""
+    """A memory of random vertices and triangles. By default neither number is a power of two."""
     rng = np.random.default_rng(seed)
     faces = rng.integers(0, vertices, (triangles, 3))
     normals = normalise(rng.normal(size=(vertices, 3)))

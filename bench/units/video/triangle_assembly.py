@@ -45,7 +45,7 @@ def _around(unit, rng, count):
 
 
 def _within(unit, rng, count):
-    """Vertices on less than two scanlines: most triangles cover no centre, or one row of them."""
+    """Vertices on less than two scanlines. Most triangles cover no centre, or one row of centres."""
     return _case(unit, rng, count, unit.model.grid.steps, 0.0)
 
 

@@ -16,7 +16,7 @@ __all__ = ["RECORD", "any_matrix"]
 
 
 def any_matrix(rng: np.random.Generator, distance: float = 1.4, size: float = 0.4) -> Matrix:
-    """Matrix of any rotation before a camera; distance and size of the object are in near-plane distances."""
+    """Matrix of any rotation before a camera. Distance and size of the object are in near-plane distances."""
     turn = rotation(rng.normal(size=3), rng.uniform(0, 6.3))
     rows = size * np.array([[1.7], [1.7], [1.0]]) * turn
     position, normal = (Fixed.round(ENTRY, values).codes for values in (rows, turn))
@@ -61,7 +61,7 @@ def _any(unit, rng, count):
 
 
 def _measure(rng, count):
-    """Columns in steps of the grid, of vertices inside."""
+    """Columns of vertices inside, in steps of the grid."""
     unit, matrix = VertexTransform(), any_matrix(rng)
     position = rng.integers(-ONE, ONE + 1, (count, 3))
     found = unit.compute(position, unit_codes(rng, count), matrix)
