@@ -66,7 +66,7 @@ def _errors() -> str:
         worst = 0.0
         for n in (1, 2, 3, 10, 100, 513, 1000):
             found = unit.compute(arguments, nothing, n).values
-            exact = unit.model.reflect(1 - arguments.values, n)
+            exact = unit.reflection.reflect(1 - arguments.values, n)
             # Under the cutoff the unit gives 0 on purpose.
             counted = (found > 0) | (exact > 2.0**-13)
             worst = max(worst, float(np.abs(found - exact)[counted].max()))
