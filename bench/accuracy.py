@@ -1,4 +1,4 @@
-"""The frames that errors are measured on: scene, designs, exponents."""
+"""The frames for measurements of errors: scene, designs, exponents."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -22,7 +22,8 @@ EXPONENTS = (1, 10, 100, 1000)
 def model_of(method: str) -> str:
     """Reflection model by which methods are compared.
 
-    It is ``cosquad``, the documents'. A method whose highlights come from a table at any rate has ``blinn``.
+    It is ``cosquad``, the documents' model. For a method whose highlights always come from a table it is
+    ``blinn``.
     """
     return "blinn" if (METHODS | PUBLISHED)[method].needs_table else "cosquad"
 
@@ -36,7 +37,7 @@ DESIGNS += [("renormalise", model) for model in _MODELS]
 
 
 def scene_for(mesh: Mesh, exponent: int, width: int = 640, height: int = 480) -> Scene:
-    """Scene of a mesh with white light on a grey, glossy surface: every channel shows the whole error."""
+    """Scene of a grey, glossy mesh in white light, so that every channel shows the whole error."""
     return Scene(
         mesh=mesh,
         camera=Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", width / height),

@@ -1,7 +1,8 @@
 """Styles of methods: a colour, a marker and a dash of each, the same in every drawing and on every page.
 
-The colours are those of Okabe and Ito, which readers with any colour vision can tell apart, without yellow,
-which is too light on white. A variant of a method has its colour with other dashes and another marker.
+The colours are from Okabe and Ito. Readers with any colour vision can tell them apart. Yellow is left out,
+because it is too light on white. A variant of a method has the method's colour, but other dashes and another
+marker.
 """
 
 from typing import NamedTuple
@@ -17,7 +18,7 @@ class Style(NamedTuple):
     Parameters
     ----------
     color, dark : str
-        ``#rrggbb`` on light paper, and on dark.
+        ``#rrggbb`` on light and on dark paper.
     dash : str
         Dashes of a line, as matplotlib takes them.
     marker : str
@@ -46,7 +47,7 @@ STYLES = {
 
 
 def style_of(method: str) -> Style:
-    """Style of a method; a variant as published has the style of its method."""
+    """Style of a method. A variant as published has the style of its method."""
     if method in STYLES:
         return STYLES[method]
     base = method.rpartition("-")[0] if method in PUBLISHED else ""

@@ -93,16 +93,16 @@ def resumable(total: int, unit: str) -> Iterator[Callable[[], None]]:
 
 
 def run(command: click.Command, name: str, arguments: Sequence[str] | None) -> int:
-    """Run a command; print an error in one line.
+    """Run a command, and print an error in one line.
 
     Parameters
     ----------
     command : click.Command
-        Its result is an exit status.
+        The command. Its result is an exit status.
     name : str
         Name of the module, for messages.
     arguments : sequence of str or None
-        Arguments; ``None``: those of the process.
+        Arguments. ``None``: the arguments of the process.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Labels of a drawing's points and lines that do not cover each other."""
+"""Labels of points and lines of a drawing. They do not cover each other."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -16,11 +16,11 @@ _SPOTS = (
     *((1, 2), (1, -2), (-1, 2), (-1, -2), (1, 3), (1, -3), (-1, 3), (-1, -3), (1, 4), (1, -4)),
     *((-1, 4), (-1, -4), (1, 5), (1, -5), (-1, 5), (-1, -5)),
 )
-"""Places of a label: steps to the side and up from its point, nearest first."""
+"""Places of a label as steps to the side and up from its point, nearest first."""
 
 
 class Label(NamedTuple):
-    """A text and the point that it names.
+    """A text, and the point that the text names.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def place_labels(
     Parameters
     ----------
     axes : Axes
-        The axes; their limits and scales must not change afterwards.
+        The axes. Their limits and scales must not change afterwards.
     labels : sequence of Label
         The labels, the more important first.
     points : sequence of (x, y)

@@ -1,12 +1,13 @@
 """Baselines: recorded resources of each unit and pipeline, and cycles of a fixed set of frames.
 
-The figures are in ``bench/quality/baselines.json``, and a test fails if one changes by more than 2 % either
-way. ``python -m blysk.bench.quality.baselines`` measures all of them and prints the changes; the exit status
-is 1 if a figure changed by more than that, or an entry is missing or not measured any more. ``--update``
-writes the file. With words only the entries that have one of them in their names are measured, and the others
-stay as they are: ``python -m blysk.bench.quality.baselines --update halfway_vector`` after a unit was added.
+The figures are in ``bench/quality/baselines.json``. A test fails if a figure changes by more than 2 %, up or
+down. ``python -m blysk.bench.quality.baselines`` measures all figures and prints the changes. The exit status
+is 1 if a figure changed by more than 2 %, or if an entry is missing or no longer measured. ``--update``
+writes the file. With words the command measures only entries with one of the words in their names. The other
+entries stay unchanged. After a unit was added, use
+``python -m blysk.bench.quality.baselines --update halfway_vector``.
 
-Cycles do not depend on the engine; here they are Amaranth's own simulator's, which compiles nothing.
+Cycles do not depend on the engine. Here they come from Amaranth's own simulator, which compiles nothing.
 """
 
 import json
@@ -54,10 +55,10 @@ __all__ = [
 ]
 
 Figures = Mapping[str, Mapping[str, int]]
-"""Figures of entries: by the entry's name, values by the figure's name."""
+"""Figures by the entry's name, then by the figure's name."""
 
 TOLERANCE = 0.02
-"""Share of its baseline by which a figure may move."""
+"""Share of its baseline by which a figure may change."""
 
 FILE = Path(str(files(__package__))) / "baselines.json"
 """File of the baselines."""
@@ -70,7 +71,7 @@ _EXPONENT = 50
 
 @cache
 def _scenes() -> dict[str, Scene]:
-    """A teapot, whose spans are short, and a square with bent normals, whose spans cross it."""
+    """A teapot with short spans, and a square with bent normals and long spans."""
     corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
     normals = normalise(corners * 0.1 + (0, 0, 1))
     square = Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normals)
@@ -144,11 +145,11 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
 
 
 ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
-"""Entries to measure: for each a function that returns its figures.
+"""Entries to measure, each with a function that returns its figures.
 
-``frames``: `cycles_of` the pipelines of each method in both styles, and of some with a gate. ``parts``:
-`Cost.totals` of these, of a pipeline of each model, of true Phong, and of every measured variant of every
-other unit.
+``frames`` is `cycles_of` the pipelines of each method in both styles, and of some with a gate. ``parts`` is
+`Cost.totals` of these pipelines, of a pipeline of each model, of true Phong, and of every measured variant of
+every other unit.
 """
 
 
@@ -172,9 +173,10 @@ def read(path: Path = FILE) -> dict[str, dict[str, int]]:
 
 
 def differences(old: Figures, new: Figures, tolerance: float = 0.0) -> list[str]:
-    """Changes by more than a tolerance, a line each: entry, figure, old, new, and change in percent.
+    """Changes by more than a tolerance. Each line has entry, figure, old, new, and change in percent.
 
-    An entry or figure that only one side has is a difference at any tolerance, and so is a change from 0.
+    An entry or figure that only one side has is a difference at any tolerance. A change from 0 is a
+    difference, too.
 
     Parameters
     ----------
@@ -244,8 +246,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if a figure changed by more than `TOLERANCE`; 2 for bad input, printed in one line; 130 if
-        interrupted.
+        Exit status: 0, or 1 if a figure changed by more than `TOLERANCE`, 2 for bad input (printed in one
+        line), 130 if interrupted.
     """
     return run(_command, "blysk.bench.quality.baselines", arguments)
 

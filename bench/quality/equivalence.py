@@ -1,4 +1,4 @@
-"""Equivalent mutants: ABC proves that no stimulus distinguishes them from the unit."""
+"""Equivalent mutants. ABC proves that no stimulus distinguishes them from the unit."""
 
 import itertools
 import math
@@ -18,12 +18,14 @@ from blysk.hdl.emit.processes import run_program
 __all__ = ["Miter", "yosys"]
 
 _SECONDS = 20
-"""Time limit in seconds of a proof of equivalence; a first attempt may take a quarter of it before. Most
-proofs that succeed take at most 3."""
+"""Time limit of a proof of equivalence, in seconds.
+
+A first attempt before it may take a quarter of this time. Most proofs that succeed take at most 3 seconds.
+"""
 
 
 YOSYS_SECONDS = 1800
-"""Limit of a run of Yosys, longer than any that ends."""
+"""Time limit of a run of Yosys, in seconds, longer than every run that ends."""
 
 
 def yosys(script: str, folder: Path) -> None:
@@ -82,18 +84,18 @@ def _coded(number: int) -> bytes:
 
 
 class Miter:
-    """Equivalence check of a unit and a mutant of it, both as AND gates and one-bit registers.
+    """Equivalence check of a unit and one of its mutants, both as AND gates and one-bit registers.
 
     A proof through products would take too long. Therefore unit and mutant share their registers, and the
-    proof shows that both compute the same next values: then the registers stay equal by induction. Shared
-    registers of at most 12 bits, and those named ``valid`` or ``ages``, control the unit: they take the next
-    values that the unit computes. The other shared registers are free inputs, or 0 if they are always 0 in
-    the unit. The register that the fault reaches first, and bits that differ in a proof, are not shared.
+    proof shows that both compute the same next values. Then the registers stay equal by induction. Shared
+    registers of at most 12 bits, and registers named ``valid`` or ``ages``, control the unit. They take the
+    next values that the unit computes. The other shared registers are free inputs, or 0 if they are always 0
+    in the unit. The register that the fault reaches first, and bits that differ in a proof, are not shared.
 
     Parameters
     ----------
     folder : path
-        Folder with the netlist ``whole.il`` that `mutation.mutate` wrote; with 0 at its input ``mutant`` it
+        Folder with the netlist ``whole.il`` of `mutation.mutate`. With 0 at its input ``mutant`` the netlist
         is the unit. Intermediate files are written here.
     """
 
@@ -123,7 +125,7 @@ class Miter:
         self._zero = self._constant()
 
     def _constant(self) -> set[int]:
-        """Registers of the unit that are always 0: while all of them are 0, their next values are 0."""
+        """Registers of the unit that are always 0. While all of them are 0, their next values are 0."""
         zero = set(range(len(self._next)))
         while True:
             # The value of each node: 0, 1, or ``None`` if it is not constant.
@@ -144,7 +146,7 @@ class Miter:
             zero -= changed
 
     def is_equivalent(self, mutant: int, register: str = "") -> bool:
-        """Whether a mutant, whose fault reaches ``register`` first, is proved equivalent to the unit."""
+        """Whether a mutant is proved equivalent to the unit. Its fault reaches ``register`` first."""
         shared = set(range(len(self._next)))
         # A fault that the simplification of gates removes. With fewer registers shared it would hardly do so.
         if not self._write(mutant, shared):

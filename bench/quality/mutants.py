@@ -1,19 +1,22 @@
 """Mutation score of every unit: the share of small faults in its hardware that the record's vectors find.
 
-``python -m blysk.bench.quality.mutants [UNIT ...]`` takes faults of a unit at random (a bit of a cell that is
-stuck, inverted, or inverted by a neighbour: Yosys' pass ``mutate``), and gives each the runs of the unit's
-record, which `tests/test_units.py` compares with the bit-accurate model. A mutant is killed if an output
-beat, its cycle or another output differs from the unit's; in a run without stalls the cycles of the inputs
-count, too. Counters of events also begin at high numbers. A mutant that is not killed is equivalent if Yosys
-and ABC (package pyosys) prove that no stimulus distinguishes it from the unit; equivalent ones do not count.
-Survivors at signals that the record waives, with the reason or the other test that finds them, do not count
-either. The *score* is the share of the others that is killed. Clocks are not mutated, and reset stays low:
-other tests and proofs check them. The faults are in the unit's own cells: parts that have a record are
-mutated for that record.
+``python -m blysk.bench.quality.mutants [UNIT ...]`` takes faults of a unit at random. A fault is a bit of a
+cell that is stuck, inverted, or inverted by a neighbour (Yosys' pass ``mutate``). Each fault gets the runs of
+the unit's record, which `tests/test_units.py` compares with the bit-accurate model.
+
+A mutant is killed if an output beat, its cycle or another output differs from the unit's. In a run without
+stalls the cycles of the inputs count, too. Counters of events also begin at high numbers. The *score* is the
+share of killed mutants. These mutants do not count in it:
+
+- equivalent mutants: Yosys and ABC (package pyosys) prove that no stimulus distinguishes them from the unit;
+- survivors at signals that the record waives, with the reason or with the other test that finds them.
+
+Clocks are not mutated, and reset stays low. Other tests and proofs check them. The faults are in the unit's
+own cells. Parts that have a record are mutated for their own record.
 
 All mutants of a unit are one compiled model, with an input that chooses one. Survivors that count are listed:
-stimuli for them are missing, or a proof, or a waiver. Each change of a unit has Yosys choose other faults;
-therefore they do not change the exit status, which is 1 if a unit's score is less than `LEAST`, 2 for bad
+stimuli for them are missing, or a proof, or a waiver. Each change of a unit makes Yosys choose other faults,
+so survivors do not change the exit status. It is 1 if a unit's score is less than `LEAST`, and 2 for bad
 input.
 """
 
@@ -55,7 +58,7 @@ LEAST = 0.95
 def waived(unit: str, mutant: str) -> bool:
     """Whether the record waives faults at the first register or output that a mutant's fault reaches.
 
-    A waiver is a pattern for the signal's path or its last parts; a copy of a signal for a later stage has
+    A waiver is a pattern for the signal's path or its last parts. A copy of a signal for a later stage has
     the name of the signal and a number.
 
     Parameters
@@ -63,7 +66,7 @@ def waived(unit: str, mutant: str) -> bool:
     unit : str
         A key of `RECORDS`.
     mutant : str
-        As `mutation.mutate` names it: ``fault -> unit.path``.
+        Name of the mutant by `mutation.mutate`: ``fault -> unit.path``.
     """
     signal = mutant.rpartition(" -> ")[2].removeprefix("unit.")
     names = (signal, re.sub(r"_\d+$", "", signal))
@@ -81,7 +84,7 @@ class Score:
     Parameters
     ----------
     unit : str
-        Its name.
+        Name of the unit.
     mutants : int
         Number of mutants.
     equivalent : tuple of str
@@ -112,7 +115,7 @@ class Score:
 
     @property
     def score(self) -> float:
-        """Share of killed mutants among those neither equivalent nor waived; 1 if there are none."""
+        """Share of killed mutants among the mutants neither equivalent nor waived. 1 if there are none."""
         return self.killed / (self.killed + len(self.open)) if self.open else 1.0
 
 
@@ -134,7 +137,7 @@ def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
     Raises
     ------
     ToolError
-        If a tool fails, or mutant 0 does not behave as the unit; with the unit's name.
+        If a tool fails, or mutant 0 does not behave as the unit. The message has the unit's name.
     """
     try:
         return _measured(unit, count, seed)
@@ -168,7 +171,7 @@ def scores(
     executor: Executor | None = None,
     progress: Callable[[], object] = lambda: None,
 ) -> list[Score]:
-    """Scores of units, in their order; scores in the cache are not measured again.
+    """Scores of units, in their order. Scores in the cache are not measured again.
 
     Parameters
     ----------
@@ -245,7 +248,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if a score is less than `LEAST` or a tool fails; 2 for bad input, printed in one line.
+        Exit status: 0, or 1 if a score is less than `LEAST` or a tool fails, 2 for bad input (printed in one
+        line).
     """
     return run(_command, "blysk.bench.quality.mutants", arguments)
 

