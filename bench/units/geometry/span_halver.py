@@ -91,7 +91,7 @@ def _sizes(unit, rng, count):
 
 
 def _steep(unit, rng, count):
-    """Spans of two pixels at four scales. Between the ends a component differs by about 9/16 of the length."""
+    """Spans of two pixels at four scales. A component of the ends differs by about 9/16 of the length."""
     near = sphere(rng, count)
     apart = rng.uniform(-0.1, 0.1, (count, 3))
     apart[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-1, 1], count) * rng.uniform(

@@ -91,7 +91,7 @@ def _exponents(unit, rng, count):
 
 
 def _terminator(unit, rng, count):
-    """A highlight's peak with N·L 0, next to 0, of one bit, or under 0, so that N·L switches the highlight."""
+    """A highlight's peak with N·L at 0, next to 0, of one bit, or under 0, so that N·L switches it."""
     bits = 1 << np.arange(34)
     cosine = rng.permutation(np.r_[0, bits, -bits, _cosine_format(unit).min_code])
     highlight = np.full(len(cosine), ONE**2)

@@ -68,7 +68,7 @@ def _slopes(model, exponent):
 
 
 def highlights(unit, rng, count, exponent=None):
-    """Operands in the highlight, about its end and anywhere, for one exponent. A tenth of the beats is dark."""
+    """Operands in the highlight, at its end and anywhere, for an exponent. A tenth of the beats is dark."""
     exponent = getattr(unit, "exponent", None) or exponent or EXPONENT
     constants = {"exponent": exponent}
     if "constants" not in unit.signature.members:
