@@ -154,7 +154,7 @@ def _criteria(quick: bool) -> list[Claim]:
         found.append(_claim("use of resources", f"{words} on {DEVICE}", use, {"date": _entry()[1]}, part))
     for lights in (1, 2) if quick else (1, 2, 4, 8):
         for part in ("multipliers", "register_bits"):
-            words = f"{part.replace('_', ' ')} with {lights} lights, before synthesis"
+            words = f"{part.replace('_', ' ')} before synthesis, lights: {lights}"
             found.append(_claim("scaling with lights", words, resources, {"lights": lights}, part))
     return found
 
@@ -166,7 +166,7 @@ def _cycles(quick: bool) -> list[Claim]:
     return [
         _claim(
             "scaling with triangles and pixels",
-            f"cycles a pixel, `{method}`, {triangles:,} triangles at {size[0]}x{size[1]}",
+            f"cycles a pixel, {method}, {triangles:,} triangles at {size[0]}x{size[1]}",
             frame,
             _frame(triangles, size, method),
             "cycles_a_pixel",
