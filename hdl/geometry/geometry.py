@@ -129,7 +129,9 @@ class _TriangleSetup(wiring.Component):
 
         ahead = (edges.latency + planes.latency) // self.interval + 3
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
-        depth = max(ATTRIBUTES * ahead + UNCOUNTED, BLOCK_WORDS)
+        depth = ATTRIBUTES * ahead
+        if not self._compact:
+            depth = max(depth + UNCOUNTED, BLOCK_WORDS)
         connect_late_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
         # The plane setup goes on with the next triangle while the gradients of this one are computed.
         connect_register(m, "waiting_scale", planes.o, scales)
