@@ -41,7 +41,7 @@ LONGEST = (
     *(f"tests/bench/report/test_{name}.py" for name in ("report", "points")),
     "tests/bench/web/test_web_browser.py",
     "tests/bench/tools/test_place_and_route.py",
-    *(f"tests/bench/quality/test_{name}.py" for name in ("mutants", "pairs")),
+    "tests/bench/quality/test_mutants.py",
 )
 """Beginnings of the groups that take the longest: workers begin with them."""
 
