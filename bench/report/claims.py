@@ -1,4 +1,4 @@
-"""Claims of documents: statements with a printed value, functions that measure it, and their table."""
+"""Claims of documents: statements with a printed value, functions that measure the value, and a table."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -15,42 +15,42 @@ AGREEMENT = 2e-3
 
 
 def to_the_digits(printed: str, value: float) -> bool:
-    """Whether a value, rounded, has every printed digit: the tolerance is half a unit of the last digit."""
+    """Whether a rounded value has every printed digit. The tolerance is half a unit of the last digit."""
     return f"{value:.{len(printed.partition('.')[2])}f}" == printed
 
 
 def at_least(printed: str, value: float) -> bool:
-    """Whether a value reaches what is printed, or the lower end of a range as in "0.20 to 0.35"."""
+    """Whether a value reaches the printed value, or the lower end of a range such as "0.20 to 0.35"."""
     return value >= float(printed.partition(" to ")[0])
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of a document, and the function that measures what comes out.
+    """A statement of a document, and the function that measures its quantity.
 
     Parameters
     ----------
     source : str
         Document and place.
     stated : str
-        What the document states, in words, a formula or digits.
+        The statement, in words, a formula or digits.
     quantity : str
         The measured quantity, with its unit behind a comma. With the unit % the function gives a share of 1.
     function : callable, optional
-        Measures the quantity; see `Task`. It gives a number or a text; or two numbers, by the document's own
-        statement and as it comes out; or a dictionary. ``None``: nothing is measured.
+        Measures the quantity, see `Task`. Its result is a number, a text, a dictionary, or two numbers: by
+        the document's own statement, and as measured. ``None``: nothing is measured.
     settings : dict
         Arguments of the function.
     key : str
         Key of the quantity in a dictionary.
     printed : str
-        Value as printed, digit by digit. Empty: there is none, or the function computes it.
+        Printed value, digit by digit. Empty: there is none, or the function computes it.
     holds : callable
         Whether a value is as printed. Two computed values are held to `AGREEMENT`.
     ours : str
-        What replaces the statement.
+        Our replacement of the statement.
     kind, matter : str
-        Kind of an erratum, and a name that errata about one matter share.
+        Kind of an erratum, and a common name of errata about one matter.
     timed : bool
         Whether the function measures a time.
     """
@@ -74,7 +74,7 @@ class Claim:
         return self.function and Task(self.function, dict(self.settings), self.timed)
 
     def values(self, result: Any) -> tuple[Cell, Cell]:
-        """Printed and measured value, from the result of the function; ``None`` for a missing one."""
+        """Printed and measured value, from the function's result. ``None`` stands for a missing value."""
         value = result[self.key] if self.key else result
         if isinstance(value, list | tuple):
             return tuple(value)
@@ -83,7 +83,7 @@ class Claim:
         return self.printed or None, value
 
     def verdict(self, result: Any) -> bool | None:
-        """Whether the measured value is as printed; ``None`` if there are not both values."""
+        """Whether the measured value is as printed. ``None`` if a value is missing."""
         printed, value = self.values(result)
         if printed is None or value is None:
             return None
@@ -93,7 +93,7 @@ class Claim:
 
 
 def measured(claims: Sequence[Claim]) -> list[Any]:
-    """Results of claims that have a function, measured now, each measurement once."""
+    """Results of claims with a function. Each is measured now, once."""
     tasks = {_identity(claim.task): claim.task for claim in claims}
     found = {identity: task.run() for identity, task in tasks.items()}
     return [found[_identity(claim.task)] for claim in claims]
@@ -120,7 +120,7 @@ class ClaimTable:
     further: Mapping[str, str] = field(default_factory=dict)
 
     def made(self, quick: bool, results: Mapping[str, Any]) -> Table:
-        """The table, from results by task; columns without any entry are left out."""
+        """The table, from results by task. Columns without any entry are left out."""
         rows, grades = [], []
         for claim in self.claims(quick):
             result = results[_identity(claim.task)] if claim.task else None
@@ -150,7 +150,7 @@ class Plot:
     tasks : callable
         Measurements of a quick report or of a full one.
     draw : callable
-        The drawing from their results.
+        Makes the drawing from their results.
     """
 
     tasks: Callable[[bool], Sequence[Task]]
@@ -164,9 +164,9 @@ class Document:
     Parameters
     ----------
     name, title, text, appendix
-        As for `Section`. A sentence on the printed values that come out follows the text.
+        As for `Section`. A sentence on the confirmed printed values follows the text.
     tables : sequence of ClaimTable
-        Its claims.
+        Tables of its claims.
     plots : sequence of Plot
         Its drawings.
     """
@@ -179,7 +179,7 @@ class Document:
     appendix: bool = True
 
     def tasks(self, quick: bool) -> list[Task]:
-        """Measurements of a quick report or of a full one, each of them once."""
+        """Measurements of a quick report or of a full report, each once."""
         claims = [claim for table in self.tables for claim in table.claims(quick)]
         found = [claim.task for claim in claims if claim.task]
         found += [task for plot in self.plots for task in plot.tasks(quick)]

@@ -30,16 +30,18 @@ EXPONENTS = range(2, 1001)
 """Range of exponents in [C]."""
 
 ZONE = 0.59363
-"""Least brightness of Blinn's model in the "epicentre zone", which [C] does not define: it gives the 7.924 %
-that [C] states for f2."""
+"""Least brightness of Blinn's model in the "epicentre zone".
+
+[C] does not define the zone. With this value the error of f2 is 7.924 %, as [C] states.
+"""
 
 MODELS = {"f2": "cosquad", "fQ (Q = 0.64)": "cosquad_q", "fQ2": "cosquad_lin"}
-"""Models of [C], by their names there."""
+"""Models of [C], by their names in [C]."""
 
 _RELATED = ("cosquad7", "coscos2", "coscos4")
 
 _X = np.linspace(0, 30, 6001)
-"""``n (1 - cos gamma)``, on which the models depend almost alone; above 30 Blinn is below 1e-13."""
+"""``n (1 - cos gamma)``. The models depend on it almost alone. Above 30 Blinn's model is under 1e-13."""
 
 
 def errors(model: str) -> dict[str, Any]:
@@ -86,14 +88,14 @@ def slopes() -> dict[str, float]:
 def coefficients() -> dict[str, float]:
     """Ideal coef(n) of fQ2, ``1/(2 pi integral_0^1 S(c) c dc)``, and [C]'s line for it.
 
-    With the slope k, ``S = (1 - k (1-c))^2`` down to ``c = max(1 - 1/k, 0)``; the integral is taken in closed
+    With the slope k, ``S = (1 - k (1-c))^2`` down to ``c = max(1 - 1/k, 0)``. The integral is taken in closed
     form.
 
     Returns
     -------
     dict
-        Ideal at n = 2, 3, 4, 5 and 10, with n as a text for its key; ``deviation``: largest relative error of
-        the line over `EXPONENTS`, and its exponent, ``deviation_exponent``.
+        Ideal values at n = 2, 3, 4, 5 and 10, with n as a text for the key. ``deviation`` is the largest
+        relative error of the line over `EXPONENTS`, and ``deviation_exponent`` its exponent.
     """
     n = np.array(EXPONENTS, dtype=np.float64)
     k = np.array([REFLECTION_MODELS["cosquad_lin"].slope(value) for value in n])
@@ -111,12 +113,12 @@ def coefficients() -> dict[str, float]:
 
 
 def curves(exponent: int) -> dict[str, list[float]]:
-    """Brightness against the angle, of Blinn's model and those of [C].
+    """Brightness against the angle, of Blinn's model and of the models of [C].
 
     Parameters
     ----------
     exponent : int
-        n; angles go up to the place where Blinn's model is about ``exp(-6)``, or to 90 degrees.
+        Exponent n. Angles go up to the place where Blinn's model is about ``exp(-6)``, or to 90 degrees.
 
     Returns
     -------
@@ -159,11 +161,11 @@ PUBLISHED = (
         printed="0.053",
     ),
 )
-"""What [C] prints, in its order."""
+"""Printed values of [C], in its order."""
 
 
 def claims(quick: bool) -> list[Claim]:
-    """`PUBLISHED`, and the same measures of related models and of a refitted line; the same if quick."""
+    """`PUBLISHED`, and the same measures of related models and of a refitted line, also if quick."""
     related = [_of_model(model, key) for model in _RELATED for key in ("absolute", "relative")]
     refitted = Claim(
         "ours", "", _LINE.replace("0.448 n + 0.099", "0.44813 n + 0.10235"), slopes, key="refitted"

@@ -1,4 +1,4 @@
-"""What ways in software take: operations that are counted while they run, and the least of their times."""
+"""Costs of ways in software: operations counted while they run, and their least times."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 class Counted(np.ndarray):
     """An array that counts in `counts` the operations on it and on their results.
 
-    An operation on arrays counts once an element. Made by `Counted.of`.
+    An operation on arrays counts once for each element. `Counted.of` makes the array.
     """
 
     counts: Counter[str]
@@ -70,9 +70,9 @@ class Counted(np.ndarray):
 
 
 def fastest(actions: Sequence[Callable[[], Any]], repeats: int) -> list[float]:
-    """Least processor time of each of several actions, in seconds; they run in turn, in the same minutes.
+    """Least processor time of each of several actions, in seconds. They run in turn, in the same minutes.
 
-    It is the time of all threads, as if they shared one core; other processes do not count.
+    The time is of all threads, as if they shared one core. Other processes do not count.
 
     Parameters
     ----------

@@ -36,14 +36,14 @@ _FIGURES = ("max_lsb", "p999_lsb", "rmse_lsb")
 
 
 def _lit(scene: Scene, lights: int) -> Scene:
-    """The scene with its light replaced by several, evenly round an upright axis, together as bright."""
+    """The scene with several lights in place of one, evenly round an upright axis, together as bright."""
     (light,) = scene.lights
     directions = turned(light.direction, (0, 1, 0), lights).tolist()
     return replace(scene, lights=[Light(tuple(one), (1 / lights,) * 3) for one in directions])
 
 
 def errors_of(candidate: Mapping[str, Any], view: Mapping[str, Any], exponent: int) -> dict[str, Any]:
-    """Errors of a frame by a design's bit-accurate model, whatever its style.
+    """Errors of a frame by a design's bit-accurate model. They do not depend on the style.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def costs_of(candidate: Mapping[str, Any]) -> dict[str, int]:
 
 
 def tasks_of(candidates: Iterable[Candidate], view: Mapping[str, Any], exponent: int) -> list[Task]:
-    """Measurements of designs on a scene; the errors of a design are one task for both styles."""
+    """Measurements of designs on a scene. The errors of a design are one task for both styles."""
     found = []
     for candidate in candidates:
         found.append(Task(costs_of, {"candidate": asdict(candidate)}))
@@ -96,7 +96,7 @@ def tasks_of(candidates: Iterable[Candidate], view: Mapping[str, Any], exponent:
 
 @dataclass(frozen=True)
 class Explored:
-    """A design that was measured.
+    """A measured design.
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ class Explored:
         Figures of `Cost.totals`.
     cycles_per_pixel : float or None
         Upper bound from the figures of the units: the sum of ``max(cycles_per_pixel length, setup_interval)``
-        of all spans, over the number of pixels; writes of constants and latency come on top. A frame takes
-        less where a span is set up during the pixels of a longer one, or pixels lack terms. ``None`` for
-        ``bisection``, which states no interval of the spans that it divides.
+        of all spans, over the number of pixels. Writes of constants and latency are not included. A frame
+        takes less if a span is set up during the pixels of a longer span, or if pixels lack terms. ``None``
+        for ``bisection``, because it states no interval of the spans that it divides.
     out_of_range_spans : int
         Number of spans that are too wide, of `errors_of`.
     """
@@ -156,7 +156,7 @@ def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
 def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values: bool = True) -> np.ndarray:
     """Whether each design is on the Pareto front of largest error and cost: bool array.
 
-    A design that flags spans as too wide is not on it.
+    A design that flags spans as too wide is not on the front.
 
     Parameters
     ----------
@@ -167,8 +167,8 @@ def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values
     cost : str
         One of `COSTS`.
     given_values : bool
-        Whether to include designs whose spans carry values of each light in place of normals: their cost does
-        not contain the computation of the values.
+        Whether to include designs whose spans have values of each light in place of normals. Their cost does
+        not include the computation of the values.
     """
     errors = [
         None

@@ -1,6 +1,7 @@
 """The report's section on switching: toggled register bits a pixel of a frame, also with a highlight gate.
 
-They are a proxy of energy: CMOS takes most energy when bits change. `toggles` says which bits are counted.
+Toggled bits stand for energy, because CMOS takes most energy when bits change. `toggles` says which bits are
+counted.
 """
 
 from collections.abc import Sequence
@@ -38,8 +39,9 @@ BLOCKS: dict[str, tuple[str, ...]] = {
     "intensity": ("intensity",),
     "assembler": ("shaded", "pixel_assembler"),
 }
-"""Submodules of the pipeline by block, in the stream's order; an inner one counts for its own block. The sums
-of ``quotient``, and the normals of ``bisection``, are in the setup of spans."""
+"""Submodules of the pipeline by block, in the stream's order. An inner submodule counts for its own block.
+The sums of ``quotient`` and the normals of ``bisection`` are in the setup of spans.
+"""
 
 DESIGN = ("quotient", "blinn")
 """Method and model of the default pipeline, which has no gate."""
@@ -51,7 +53,7 @@ _COLORS = (
 
 
 def by_block(toggles: dict[str, int]) -> dict[str, int]:
-    """Toggles of each of `BLOCKS`, and of ``others``, if there are any.
+    """Toggles of each of `BLOCKS`, and of ``others`` if there are other submodules.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ def measure(
     -------
     list of dict
         For each exponent ``spans``, ``pixels``, ``cycles``, ``toggles`` by submodule, and ``same``: whether
-        the pixels are those of the bit-accurate model.
+        the pixels equal the pixels of the bit-accurate model.
     """
     design = preset(method, model, gate=gate)
     counter = ToggleCounter(ShadingPipelineUnit(design))
@@ -117,7 +119,7 @@ def measure(
 def tasks(quick: bool) -> list[Task]:
     """Measurements of `DESIGN`, then without and with the gate of each model and each method.
 
-    Quick ones are of one model and method, and in Amaranth's own simulator.
+    A quick report has one model and method, in Amaranth's own simulator.
     """
     exponents = EXPONENTS[1:2] if quick else EXPONENTS
     common = {"exponents": list(exponents), "size": list(_QUICK if quick else _FULL)}

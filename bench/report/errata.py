@@ -1,4 +1,4 @@
-"""Errata of the documents: statements that do not come out, or that our units replace, with evidence."""
+"""Errata of the documents: statements that measurements refute or that our units replace, with evidence."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -41,7 +41,7 @@ KINDS = {
     "reading": "perhaps marks lost when a machine read the text that we have, and no error of the authors",
     "form": "no error: a form or a choice that is good in its range, and that our units replace",
 }
-"""What an entry is, and what it is not."""
+"""Explanations of the kinds of entries."""
 
 ROOT_PUBLISHED = {1: (0.64, -0.07), 2: (0.681, -0.119, 0.014)}
 """[T] 2.1: ``1/sqrt(2 + z)`` in ascending powers of z, by degree."""
@@ -52,7 +52,7 @@ FACTOR_PUBLISHED = (0.707, -0.341, 0.193, -0.059)
 _ROOT_DOMAIN = (math.sqrt(2), 2.0)
 
 Pair = tuple[float, float]
-"""A quantity by the document's statement, and as it comes out."""
+"""A quantity by the document's statement, and as measured."""
 
 
 def _by_cosine(r: np.ndarray) -> np.ndarray:
@@ -113,8 +113,8 @@ def chebyshev(
 def factor_quadratics() -> dict[str, tuple[float, float]]:
     """Largest absolute and relative error of three quadratics for the factor of the middle normal.
 
-    ``"nodes"``: through the values at Chebyshev's nodes; ``"relative"``: of the least largest relative error;
-    ``"within"``: the same among those with an absolute error of 0.002 at most.
+    ``"nodes"`` goes through the values at Chebyshev's nodes. ``"relative"`` has the least largest relative
+    error. ``"within"`` has the least among quadratics with an absolute error of 0.002 at most.
     """
     x = (1 - np.cos(np.linspace(0, np.pi, 4001))) / 2
     exact = _by_cosine(x)
@@ -181,7 +181,7 @@ def worked_example() -> float:
 
 
 def flat_picture() -> Pair:
-    """Share of the values of a flat picture where MNSE as published is defined; whether NMSE is."""
+    """Share of a flat picture's values where MNSE as published is defined, and whether NMSE is defined."""
     reference = np.full((8, 8), 100.0)
     reference[0, 0] = 200
     reference[0, 1] = 0
@@ -456,11 +456,11 @@ CLAIMS = (
         kind="unclear",
     ),
 )
-"""What the documents print."""
+"""Printed statements of the documents."""
 
 
 def matters() -> dict[str, int]:
-    """Number of different matters of `CLAIMS` of each kind, in the order of `KINDS`."""
+    """Number of different matters in `CLAIMS`, for each kind in the order of `KINDS`."""
     found = {(claim.kind, claim.matter or (claim.source, claim.stated)) for claim in CLAIMS}
     return {kind: sum(one == kind for one, _ in found) for kind in KINDS}
 

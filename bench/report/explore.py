@@ -1,9 +1,9 @@
 """The design space: pipelines that draw a scene within an error limit, and their costs.
 
 ``blysk explore`` draws a scene with every design of a sweep over method, model, lights, polynomial degree,
-word length, operand and style, and lists the cheapest ones under a given error. Frames are computed by the
-bit-accurate model, which the simulation equals to the bit; costs are counted in the netlist. Results are
-kept, so that every design is measured once, and a run that was stopped can continue.
+word length, operand and style. It lists the cheapest designs under a given error. The bit-accurate model
+computes the frames. It equals the simulation to the bit. Costs are counted in the netlist. Results are kept,
+so that every design is measured once, and a stopped run can continue.
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,8 +62,8 @@ def tasks(quick: bool) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        Five methods on a teapot of 992 triangles at 160x120; else the default `Sweep` on one of 10,712
-        triangles at 320x240.
+        Whether to measure five methods on a teapot of 992 triangles at 160x120. Else the default `Sweep` is
+        measured on a teapot of 10,712 triangles at 320x240.
     """
     if quick:
         one = {"operands": (None,), "degrees": (3,), "fraction_bits": (46,), "styles": ("throughput",)}
@@ -231,16 +231,16 @@ def explore(
     figures: str | None,
     impossible: Mapping[str, int],
 ) -> None:
-    """Measure designs, and print those under an error; `blysk explore` after its checks.
+    """Measure designs, and print the designs under an error: `blysk explore` after its checks.
 
     Parameters
     ----------
     candidates, impossible
-        Of `Sweep.candidates`.
+        Results of `Sweep.candidates`.
     mesh, exponent, size
         The scene.
     error, largest, cost, limit
-        Kind and limit of the error, what is to be little, and how many designs are listed.
+        Kind and limit of the error, kind of the cost, and number of designs to list.
     jobs, address
         Processes, or a Dask scheduler.
     figures : str or None

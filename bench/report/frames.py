@@ -111,7 +111,7 @@ _SIDE = 280
 """Largest width of the embedded pictures."""
 
 STEPS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 255.0)
-"""Largest error, in LSB, of each colour of an error map: the first is correct rounding."""
+"""Largest error, in LSB, of each colour of an error map. The first is correct rounding."""
 
 
 # Measurements.
@@ -146,13 +146,15 @@ def frames(
 
     Each error is between two images, over the pixels that show the surface:
 
-    - ``model``: Phong shading (normals interpolated over the triangle and normalised at every pixel, as on a
-      GPU) with the design's model, against the same with Blinn's model; both in float64. It does not depend
-      on the arithmetic. A model of R·V approximates no other: this error is 0;
-    - ``arithmetic``: the frame against the same method and model in float64; coefficients as published
-      count as arithmetic;
+    - ``model``: Phong shading with the design's model, against Phong shading with Blinn's model, both in
+      float64. Phong shading interpolates normals over the triangle, and normalises them at every pixel, as on
+      a GPU. The error does not depend on the arithmetic. A model of R·V approximates no other model, so its
+      error is 0;
+    - ``arithmetic``: the frame against the same method and model in float64. Coefficients as published count
+      as arithmetic;
     - ``method``: the frame against Phong shading with the same model;
-    - ``total``: the frame against the exact one, Phong shading with Blinn's model, or with its own of R·V.
+    - ``total``: the frame against the exact frame, Phong shading with Blinn's model, or with the design's own
+      model of R·V.
 
     Parameters
     ----------
@@ -164,9 +166,9 @@ def frames(
     exponents : sequence of int
         Exponents, with a frame for each.
     simulated : bool
-        Whether the frames are simulated; else the bit-accurate model computes them, equal to the bit.
+        Whether the frames are simulated. Else the bit-accurate model computes them, equal to the bit.
     operand : str, optional
-        Operand of the specular unit, if it is not that of the method.
+        Operand of the specular unit, if it is not the method's operand.
 
     Returns
     -------
@@ -203,7 +205,7 @@ def frames(
 def software_frames(shading: str, view: Mapping[str, Any], exponents: Sequence[int]) -> list[dict[str, Any]]:
     """Frames of the golden renderer with Blinn's model, rounded to 8 bits: errors and pictures.
 
-    Errors are those of `frames`; the model error is 0, the arithmetic error that of rounding the frame.
+    The errors are as for `frames`. The model error is 0. The arithmetic error is the rounding of the frame.
 
     Parameters
     ----------
@@ -382,7 +384,7 @@ def map_colors() -> list[list[int]]:
 
 
 def _pictures(image: np.ndarray, references: Mapping[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
-    """The frame and its error maps, cropped to the object and at most `_SIDE` wide."""
+    """The frame and its error maps, cropped to the object, and at most `_SIDE` wide."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     shown = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
     factor = -(-(columns[-1] + 1 - columns[0]) // _SIDE)
@@ -414,7 +416,7 @@ def view_of(source: str, triangles: int, width: int, height: int) -> dict[str, A
     source : str
         ``"teapot"`` or a mesh file.
     triangles : int
-        Triangles of the teapot, about.
+        Approximate number of triangles of the teapot.
     width, height : int
         Size of the picture.
 

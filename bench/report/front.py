@@ -86,7 +86,7 @@ _ALIKE_LSB, _ALIKE_TIMES = 0.15, 1.05
 """Difference of errors, in LSB, and ratio of times, up to which two designs count as equal."""
 
 _LEAST_LSB = 1e-2
-"""Smallest error that is drawn."""
+"""Smallest drawn error."""
 
 
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
@@ -149,7 +149,7 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
 
 
 def _is_compared(of: Mapping[str, Any]) -> bool:
-    """Whether a design may be on the front: it works out its dot products, and draws Blinn's highlight."""
+    """Whether a design may be on the front. It has to compute its dot products and draw Blinn's highlight."""
     return not (of["is_prepared"] or of["is_mirror"])
 
 
@@ -158,13 +158,14 @@ def _cheapest_first(found: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any
 
 
 def _front(found: Sequence[Mapping[str, Any]], kind: str, time: str = "cycles") -> list[Mapping[str, Any]]:
-    """Designs that no other beats, fastest first.
+    """Designs that no other design beats, fastest first.
 
-    Designs that get their dot products as input are left out, and those of R·V, which draw another picture.
+    Designs that get their dot products as input are left out. Designs of R·V are left out, too, because they
+    draw another picture.
 
-    A design beats another if it is no worse in error (by `_ALIKE_LSB`) and time (by `_ALIKE_TIMES`), and
-    better by more than that in one of both, or smaller: it has fewer multipliers, or as many and fewer
-    look-up tables. `time` is a key of `summaries`, ``cycles`` or ``ns``.
+    A design beats another if it is no worse in error (by `_ALIKE_LSB`) and time (by `_ALIKE_TIMES`). It must
+    also be better by more than this in one of them, or smaller. It is smaller if it has fewer multipliers, or
+    as many and fewer look-up tables. `time` is a key of `summaries`, ``cycles`` or ``ns``.
     """
     found = [of for of in found if _is_compared(of)]
     if not found:
@@ -306,7 +307,7 @@ def _short(of: Mapping[str, Any]) -> str:
 
 
 def _named(found: Sequence[Mapping[str, Any]], on: Container[str], kind: str) -> list[Mapping[str, Any]]:
-    """Designs that get a label, the more important first: the front, then each method's best and worst."""
+    """Designs with a label, the more important first: the front, then each method's best and worst."""
     chosen = sorted((of for of in found if of["label"] in on), key=lambda of: of[kind][1])
     for method in dict.fromkeys(of["method"] for of in found):
         own = sorted((of for of in found if of["method"] == method), key=lambda of: of[kind][1])

@@ -1,13 +1,15 @@
 """Savings of the highlight gate: pixels, and cycles of the compact style.
 
-``python -m blysk.bench.report.gate [MESH ...]`` renders each mesh (the teapot by default) at 320x240 by the
-method quadratic, or another one that serves a gate (``--method``), with one light, for the models cosquad,
-coscos4 and blinn_product and the exponents 2, 10, 50, 200 and 1000, in the compact and the throughput style,
-without and with the gate. It prints two tables in Markdown: gated spans and pixels, and cycles. The exit
-status is 1 if a frame is not equal, to the bit, in all four simulations and by the bit-accurate model; 2 for
-bad input. The report's section `energy` has what the gate saves in toggled register bits.
+``python -m blysk.bench.report.gate [MESH ...]`` renders each mesh (the teapot by default) at 320x240 with one
+light. The method is quadratic, or another method that serves a gate (``--method``). The models are cosquad,
+coscos4 and blinn_product, the exponents 2, 10, 50, 200 and 1000. There are frames in the compact and the
+throughput style, without and with the gate. The command prints two tables in Markdown: gated spans and
+pixels, and cycles.
 
-The methods quotient and renormalise have no gate: their spans bring no unit normals.
+The exit status is 1 if a frame is not equal, to the bit, in all four simulations and by the bit-accurate
+model. It is 2 for bad input. The report's section `energy` has the gate's savings of toggled register bits.
+
+The methods quotient and renormalise have no gate, because their spans bring no unit normals.
 """
 
 import sys
@@ -51,10 +53,10 @@ __all__ = [
 ]
 
 METHODS = tuple(name for name, of in ALL_METHODS.items() if of.serves_gate and of.ORIGIN != "own")
-"""Methods of unit normals, which serve the gate: those of the documents, and linear."""
+"""Methods of unit normals, which serve the gate: linear, and the methods of the documents."""
 
 METHOD = "quadratic"
-"""The method of `METHODS` that is measured if none is named."""
+"""Default method of `METHODS`."""
 
 MODELS = ("cosquad", "coscos4", "blinn_product")
 EXPONENTS = (2, 10, 50, 200, 1000)
@@ -62,18 +64,18 @@ EXPONENTS = (2, 10, 50, 200, 1000)
 
 @dataclass(frozen=True)
 class Shares:
-    """Spans and pixels of a frame that the gate keeps from the specular unit, and upper limits of them.
+    """Spans and pixels of a frame that the gate keeps from the specular unit, and their upper limits.
 
     Parameters
     ----------
     spans, pixels : int
-        Numbers of the frame; spans of length 0 do not count.
+        Numbers of the frame. Spans of length 0 do not count.
     gated_spans, gated_pixels : int
         Spans that the gate finds dark, and their pixels.
     dark_spans, dark_span_pixels : int
-        Spans in which no pixel has a specular term over 0, and their pixels: the limit of a gate for spans.
+        Spans without a specular term over 0, and their pixels. This is the limit of a gate for spans.
     dark_pixels : int
-        Pixels whose specular term is 0: the limit of any gate.
+        Pixels whose specular term is 0. This is the limit of any gate.
     behind_pixels : int
         Pixels whose light is behind the surface, which are dark without a gate, too.
     """
@@ -90,7 +92,7 @@ class Shares:
 
 @dataclass(frozen=True)
 class GateRow:
-    """A frame without and with the gate: pairs are in this order.
+    """A frame without and with the gate. Pairs are in this order.
 
     Parameters
     ----------
@@ -117,7 +119,7 @@ class GateRow:
 
 
 def shares_of(design: ShadingPipeline, spans: Spans, constants: FrameConstants) -> Shares:
-    """Shares of a frame by the bit-accurate gate, for one light and material; the design may have no gate."""
+    """Shares of a frame by the bit-accurate gate, for one light and material. The design may have no gate."""
     spans = spans[np.flatnonzero(spans.length)]
     length = np.asarray(spans.length, dtype=np.int64)
     operands = design.operands(spans, constants)
@@ -150,7 +152,7 @@ def frames(
     spans : Spans
         Input of each.
     constants : FrameConstants
-        Constants that are written first.
+        Constants to write first.
     engine : str
         As `simulate` takes it.
     """
@@ -332,7 +334,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if a frame differs or a simulation fails; 2 for bad input, printed in one line.
+        Exit status: 0, or 1 if a frame differs or a simulation fails, 2 for bad input (printed in one line).
     """
     return run(_command, "blysk.bench.report.gate", arguments)
 

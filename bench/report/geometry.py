@@ -1,8 +1,8 @@
 """The report's section on triangles: whole designs compared, from triangles to pixels, and stiff cases.
 
-The method is ``quotient``, which takes a vector and its step. Its rivals are ``quadratic``, which needs unit
-normals at the ends of each span, and ``renormalise``, which takes the line between the ends as it is and
-normalises at every pixel.
+The method is ``quotient``, which takes a vector and its step. It has two rivals. ``quadratic`` needs unit
+normals at the ends of each span. ``renormalise`` takes the unchanged line between the ends, and normalises at
+every pixel.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,7 +62,7 @@ def measure(design: str, triangles: Sequence[int], size: Sequence[int]) -> dict[
     design : str
         A key of `CANDIDATES`.
     triangles : sequence of int
-        Numbers of triangles of the teapot, about.
+        Approximate numbers of triangles of the teapot.
     size : sequence of int
         Width and height.
 
@@ -100,7 +100,7 @@ def _scene(triangles: int, size: tuple[int, int], exponent: int) -> Scene:
 
 
 def tasks(quick: bool) -> list[Task]:
-    """A task for each design, and one for each method's stiff cases; quick: compact ones, small pictures."""
+    """Tasks of each design and of each method's stiff cases. Quick: compact designs, small pictures."""
     settings = {
         "triangles": list(_TRIANGLES[:2] if quick else _TRIANGLES),
         "size": [160, 120] if quick else [640, 480],
@@ -110,7 +110,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: costs and cycles by triangle size, which design wins where, and the stiff cases."""
+    """The section: costs and cycles by triangle size, the best design by size, and the stiff cases."""
     designs, cases, size = {}, {}, None
     for task, result in zip(tasks, results, strict=True):
         if "design" in task.settings:
@@ -132,7 +132,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _verdict(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> Iterator[str]:
-    """What each rival of a style takes beside the first method, for large triangles and for small ones."""
+    """Costs of each rival of a style relative to the first method, for large and for small triangles."""
     for style in ("", ", two lanes", ", compact"):
         for rival in _METHODS[1:]:
             names = [f"{method}{style}" for method in (_METHODS[0], rival)]
@@ -141,7 +141,7 @@ def _verdict(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -
 
 
 def _beside(names: Sequence[str], pair: Sequence[Any], rates: Mapping[str, Sequence[float]]) -> str:
-    """What the second of two designs takes of the first one's cycles, time and multipliers."""
+    """Cycles, time and multipliers of the second of two designs relative to the first."""
     seeds = [rates.get(name_of(CANDIDATES[name]), ()) for name in names]
     clocks = [median(of) for of in seeds] if all(seeds) else []
     words = []

@@ -1,4 +1,4 @@
-"""Stiff and extreme cases of geometry: scenes, and what becomes of their pixels."""
+"""Stiff and extreme cases of geometry: scenes, and the errors of their pixels."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -26,7 +26,7 @@ _UP = (0.0, 0.0, 1.0)
 
 
 def frame_figures(scene: Scene, renderer: Renderer, frame: TriangleFrame) -> dict[str, Any]:
-    """What a frame differs in from exact normals at every pixel in float64, with the same reflection model.
+    """Differences of a frame from exact normals at every pixel in float64, with the same reflection model.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def measure_cases(method: str, quick: bool) -> list[dict[str, Any]]:
     method : str
         Method of shading, with the model `blinn`.
     quick : bool
-        Whether the million of triangles is a hundredth of it.
+        Whether the case of a million triangles has a hundredth of them.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def measure_cases(method: str, quick: bool) -> list[dict[str, Any]]:
 
 
 def cases_of(quick: bool) -> Iterator[tuple[str, Scene]]:
-    """Names and scenes; a unit of the world is a pixel, and (0, 0) is in the middle of the picture."""
+    """Names and scenes. A unit of the world is a pixel, and (0, 0) is in the middle of the picture."""
     rng = np.random.default_rng(23)
     for parts in (256, 32, 2):
         yield f"slivers of 1/{parts} pixel", _slivers(rng, 1 / parts)
@@ -141,7 +141,7 @@ def _facing(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def _slivers(rng: np.random.Generator, width: float) -> Scene:
-    """Long triangles of that width in all directions, each counterclockwise."""
+    """Long triangles of a width in all directions, each counterclockwise."""
     angle, count = rng.uniform(0, 2 * np.pi, 400), 400
     along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -172,7 +172,7 @@ def _crossing() -> Scene:
 
 
 def _tied() -> Scene:
-    """The same triangle twice, with normals to the left and to the right: the first one stays."""
+    """The same triangle twice, with normals to the left and to the right. The first stays visible."""
     vertices, _, _ = _corner(_fan(0))
     normals = np.concatenate([np.tile([(-0.5, 0, 1.0)], (3, 1)), np.tile([(0.5, 0, 1.0)], (3, 1))])
     return _scene(200, 160, np.concatenate([vertices, vertices]), normals, [(0, 1, 2), (3, 4, 5)])

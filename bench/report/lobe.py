@@ -1,4 +1,4 @@
-"""Errors and costs of the lobe unit, and errors of frames with it, beside their baselines."""
+"""Errors and costs of the lobe unit, and errors of frames with it, beside baselines."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 SIZES = ((8, 16), (12, 16), (12, 32), (14, 32), (15, 16), (15, 32), (20, 16))
-"""Sizes of the table to compare: octaves, and steps of each."""
+"""Sizes of the table to compare: number of octaves, and steps of an octave."""
 
 MESHES = ("teapot", "sphere", "torus", "waves")
 """Surfaces of the frames."""
@@ -53,7 +53,7 @@ FRONT = (
     *(("quotient", model) for model in ("blinn", "phong")),
     *(("renormalise", model) for model in ("blinn", "cosquad", "lyon3_refitted", "exp", "blinn_product")),
 )
-"""Method and model of the pipelines that are compared: with a table, and the baselines by other circuits."""
+"""Method and model of the compared pipelines: with a table, and baselines with other circuits."""
 
 EXPONENTS = (1, 10, 100, 1000)
 
@@ -91,7 +91,8 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
     parameter : float or None
         Parameter of the model.
     samples : int
-        Sampled operands in each step of the table, with its first and last; all of them in a smaller step.
+        Sampled operands in each step of the table, with the first and the last. A smaller step has all
+        operands.
     """
     knots = np.ldexp(lobe.knots, lobe.fraction_bits).astype(np.int64)
     first, last = knots[:-1, np.newaxis], knots[1:, np.newaxis] - 1
@@ -174,7 +175,7 @@ def frame_errors(
     model : str
         One of `MODELS` or `LOBES`, or with ``quotient`` of `MIRROR_LOBES`.
     values : sequence of float
-        Exponents, or roughnesses if the model has them.
+        Exponents, or roughnesses if the model takes them.
     size : two ints
         Width and height.
 
@@ -330,7 +331,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _serves(frames: Sequence[tuple[str, tuple[str, str], dict]], model: str) -> float:
-    """Least roughness from which on `quotient` is within 1 LSB."""
+    """Least roughness from which `quotient` is within 1 LSB."""
     off = [row["value"] for _, of, row in frames if of == ("quotient", model) and row["total"] > 1]
     values = sorted({row["value"] for _, of, row in frames if of == ("quotient", model)})
     return next((value for value in values if value > max(off, default=0)), float("inf"))

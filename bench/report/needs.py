@@ -77,7 +77,7 @@ def _lamp(width: int, height: int, triangles: int) -> Scene:
 
 
 _GATED = {"method": "quadratic", "model": "cosquad", "gate": True}
-"""A method whose spans stay the same without highlights, and can be proved to hold none."""
+"""A method whose spans stay the same without highlights, and can be proved to have none."""
 
 SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]] = {
     "copper teapot": (_teapot, None),
@@ -94,8 +94,10 @@ SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]
     ),
     "teapot beside a lamp": (_lamp, {"method": "chord-local", "model": "cosquad_lin"}),
 }
-"""Scenes, as functions of width, height and number of triangles (about), and options of the full pipeline; by
-default it is the method quotient with the model blinn.
+"""Scenes, and options of the full pipeline.
+
+A scene is a function of width, height and approximate number of triangles. The default pipeline has the
+method quotient and the model blinn.
 """
 
 QUICK_SCENES = (
@@ -118,9 +120,9 @@ def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]
 
 
 def measure(name: str, size: Sequence[int]) -> dict[str, Any]:
-    """Savings of a scene's reductions, each alone and all together, and its frame beside the full pipeline's.
+    """Savings of a scene's reductions, each alone and all together, and its frame beside the full frame.
 
-    Both frames are those of the bit-accurate models.
+    Both frames are by the bit-accurate models.
 
     Parameters
     ----------
@@ -133,7 +135,7 @@ def measure(name: str, size: Sequence[int]) -> dict[str, Any]:
     -------
     dict
         ``full`` and ``specialised`` of `saving_figures`, and `difference_figures`; ``reasons`` of the
-        reductions; ``alone``, resources that each reduction saves by itself; ``method``, ``model`` and
+        reductions; ``alone``, the resources that each reduction alone saves; ``method``, ``model`` and
         ``pixels``.
     """
     scene, found = _specialised(name, size)
@@ -201,7 +203,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _shares_alone(found: dict[str, dict]) -> dict[str, list[tuple[str, dict[str, float]]]]:
-    """For each kind of reduction the scenes, and the share of each resource that it saves alone."""
+    """For each kind of reduction the scenes, and the share of each resource that it alone saves."""
     shares: dict[str, list[tuple[str, dict[str, float]]]] = {}
     for name, of in found.items():
         for reason, saves in zip(of["reasons"], of["alone"], strict=True):
@@ -292,7 +294,7 @@ def _alone(found: dict[str, dict]) -> Table:
 
 
 def _left(figures: dict, resource: str) -> float:
-    """Share of a resource that stays; 1 if the full pipeline has none of it."""
+    """Remaining share of a resource. 1 if the full pipeline has none of it."""
     full = figures["full"][resource]
     return figures["specialised"][resource] / full if full else 1.0
 

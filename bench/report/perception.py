@@ -1,4 +1,4 @@
-"""Perceived difference of two pictures: FLIP, CIEDE2000, and a verdict whether they look identical."""
+"""Perceived difference of two pictures: FLIP, CIEDE2000, and whether both look identical."""
 
 from dataclasses import dataclass
 from types import ModuleType
@@ -20,13 +20,14 @@ __all__ = [
 ]
 
 LARGEST_LSB = 1.0
-"""Largest error of a channel, in LSB, that counts as invisible whatever the other figures are."""
+"""Largest error of a channel, in LSB, that counts as invisible for all values of the other figures."""
 
 FLIP_P99 = 0.05
 FLIP_MAX = 0.10
 CIEDE2000_P99 = 1.0
 CIEDE2000_MAX = 2.3
-"""The verdict's limits for larger errors; a colour difference of 2.3 is about the least that is noticed."""
+"""The verdict's limits for larger errors. A colour difference of 2.3 is about the least noticed difference.
+"""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Perceived:
     flip_p99, flip_max : float
         99th percentile (linear between neighbours) and largest of the FLIP map, 0 to 1.
     ciede2000_p99, ciede2000_max : float
-        The same two figures of the CIEDE2000 colour difference of each pixel.
+        99th percentile and largest CIEDE2000 colour difference of a pixel.
     """
 
     flip_p99: float
@@ -67,14 +68,14 @@ def perceived(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> Per
     """FLIP and CIEDE2000 between two pictures.
 
     Channels are read as sRGB. FLIP (Andersson and others 2020, LDR) is for a viewer who sees 67 pixels a
-    degree, its default; a pixel's value depends on its neighbours, also on the background. CIEDE2000 is of
-    each pixel alone, under D65 for the 2 degree observer. Only pixels of the mask count, since the background
-    would make both figures too small.
+    degree, its default. A pixel's FLIP value depends on its neighbours, also on the background. CIEDE2000 is
+    of each pixel alone, under D65 for the 2 degree observer. Only pixels of the mask count, because the
+    background would make both figures too small.
 
     Parameters
     ----------
     image, reference : arrays, shape (height, width, 3)
-        Values in LSB, 0 to 255, of any type; a float64 reference stays unrounded.
+        Values in LSB, 0 to 255, of any type. A float64 reference stays unrounded.
     mask : bool array, shape (height, width)
         The pixels that count, at least one.
 
@@ -109,8 +110,9 @@ def perceived(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> Per
 def identical_to_the_eye(largest_lsb: float, difference: Perceived) -> bool:
     """Whether two pictures look the same.
 
-    They do if no channel's error is over `LARGEST_LSB`. Else they do if FLIP is at most `FLIP_P99` in 99 % of
-    the pixels and `FLIP_MAX` in all, and CIEDE2000 at most `CIEDE2000_P99` and `CIEDE2000_MAX` likewise.
+    They look the same if no channel's error is over `LARGEST_LSB`. Else FLIP must be at most `FLIP_P99` in 99
+    % of the pixels, and at most `FLIP_MAX` in all. CIEDE2000 must be at most `CIEDE2000_P99` in 99 % of the
+    pixels, and at most `CIEDE2000_MAX` in all.
 
     Parameters
     ----------

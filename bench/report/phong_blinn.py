@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 PIXELS = 1 << 14
-"""Pixels that the ways in software compute at once: their arrays stay in a processor's cache."""
+"""Pixels that the ways in software compute at once. Their arrays stay in a processor's cache."""
 
 _EXPONENT = 50
 
@@ -103,14 +103,14 @@ def operations(way: str, local: bool) -> dict[str, float]:
     way : str
         One of `WAYS`.
     local : bool
-        Whether every pixel has its own L and V; else L, V, L·V and H are computed once a frame, and hardly
+        Whether every pixel has its own L and V. Else L, V, L·V and H are computed once a frame, and hardly
         count.
 
     Returns
     -------
     dict
-        Operations of a pixel by kind (see `Counted`); ``all`` of them; ``fewer``: share of the operations of
-        the first of `WAYS` that this way saves.
+        Operations of a pixel by kind (see `Counted`), and ``all`` of them. ``fewer`` is the saved share of
+        the operations of the first of `WAYS`.
     """
     counts: dict[str, Counter[str]] = {}
     for name in (next(iter(WAYS)), way):
@@ -186,7 +186,7 @@ def exponent_at(degrees: float) -> float:
 _ALONG, _ACROSS = "along", "across"
 
 _DIRECTIONS = {_ALONG: (1, 0), _ACROSS: (0, 1)}
-"""Directions in which a normal leaves H: along the plane of L and V, and across it."""
+"""Directions of a normal from H: along the plane of L and V, and across the plane."""
 
 
 def half_angle(way: Sequence[float], degrees: float, exponent: float) -> float:
@@ -197,9 +197,10 @@ def half_angle(way: Sequence[float], degrees: float, exponent: float) -> float:
     Parameters
     ----------
     way : two floats
-        Direction in which the normal leaves H: along the plane of L and V, and across it; of length 1.
+        Direction of the normal from H, of length 1: its parts along the plane of L and V, and across the
+        plane.
     degrees : float
-        a, half of the angle from L to V.
+        Half of the angle from L to V, a.
     exponent : float
         n.
     """
@@ -243,7 +244,7 @@ _PICTURES = (
 
 
 def picture(model: str, exponent: int, side: int) -> dict[str, Any]:
-    """A highlight on a sphere by the simulated pipeline `quotient`; L and V are 100 degrees apart.
+    """A highlight on a sphere by the simulated pipeline `quotient`. L and V are 100 degrees apart.
 
     Parameters
     ----------
@@ -351,7 +352,7 @@ def _frames(quick: bool) -> list[Claim]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """All claims; if quick, frames have up to 10,000 triangles at 320x240, else a million at 1920x1080."""
+    """All claims. Frames have up to 10,000 triangles at 320x240 if quick, else a million at 1920x1080."""
     return [*_shapes(quick), *_counts(quick), *_frames(quick)]
 
 

@@ -47,7 +47,7 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
     seeds : int
         Number of placements.
     tools : dict of str to str or None
-        Versions of the tools, which the result depends on.
+        Versions of the tools. The result depends on them.
     """
     design = ShadingPipelineUnit(preset(method, model))
     if None in tools.values():
@@ -59,7 +59,7 @@ def measure(method: str, model: str, family: str, seeds: int, tools: dict[str, s
 
 
 def task(method: str, model: str | None = None, family: str = "ecp5") -> Task:
-    """Task that measures a pipeline; with one seed for published methods and other models than `model_of`.
+    """Task that measures a pipeline. Published methods, and other models than `model_of`, have one seed.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def task(method: str, model: str | None = None, family: str = "ecp5") -> Task:
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Tasks of some minutes each: every method for the first family, `OTHERS` for the others.
+    """Tasks of some minutes each: every method for the first family, `OTHERS` for the other families.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: for each family a table, or the reason why there is none.
+    """The section: for each family a table, or the reason for a missing table.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _committed() -> tuple[list[str], list[Table]]:
-    """Text and table of a quick report: the figures of the store, each with its date and command."""
+    """Text and table of a quick report. It has the figures of the store, each with its date and command."""
     rows: list[list[Cell]] = [
         [
             *(
@@ -159,7 +159,7 @@ def _committed() -> tuple[list[str], list[Table]]:
 
 
 def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[str, Table | None]:
-    """Text and table of a family; ``results`` are pairs of settings and figures."""
+    """Text and table of a family. ``results`` are pairs of settings and figures."""
     device = FAMILIES[family].device
     settings = results[0][0]
     versions = settings["tools"]

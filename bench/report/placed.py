@@ -1,7 +1,7 @@
 """Committed results of place and route: parts and clock rates of pipelines, each with its date.
 
-A quick report reads them here, as placing a design takes minutes. ``blysk fpga --json FILE`` measures more,
-and ``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
+A quick report reads them here, because placement takes minutes. ``blysk fpga --json FILE`` measures more, and
+``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
 """
 
 import json
@@ -36,7 +36,7 @@ def merged(
     measured : dict
         Figures of ``blysk fpga --json``.
     date : str
-        Date of the measurement, as 2026-11-23.
+        Date of the measurement, such as 2026-11-23.
     command : str
         Command of the measurement.
 

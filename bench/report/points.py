@@ -72,13 +72,15 @@ DESIGNS += [(method, "cosquad") for method in PUBLISHED]
 """Method and model of the hardware's points, with the method's own operand of the specular unit."""
 
 BEST = [method for method, interpolator in METHODS.items() if interpolator.operand == "cosine"]
-"""Methods whose own operand is N·H, as in their documents. They are more exact with 1 - N·H, and have points
-with both, so that each method is also compared in its best form. Variants as published are in `PUBLISHED`."""
+"""Methods whose own operand is N·H, as in their documents. They are more exact with 1 - N·H. They have points
+with both operands, so that each method is also compared in its best form. Variants as published are in
+`PUBLISHED`.
+"""
 
 _BEST_OPERAND = {"operand": "one_minus_cosine"}
 
 _BEST_MODEL = "blinn"
-"""Model, an exact lobe table, with which each method in its best form also has points."""
+"""An exact lobe table. Each method in its best form also has points with this model."""
 
 QUICK_SIMULATED = [(method, model_of(method)) for method in (*METHODS, *PUBLISHED)]
 QUICK_SIMULATED += [("quotient", "phong")]
@@ -146,7 +148,7 @@ def _designs() -> list[dict[str, str]]:
 
 
 def _design_of(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Method, model and, if it is not the method's own, operand."""
+    """Method, model, and the operand if it is not the method's own."""
     return tuple(settings[name] for name in ("method", "model", "operand") if name in settings)
 
 
@@ -242,7 +244,7 @@ _HARDWARE = (
 
 
 def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, dict[str, Any]]:
-    """Hardware of designs: the netlist, and place and route, measured now or committed."""
+    """Hardware of designs by the netlist, and by place and route, measured now or committed."""
     found: dict[tuple, dict[str, Any]] = {}
     for design, entry in placed(DEVICE).items():
         rates = {"fmax_mhz": entry["fmax_median_mhz"], "seeds_mhz": entry["fmax_mhz"]}

@@ -35,13 +35,13 @@ __all__ = [
 
 
 def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.ndarray:
-    """Whether points are on the Pareto front: no other is better in one measure and as good in both.
+    """Whether points are on the Pareto front. No other point is better in one measure and as good in both.
 
     Parameters
     ----------
     error, time : sequences of float
-        Measures of each point; less is better. A point that lacks one of them (``None`` or NaN) is not on the
-        front, and beats none.
+        Measures of each point. Less is better. A point without one of them (``None`` or NaN) is not on the
+        front, and beats no point.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.nda
 
 
 def _by_scene(points: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], list[Mapping[str, Any]]]:
-    """Points by mesh and exponent: only points of one mesh and exponent can be compared."""
+    """Points by mesh and exponent. Only points of one mesh and exponent can be compared."""
     found: dict[tuple[str, int], list] = {}
     for point in points:
         found.setdefault((point["settings"]["source"], point["settings"]["exponent"]), []).append(point)
@@ -132,7 +132,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
-    """The trade between error and time at a mesh and exponent, in a few sentences; see `_is_comparable`."""
+    """The trade between error and time at a mesh and exponent, in a few sentences. See `_is_comparable`."""
     settings = scene[0]["settings"]
     hardware = [point for point in scene if point["group"] != "software"]
     alike = sum(point["verdicts"]["total"] for point in hardware)
@@ -165,7 +165,7 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _is_comparable(point: Mapping[str, Any]) -> bool:
-    """Whether a design does all of the work, for Blinn's picture: as in `front.conclusion`."""
+    """Whether a design does all of the work, for Blinn's picture, as in `front.conclusion`."""
     method, model = (point["settings"][name] for name in ("method", "model"))
     return not ((method in METHODS and METHODS[method].given_values) or model in MIRROR_LOBES)
 

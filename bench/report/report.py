@@ -1,6 +1,6 @@
 """``blysk bench``: every measurement in one report, a page to read and files for other programs.
 
-The page is one file with styles, script, pictures and figures; it loads nothing from a network.
+The page is one file with styles, script, pictures and figures. It loads nothing from a network.
 """
 
 import csv
@@ -100,7 +100,7 @@ def _tables(sections: Sequence[Section]) -> Iterator[Table]:
 
 
 def _earlier(folder: Path) -> dict[str, Any] | None:
-    """``report.json`` of a folder, if this program wrote it; else ``None``."""
+    """``report.json`` of a folder if this program wrote it, else ``None``."""
     try:
         earlier = json.loads((folder / _JSON).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -109,7 +109,7 @@ def _earlier(folder: Path) -> dict[str, Any] | None:
 
 
 def check_folder(folder: Path) -> None:
-    """Check, before long work, that a report can be written into a folder; writes nothing.
+    """Check, before long work, that a report can be written into a folder. The check writes nothing.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
 
 
 def _begin(folder: str) -> None:
-    """Set up a worker: its child programs end with it, and its temporary files are in ``folder``."""
+    """Set up a worker. Its child programs end with it, and its temporary files are in ``folder``."""
     os.environ["TMPDIR"] = folder
     tempfile.tempdir = None
     if hasattr(os, "setpgrp"):
@@ -198,15 +198,15 @@ def _begin(folder: str) -> None:
 def measure_all(
     tasks: Sequence[Task], jobs: int, progress: Callable[[], object], address: str | None = None
 ) -> list[Any]:
-    """Results of tasks in their order; times are measured at the end, alone, with all models built.
+    """Results of tasks in their order. Times are measured at the end, alone, with all models built.
 
     If an interrupt ends the processes, their child programs end and their files are removed, too. A cluster
-    runs the measurements that are the same on every machine; times are always measured on this one.
+    runs the measurements that are the same on every machine. Times are always measured on this machine.
 
     Parameters
     ----------
     tasks : sequence of Task
-        Measurements; earlier results come from the cache.
+        Measurements. Earlier results come from the cache.
     jobs : int
         Number of processes.
     progress : callable
@@ -240,7 +240,7 @@ def chosen_tasks(
     quick, meshes
         As for `about`.
     names : sequence of str, optional
-        Names of the sections; by default all.
+        Names of the sections, by default all.
 
     Raises
     ------
@@ -261,7 +261,7 @@ def measured(
     progress: Callable[[], object],
     address: str | None = None,
 ) -> list[Section]:
-    """Measure the sections of `chosen_tasks`; earlier results come from the cache.
+    """Measure the sections of `chosen_tasks`. Earlier results come from the cache.
 
     Parameters
     ----------

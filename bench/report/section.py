@@ -7,18 +7,18 @@ from typing import Any, Literal
 __all__ = ["Cell", "Conclusion", "Drawing", "Grade", "Mark", "Section", "Table"]
 
 Cell = str | int | float | bool | None
-"""Value of a table's cell; ``None``: there is no such figure."""
+"""Value of a table's cell. ``None``: there is no figure."""
 
 Grade = Literal["", "good", "fair", "poor", "bad"]
-"""Colour of a table's cell; the table's note explains each."""
+"""Colour of a table's cell. The table's note explains each colour."""
 
 Mark = Literal["", "stated", "silent"]
-"""Mark of an error: ``stated`` in the documentation or flagged, or ``silent``: without any sign."""
+"""Mark of an error: ``stated`` (in the documentation, or flagged) or ``silent`` (without any sign)."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Table of figures: shown in the page, and written as CSV and JSON under its name.
+    """Table of figures. The page shows it, and it is written as CSV and JSON under its name.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Table:
     columns : sequence of str
         Headings, with the unit behind a comma: "largest error, LSB".
     rows : sequence of sequences of cells
-        Figures, not rounded: the page rounds them.
+        Figures, not rounded. The page rounds them.
     note : str
         One or more sentences on the quantity and its measurement.
     grades : sequence of sequences of grades, optional
@@ -83,7 +83,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """Conclusion of a section, at the top of the report: a sentence with its figures, and a drawing.
+    """Conclusion of a section, at the top of the report, with a sentence, its figures and a drawing.
 
     Parameters
     ----------

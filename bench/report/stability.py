@@ -1,8 +1,8 @@
-"""Stiff and extreme cases: every method in each, as a section of the report.
+"""The report's section on stiff and extreme cases, with every method in each case.
 
-A case is a scene and its spans. Every method shades each case twice: with the spans as they come, and with
-spans that `golden.frames.cut` has cut first, as `blysk render` does. The same functions grade the cases for
-the report and for the tests.
+A case is a scene and its spans. Every method shades each case twice. The first time it takes the spans as
+they come. The second time `golden.frames.cut` cuts them first, as `blysk render` does. The same functions
+grade the cases for the report and for the tests.
 """
 
 from collections.abc import Sequence
@@ -42,13 +42,13 @@ QUICK_SIMULATED = ("renormalise", "quotient")
 """Methods that the quick report simulates."""
 
 _LIMITS: dict[Grade, float] = {"good": GOOD, "fair": 4.0, "poor": 16.0}
-"""Largest error in LSB of each colour; larger errors are bad."""
+"""Largest error of each colour, in LSB. Larger errors are bad."""
 
 _MARKS: dict[Grade, Mark] = {"fair": "stated", "bad": "silent"}
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Measurements: every method in every case, and in simulation; if quick, only `QUICK_SIMULATED` there."""
+    """Measurements of every method in every case, and simulated. If quick, `QUICK_SIMULATED` is simulated."""
     simulated = QUICK_SIMULATED if quick else METHODS
     settings = [{"method": method} for method in METHODS]
     result = [Task(function, each) for function in (measure, measure_ranges) for each in settings]
@@ -143,7 +143,7 @@ def _worst(figures: Sequence[dict], way: str) -> tuple[float | None, Grade]:
 
 
 def _stream_cell(cases: Sequence[dict] | None) -> tuple[float | None, Grade]:
-    """Cell of the simulated group: the number of wrong pixels in place of LSB; each is a bad error."""
+    """Cell of the simulated group: the number of wrong pixels in place of LSB. Each is a bad error."""
     if cases is None:
         return None, ""
     if any(case["wrong"] is None for case in cases):
@@ -181,7 +181,7 @@ def _magnitude(error: float | None) -> Grade:
 
 
 def _shown(rows: Sequence[Sequence], grades: Sequence[Sequence[Grade]]) -> dict[str, Any]:
-    """Grades and marks of a table: colours by the error of each graded cell, marks by its grade."""
+    """Grades and marks of a table. Colours follow the error of a graded cell, marks its grade."""
     return {
         "grades": [
             [_magnitude(cell) if grade else "" for cell, grade in zip(row, of, strict=True)]

@@ -46,7 +46,7 @@ GROUPS = {
 """Groups of cases by number: the quantity that is extreme."""
 
 STREAM_GROUP = 8
-"""The group that is simulated."""
+"""The simulated group."""
 
 EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
 
@@ -76,10 +76,10 @@ class Case:
     scene : Scene
         Size, material, lights and viewer.
     raster : Raster
-        The spans; they cover every pixel of their reference picture once.
+        The spans. They cover every pixel of their reference picture once.
     codes : pair of int arrays, shape (spans, 3), optional
-        Codes of the end normals for the pipeline, if they are not of unit length; the raster's normals are
-        then the values of these codes.
+        Codes of the end normals for the pipeline, if the normals are not of unit length. The raster's normals
+        are then the values of these codes.
     """
 
     group: int
@@ -107,7 +107,7 @@ def arcs(
     degrees : array, shape (spans,)
         Angle between the ends.
     at : array, shape (spans,)
-        Place in the span at which it is nearest to the vector, 0 to 1; values outside lie before or after it.
+        Place in the span that is nearest to the vector, 0 to 1. Other values lie before or after the span.
     off : array, shape (spans,)
         Angle, in degrees, between the vector and the span at that place.
 
@@ -290,7 +290,7 @@ def _codes(vectors: np.ndarray) -> np.ndarray:
 
 
 def _mended_mesh() -> Case:
-    """Case of a mesh that `load_mesh` repaired: its file has normals that are NaN, 0 and too long."""
+    """Case of a mesh that `load_mesh` repaired. Its file has normals that are NaN, 0 and too long."""
     text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn nan 0 1\nvn 0 0 0\nvn 0.3 0 3\nvn 0 0.2 1\n"
     with TemporaryDirectory() as folder:
         path = Path(folder, "broken.obj")

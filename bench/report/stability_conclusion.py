@@ -1,4 +1,4 @@
-"""Conclusion of stiff and extreme cases: each method's worst error inside its range, and the range's end."""
+"""Conclusion of stiff and extreme cases: each method's worst error in its range, and the range's end."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -22,7 +22,7 @@ def _cases(groups: Mapping[str, Sequence[dict]]) -> Iterator[dict]:
 
 
 def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str]:
-    """Largest error, with its case, in spans without a flag inside the range, whether cut or served whole."""
+    """Largest error, with its case, in spans without a flag inside the range, cut or served whole."""
     errors = [
         *((of["prepared"]["silent"], of["case"]) for of in _cases(groups) if of["prepared"]),
         *((of["given"]["safe"], of["case"]) for of in _cases(groups) if of["inside"]),

@@ -56,10 +56,10 @@ SWEEP = tuple(np.geomspace(1, 180, 40).round(2).tolist())
 """Angles of the spans of `measure_ranges`, in degrees."""
 
 FACTORS = (1.0, 1.2, 2.0)
-"""Multiples of the widest span at which a method is tried."""
+"""Multiples of the widest span, for the angles of a method's cases."""
 
 GOOD = 1.0
-"""Largest error in LSB that is good."""
+"""Largest good error, in LSB."""
 
 LENGTH_TOLERANCE = 1 / 256
 """Largest distance of a normal's length from 1, by the methods' documentation."""
@@ -74,7 +74,7 @@ _COLOR_ERROR = 3 * Intensity.COLOR_FORMAT.step / 2
 
 
 class _Shaded(NamedTuple):
-    """Largest error of a channel, stated error (both in LSB) and span of each shown pixel; flags of spans."""
+    """Largest error of a channel, stated error (in LSB) and span of each shown pixel, and spans' flags."""
 
     error: np.ndarray
     stated: np.ndarray
@@ -207,7 +207,7 @@ def _angles(raster: Raster) -> np.ndarray:
 
 
 def _line_angles(spans: Spans) -> np.ndarray:
-    """Angle in degrees of a span with ends of length 1 whose chord is as near to 0 as each span's line."""
+    """Angle of a span with ends of length 1 and a chord as near to 0 as the span's line, in degrees."""
     left, right = (
         codes / Renormaliser.VECTOR_FORMAT.max_code for codes in (spans.normal_left, spans.normal_right)
     )
@@ -219,7 +219,7 @@ def _line_angles(spans: Spans) -> np.ndarray:
 
 
 def _has_unit_length(design: ShadingPipeline, codes: Sequence[np.ndarray]) -> np.ndarray:
-    """Whether both ends of spans have length 1 within `LENGTH_TOLERANCE`; for a line, the longer end."""
+    """Whether both ends of spans, or the longer end of a line, have length 1 within `LENGTH_TOLERANCE`."""
     lengths = np.linalg.norm(np.stack(codes) / ONE, axis=2)
     if design.interpolator.curve_is_exact:
         lengths = lengths.max(axis=0, keepdims=True)
@@ -227,14 +227,14 @@ def _has_unit_length(design: ShadingPipeline, codes: Sequence[np.ndarray]) -> np
 
 
 def _length_excess(codes: Sequence[np.ndarray]) -> float:
-    """Largest distance of a normal's length from 1; 0 if rounding explains it."""
+    """Largest distance of a normal's length from 1. 0 if rounding explains it."""
     lengths = np.linalg.norm(np.concatenate(codes) / ONE, axis=1)
     excess = float(np.abs(lengths - 1).max(initial=0))
     return excess if excess > 2 * _STEP else 0.0
 
 
 def grade_of(grades: Sequence[Grade]) -> Grade:
-    """The worst of some grades; the empty grade if there are none."""
+    """The worst of some grades. Empty if there are no grades."""
     order: tuple[Grade, ...] = ("bad", "fair", "good", "")
     return min(grades, key=order.index, default="")
 
@@ -268,14 +268,14 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
     are both right. An error is
 
     - good up to `GOOD`;
-    - fair if it is larger, but the pipeline flags the span, or the method serves the span and states such an
-      error: the error is at most that of its own curve in float64 plus the error bounds of its units, which
-      count times the exponent in a highlight;
-    - bad otherwise: nothing tells of it.
+    - fair if it is larger, but the pipeline flags the span, or the method serves the span and states the
+      error. A stated error is at most the error of the method's own curve in float64 plus the error bounds of
+      its units. In a highlight these count times the exponent;
+    - bad otherwise, because nothing tells of it.
 
-    A method serves a span that `cut_spans` leaves whole; a method that takes two normals and has no span
+    A method serves a span that `cut_spans` leaves whole. A method that takes two normals and has no span
     limit serves spans up to its `Interpolator.widest_span`. Normals have length 1 within `LENGTH_TOLERANCE`.
-    A method that takes vectors is given spans of two pixels as two of one.
+    A method that takes vectors gets a span of two pixels as two spans of one.
 
     Returns
     -------
@@ -341,8 +341,8 @@ def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
 def widest_span(method: str, exponent: int) -> float:
     """Widest span in degrees that a method serves.
 
-    For ``chord-local`` and ``quotient`` it is the widest angle at which no span of a sample is cut; else the
-    widest span that is not cut.
+    For ``chord-local`` and ``quotient`` it is the widest angle at which no span of a sample is cut. For other
+    methods it is the widest span that is not cut.
     """
     design = preset(method, model_of(method))
     if design.interpolator.brings_ends:

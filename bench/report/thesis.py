@@ -40,7 +40,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Speed:
-    """A method of [T] that is said to be faster than classical normalisation.
+    """A method that [T] claims to be faster than classical normalisation.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ class Speed:
     printed : str
         The claimed ratio of speeds.
     ways, baselines : tuple of str
-        Some of `WAYS`: each way is compared with each baseline.
+        Some of `WAYS`. Each way is compared with each baseline.
     units : tuple of str
-        Some of `UNITS`: the same in hardware.
+        Some of `UNITS`, for the same comparison in hardware.
     in_pixels : bool
         Whether the ratio depends on the length of spans.
     """
@@ -120,21 +120,22 @@ UNITS = {
     "recurrence interpolator": ("recurrence_interpolator", "recurrence"),
 }
 """Units of the claims: unit and variant in the table of ``blysk blocks``. An interpolator includes its setup,
-and gives N·L and N·H; the others are only the unit of a pixel."""
+and gives N·L and N·H. The other entries are only the unit of a pixel.
+"""
 
 _SHADINGS = ("gouraud", "phong")
 
 
 @cache
 def counted(way: str, pixels: int) -> dict[str, float]:
-    """Operations of a way's result by kind (see `Counted`), counted while it runs, its setup included."""
+    """Operations of a way's result by kind (see `Counted`), counted during the run, setup included."""
     counts: Counter[str] = Counter()
     found = sum(1 for _ in WAYS[way](*(Counted.of(x, counts) for x in random_operands()), pixels))
     return {kind: count / (found * SPANS) for kind, count in counts.items()}
 
 
 def price(printed: float, own: dict[str, float], other: dict[str, float]) -> float | None:
-    """Cost of a dear operation, in cheap ones, from which on counted operations give the printed ratio."""
+    """Cost of a dear operation, in cheap operations, at which counted operations give the printed ratio."""
     dear = [sum(counts.get(kind, 0.0) for kind in DEAR) for counts in (own, other)]
     cheap = [sum(counts.values()) - of for counts, of in zip((own, other), dear, strict=True)]
     gain = dear[1] - printed * dear[0]
@@ -155,7 +156,7 @@ def software(way: str, baseline: str, pixels: int, printed: float, repeats: int)
     way, baseline : str
         Two of `WAYS`.
     pixels : int
-        Pixels of each span; for a bisection a power of two, one more than its results.
+        Pixels of each span. For a bisection a power of two, one more than its results.
     printed : float
         Claimed ratio of speeds.
     repeats : int
@@ -220,7 +221,7 @@ def hardware(unit: str, baseline: str) -> dict[str, float | None]:
     Returns
     -------
     dict
-        Ratios of ``interval``, ``multipliers``, ``cells`` and ``register_bits``; ``None`` where the unit has
+        Ratios of ``interval``, ``multipliers``, ``cells`` and ``register_bits``. ``None`` if the unit has
         none.
     """
     own, other = _parts(unit), _parts(baseline)
@@ -238,7 +239,7 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
     width, height : int
         Size of the picture.
     repeats : int
-        Runs of each part, in turn; the fastest count.
+        Runs of each part, in turn. The fastest counts.
 
     Returns
     -------
@@ -259,8 +260,8 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
 def square_errors(method: str, triangles: int, width: int, height: int) -> dict[str, Any]:
     """MNSE of a frame as published in [T] 4.1, and its well-posed form NMSE.
 
-    The frame is by the bit-accurate model with `model_of` the method; the reference is the exact
-    frame, Phong shading with Blinn's model. Only pixels of the surface count.
+    The frame is by the bit-accurate model with `model_of` the method. The reference is the exact frame, Phong
+    shading with Blinn's model. Only pixels of the surface count.
 
     Parameters
     ----------
@@ -409,7 +410,7 @@ def _steps(quick: bool) -> list[Claim]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """All claims; if quick, of two lengths of spans, small frames and the units of a pixel."""
+    """All claims. If quick, for two lengths of spans, small frames and the units of a pixel."""
     return [claim for table in _DOCUMENT.tables for claim in table.claims(quick)]
 
 

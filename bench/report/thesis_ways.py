@@ -12,7 +12,7 @@ __all__ = ["DIVIDED", "SCALED", "SPANS", "WAYS", "WIDEST", "Way", "random_operan
 
 
 SPANS = 4096
-"""Spans that the ways in software compute at once: few, so that their arrays stay in a processor's cache."""
+"""Spans that the ways in software compute at once. They are few, so that their arrays stay in a cache."""
 
 WIDEST = 45.0
 
@@ -32,7 +32,7 @@ def _scaled(vector: np.ndarray) -> np.ndarray:
 
 
 def _polynomial(coefficients: Sequence[float], x: np.ndarray) -> np.ndarray:
-    """Horner's rule; coefficients in ascending order."""
+    """Horner's rule for coefficients in ascending order."""
     *rest, total = coefficients
     for coefficient in reversed(rest):
         total = total * x + coefficient
@@ -75,7 +75,7 @@ def _middles_by_factor(left, right, vectors, pixels):
 
 
 def _halves(half, left, right, pixels):
-    """Normals between two others by bisection, from left to right; ``half(left, right, level)`` halves."""
+    """Normals between two normals by bisection, from left to right. ``half(left, right, level)`` halves."""
     levels = pixels.bit_length() - 1
 
     def between(left, right, level):
@@ -100,7 +100,7 @@ def _bisection(left, right, vectors, pixels):
 
 
 def _bisection_by_levels(left, right, vectors, pixels):
-    """`_bisection` with one factor for all arcs of a level: in the next, ``z`` becomes ``sqrt(2 + z)``."""
+    """`_bisection` with one factor for all arcs of a level. From level to level z becomes ``sqrt(2 + z)``."""
     z = 2 * dot(left, right)
     factors = []
     for _ in range(pixels.bit_length() - 1):
@@ -166,7 +166,7 @@ WAYS: dict[str, Way] = {
     "a cosine of each angle": _cosines_by_angles,
     "recurrence": _recurrence,
 }
-"""Ways to the normals, or to N·L and N·H, of a span's pixels: functions of both ends, (L, H) and the pixels.
+"""Ways to the normals, or to N·L and N·H, of a span's pixels, as functions of both ends, (L, H) and pixels.
 
 Vectors are arrays of shape (3, spans) or (3, 1). A way yields an array for each pixel in turn: normals, shape
 (3, spans), or N·L and N·H, shape (2, spans).

@@ -1,4 +1,4 @@
-"""The report's section on single units: the table of ``blysk blocks``, a measurement for each line."""
+"""The report's section on single units: the table of ``blysk blocks``, with a measurement for each line."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +16,7 @@ _QUICK = (
     *("dot_product", "middle_normal", "gpq", "difference_accumulator", "quadratic_evaluator"),
     *("diffuse", "specular", "power", "quotient", "chord", "intensity"),
 )
-"""Units of a quick report, which take least time."""
+"""Units of a quick report. They take the least time."""
 
 _COLUMNS = (
     *("unit", "variant", "source", "as published", "unit of the errors", "model error", "arithmetic error"),
@@ -33,7 +33,7 @@ def measure(unit: str, variant: str, samples: int) -> dict[str, Any]:
     unit, variant : str
         Names.
     samples : int
-        Number of random operands, about.
+        Approximate number of random operands.
     """
     (row,) = rows([entry_of(unit, variant)], samples)
     return row.as_dict()

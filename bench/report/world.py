@@ -1,7 +1,7 @@
 """The core of this project beside other cores: rate, device, resources, light per pixel, verification.
 
-The figures of other cores are those of their sources (docs/theory/references.md#other-hardware); none was
-measured here. A figure that we did not find there is "not found in its source".
+The figures of other cores are from their sources (docs/theory/references.md#other-hardware). None was
+measured here. A figure that we did not find in its source is "not found in its source".
 """
 
 from blysk.bench.report.claims import Claim, ClaimTable, Document
@@ -75,7 +75,7 @@ OTHERS: dict[str, dict[str, str]] = {
         "PICA200": _NOT_STATED,
     },
 }
-"""What the sources of other cores print, by quantity and core."""
+"""Printed figures of other cores, by quantity and core."""
 
 _EXACT = "Phong shading with exact {} highlights at every pixel, "
 
@@ -95,7 +95,7 @@ def own(method: str, model: str, date: str) -> dict[str, str]:
     method, model : str
         The pipeline.
     date : str
-        Date of its figures; empty: there are none.
+        Date of its figures. Empty: there are no figures.
     """
     light = _OWN.get((method, model), "")
     verified = "bit-accurate model within a stated bound of float64; RTL equal to it bit for bit, simulated"
@@ -114,7 +114,7 @@ def own(method: str, model: str, date: str) -> dict[str, str]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """What the sources of other cores state, and the same of this project; the same if quick."""
+    """Statements of the sources of other cores, and of this project, also if quick."""
     found = []
     for quantity, printed in OTHERS.items():
         found += [Claim(f"{CORES[key]} [{key}]", "", quantity, printed=text) for key, text in printed.items()]
