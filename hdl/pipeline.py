@@ -16,6 +16,7 @@ from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit, kind_of
 from blysk.hdl.methods.registry import unit_of
@@ -221,6 +222,8 @@ class ShadingPipelineUnit(wiring.Component):
             self._slope = kind.slope_unit(p.specular)
         if kind.memory:
             self._tables = kind.memory(p.specular, p.lights)
+        # In lockstep all lights take as long as a light that fades.
+        waiting = range(p.lights) if p.factors and not compact else p.factors
         # In the compact style a colour takes a cycle a channel at least.
         interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
         return [
@@ -231,8 +234,7 @@ class ShadingPipelineUnit(wiring.Component):
                 exponent=exponent,
                 shares_slope=self._slope is not None or self._tables is not None,
                 gated=p.gate,
-                # In lockstep all take as long as one that fades.
-                fades=index in p.factors or (None if compact or not p.factors else False),
+                factor=FactorUnit(has_factor=index in p.factors) if index in waiting else None,
             )
             for index in range(p.lights)
         ]

@@ -124,12 +124,7 @@ def _presets(scene: Scene, up: Any) -> list[Scene]:
     )
     # A light may lie along the upright, which turns into itself.
     quarter = Rotation.from_rotvec(np.pi / 2 * normalise(up))
-    lights = tuple(
-        replace(light, direction=tuple(quarter.apply(light.direction).tolist()))
-        if light.position is None
-        else light
-        for light in scene.lights
-    )
+    lights = tuple(light.turned(quarter.apply) for light in scene.lights)
     return [
         replace(scene, material=material, lights=light)
         for light in (scene.lights, lights)

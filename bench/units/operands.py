@@ -209,8 +209,7 @@ def exact_middle(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def light_constants(unit: Component, direction: np.ndarray, halfway: np.ndarray) -> np.ndarray:
     """Constants of a unit, with the codes of L and H of each light."""
-    vectors = getattr(unit, "light_vectors", unit.constants)
-    constants = np.zeros(len(direction), dtype_of(vectors.shape().elem_shape))
+    constants = np.zeros(len(direction), dtype_of(unit.constants.shape().elem_shape))
     constants["direction"], constants["halfway"] = direction, halfway
     return constants
 

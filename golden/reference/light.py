@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -200,6 +200,41 @@ class Light:
             result = result * share**2 * (3 - 2 * share)
         found: np.ndarray | np.float64 = result
         return found
+
+    @property
+    def is_local(self) -> bool:
+        """Whether L differs from point to point."""
+        return self.position is not None
+
+    def turned(self, turn: Callable[[Triple], np.ndarray]) -> "Light":
+        """A directional light with its direction turned; a point light unchanged.
+
+        Parameters
+        ----------
+        turn : callable
+            Gives the turned vector of a vector.
+        """
+        if self.direction is None:
+            return self
+        return replace(self, direction=tuple(turn(self.direction).tolist()))
+
+    def scaled(self, shift: int) -> "Light":
+        """The light in a mesh whose unit has been multiplied by ``2**shift``.
+
+        A position is multiplied by that, too. ``k_1 d`` and ``k_2 d^2`` stay.
+
+        Raises
+        ------
+        OverflowError
+            If the position is too far away.
+        """
+        if self.position is None:
+            return self
+        with np.errstate(over="ignore", under="ignore"):
+            attenuation = np.ldexp(self.attenuation, [0, -shift, -2 * shift])
+        limited = tuple(np.minimum(attenuation, 1e300).tolist()) if attenuation.any() else (1.0, 0.0, 0.0)
+        x, y, z = (math.ldexp(place, shift) for place in self.position)
+        return replace(self, position=(x, y, z), attenuation=limited)
 
     @property
     def is_on(self) -> bool:

@@ -194,7 +194,7 @@ def distant_cosine(light: Light, viewer: ArrayLike | None) -> float | None:
     viewer : array, shape (3,), or None
         Unit vector V to a distant viewer.
     """
-    if light.position is not None or viewer is None:
+    if light.is_local or viewer is None:
         return None
     return float(np.clip(halfway_vector(np.asarray(light.direction), viewer) @ np.asarray(viewer), 0, 1))
 

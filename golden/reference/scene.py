@@ -104,7 +104,7 @@ class Scene:
     @property
     def local(self) -> bool:
         """Whether L or H differs from point to point: there is a point light or a near viewer."""
-        return self.viewer == "near" or any(light.position is not None for light in self.lights)
+        return self.viewer == "near" or any(light.is_local for light in self.lights)
 
     @property
     def lit(self) -> "Scene":

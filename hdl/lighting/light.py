@@ -129,9 +129,9 @@ class LightUnit(wiring.Component):
         `Power` needs neither.
     gated : bool
         Whether there is a highlight gate.
-    fades : bool or None
-        Whether the light has a factor. ``False``: it has none, but the latency of one that has. ``None``:
-        it has neither.
+    factor : FactorUnit or None
+        Unit that multiplies the specular term by the factor of a light that fades. A unit without a factor
+        takes its time alone. ``None``: the light has neither.
 
     Members
     -------
@@ -157,15 +157,15 @@ class LightUnit(wiring.Component):
         exponent: int | None = None,
         shares_slope: bool = False,
         gated: bool = False,
-        fades: bool | None = None,
+        factor: FactorUnit | None = None,
     ):
         self.model = p = model or Specular()
         self._specular = kind_of(p).unit(
             p, initiation_interval=initiation_interval, exponent=exponent, shares_slope=shares_slope
         )
         self.exponent = exponent
-        self._factor = None if fades is None else FactorUnit(has_factor=fades)
-        self.fades = bool(fades)
+        self._factor = factor
+        self.fades = factor is not None and factor.has_factor
         self.latency = self._specular.latency + (self._factor.latency if self._factor else 0)
         self.initiation_interval = self._specular.initiation_interval
         self.skips_dark = self.initiation_interval > 1

@@ -248,7 +248,7 @@ def _design(settings: Settings) -> ShadingPipeline:
     source, lights = settings.source, settings.lights
     viewer = source.viewer if isinstance(source, Scene) else settings["viewer"]
     made, hardware = design_of(settings, max(1, len(lights))), settings["geometry"] == "hardware"
-    local = viewer == "near" or any(light.position is not None for light in lights)
+    local = viewer == "near" or any(light.is_local for light in lights)
     if local and (hardware or not made.interpolator.serves_local):
         option, remedy = ("geometry", "use software") if hardware else ("method", "use method chord-local")
         raise settings.refuse(option, "point lights and a near viewer need the values of a span", remedy)

@@ -13,7 +13,7 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.light import Triple
-from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.scene import Scene
 from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
 from blysk.sim.api.settings import Settings, read_settings
@@ -159,7 +159,7 @@ def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, li
         width=width,
         height=height,
         material=_materials(loaded, settings),
-        lights=tuple(_scaled(light, shift) for light in settings.lights),
+        lights=tuple(light.scaled(shift) for light in settings.lights),
         **{name: settings[name] for name in ("viewer", "back_faces", "ambient_light", "background")},
     )
     return made, cameras
@@ -169,17 +169,6 @@ def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
     """The file's materials. Coefficients from options replace those of the file."""
     default = Material(*(settings[name] for name in COEFFICIENTS))
     return surfaces(loaded.materials, default, settings.given.intersection(COEFFICIENTS))
-
-
-def _scaled(light: Light, shift: int) -> Light:
-    """A light in a mesh whose unit has been multiplied by ``2**shift``."""
-    if light.position is None:
-        return light
-    # Of a distance that is 2^shift times as much: k_1 d and k_2 d^2 stay.
-    with np.errstate(over="ignore", under="ignore"):
-        attenuation = np.ldexp(light.attenuation, [0, -shift, -2 * shift])
-    attenuation = tuple(np.minimum(attenuation, 1e300).tolist()) if attenuation.any() else (1.0, 0.0, 0.0)
-    return replace(light, position=_shifted(light.position, shift), attenuation=attenuation)
 
 
 def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -> list[Camera]:

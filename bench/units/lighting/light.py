@@ -24,6 +24,7 @@ from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.unit_vector import ONE, quantise
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS
+from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.light import LightUnit
 
 __all__ = ["RECORD"]
@@ -108,6 +109,10 @@ _CHORD = Diffuse(SQ(2, 25))
 """Diffuse model with the format of N·L in methods that give 1 - N·H."""
 
 
+def _with_factor(interval, fades):
+    return LightUnit(initiation_interval=interval, gated=True, factor=FactorUnit(has_factor=fades))
+
+
 def _variants():
     yield "cosquad", Variant(LightUnit, _measure, "n 1 to 1000, N.V > 0")
     for gated in (False, True):
@@ -124,7 +129,7 @@ def _variants():
         variant = f"exact power of a chord, interval {interval}" + ", gated" * gated
         yield variant, Variant(unit, long=not gated)
     for interval, fades in ((1, True), (3, True), (1, False)):
-        unit = partial(LightUnit, initiation_interval=interval, gated=True, fades=fades)
+        unit = partial(_with_factor, interval, fades)
         yield f"interval {interval}, {'fades' if fades else 'waits'}", Variant(unit, long=interval == 1)
     for name, p in (("cosquad", Specular()), ("exact power", Power())):
         yield f"{name}, exponent 77", Variant(partial(LightUnit, p, exponent=77), long=True)
