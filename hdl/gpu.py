@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.gpu import Gpu
 from blysk.golden.video.serialiser import LANES
+from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.triangles import counters_shape
 from blysk.hdl.video.display import DisplayUnit
 from blysk.hdl.video.draw_unit import STATUS as DRAWN
@@ -63,11 +64,11 @@ class GpuUnit(wiring.Component):
         drawn, taken = draw.pixels, display.pixels
         m.d.comb += [
             draw.buttons.eq(pressed),
-            *(taken.payload[name].eq(drawn.payload[name]) for name in "xyrgb"),
+            *copy_fields(taken.payload, drawn.payload, "xyrgb"),
             taken.valid.eq(drawn.valid),
             drawn.ready.eq(taken.ready),
             self.pairs.eq(display.pairs),
-            *(self.status[name].eq(draw.status[name]) for name in DRAWN),
+            *copy_fields(self.status, draw.status, DRAWN),
             self.status.late_bands.eq(display.status.late_bands),
             self.status.frames_shown.eq(display.status.frames),
         ]

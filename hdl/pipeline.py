@@ -14,6 +14,7 @@ from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.factor import FactorUnit
@@ -286,7 +287,7 @@ class ShadingPipelineUnit(wiring.Component):
         p, assembler = self.model, self._assembler
         layout = coordinates_shape(p.x_bits, p.y_bits, p.length_bits)
         source = stream.Signature(layout).create(path=("source",))
-        m.d.comb += [source.payload[name].eq(self.i.payload[name]) for name in layout.members]
+        m.d.comb += copy_fields(source.payload, self.i.payload, layout.members)
         connect_late_fifo(m, "coordinates", source, assembler.coordinates, self._waiting_spans)
         return source.valid, source.ready
 
@@ -376,9 +377,9 @@ class ShadingPipelineUnit(wiring.Component):
         m.submodules.intensity = intensity = self._intensity
         sinks = [(interpolator.i.valid, interpolator.i.ready)]
         words = interpolator.i.payload
-        m.d.comb += [Value.cast(words[name]).eq(Value.cast(span[name])) for name in words.shape().members]
+        m.d.comb += copy_fields(words, span)
         for vectors, light in zip(interpolator.light_vectors, frame.constants.lights, strict=False):
-            m.d.comb += [vectors[name].eq(light[name]) for name in ("direction", "halfway")]
+            m.d.comb += copy_fields(vectors, light, ("direction", "halfway"))
         if interpolator.exponent is not None:
             exponent = frame.constants.exponent if p.build.exponent is None else p.build.exponent
             m.d.comb += interpolator.exponent.eq(exponent)
@@ -397,8 +398,8 @@ class ShadingPipelineUnit(wiring.Component):
             m.submodules[f"light_{index}"] = light
             constants = frame.constants.lights[index]
             m.d.comb += [
-                intensity.constants.diffuse[index].eq(constants.diffuse),
-                intensity.constants.specular[index].eq(constants.specular),
+                copy(intensity.constants.diffuse[index], constants.diffuse),
+                copy(intensity.constants.specular[index], constants.specular),
             ]
             words, terms = operands.payload[index], light.o.payload
             if p.specular is None:
@@ -416,11 +417,11 @@ class ShadingPipelineUnit(wiring.Component):
             if light.fades:
                 m.d.comb += light.i.payload.factor.eq(words.factor)
             if self._slope is not None:
-                m.d.comb += light.constants.eq(self._slope.slope)
+                m.d.comb += copy(light.constants, self._slope.slope)
             elif "constants" in light.signature.members:
                 word = frame.constants[self._kind.constant]
                 m.d.comb += Value.cast(light.constants).eq(word)
-        m.d.comb += intensity.constants.ambient.eq(frame.constants.ambient)
+        m.d.comb += copy(intensity.constants.ambient, frame.constants.ambient)
         connect(m, intensity.o, self._assembler.colors)
         return sinks
 
@@ -475,13 +476,13 @@ class ShadingPipelineUnit(wiring.Component):
         pixel, last = Signal(p.length_bits), Signal()
         moves = operands.valid & operands.ready
         m.d.comb += [
-            *(waiting.payload[name].eq(span[name]) for name in waiting.payload.shape().members),
+            *copy_fields(waiting.payload, span),
             lengths.w_data.eq(span.length),
             decisions.w_data.eq(gate.o.payload),
             decisions.w_en.eq(gate.o.valid),
             gate.o.ready.eq(decisions.w_rdy),
             # A pixel waits for the decision of its span; the length is there before that.
-            Value.cast(operands.payload).eq(Value.cast(source.payload)),
+            copy(operands.payload, source.payload),
             operands.valid.eq(source.valid & decisions.r_rdy),
             source.ready.eq(operands.ready & decisions.r_rdy),
             last.eq(pixel == lengths.r_data - 1),

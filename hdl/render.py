@@ -13,6 +13,7 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect, moving
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
 from blysk.hdl.geometry.depth_tester import DepthMemory, DepthTesterUnit, drawn_pixel_shape
@@ -156,7 +157,7 @@ class RendererUnit(wiring.Component):
         m = Module()
         geometry, pipeline, depth = self.geometry, self.pipeline, self.depth
         m.submodules.geometry, m.submodules.pipeline, m.submodules.depth = geometry, pipeline, depth
-        m.d.comb += (geometry.constants[name].eq(self.constants[name]) for name in frame_shape().members)
+        m.d.comb += copy_fields(geometry.constants, self.constants, frame_shape().members)
         connect(m, wiring.flipped(self.i), geometry.i)
         connect(m, wiring.flipped(self.write), pipeline.write)
         connect(m, depth.o, wiring.flipped(self.o))
@@ -175,7 +176,7 @@ class RendererUnit(wiring.Component):
         source = geometry.o
         connect_shading_span(m, source.payload, made.payload.span)
         m.d.comb += [
-            *(made.payload[name].eq(source.payload[name]) for name in _DEEP),
+            *copy_fields(made.payload, source.payload, _DEEP),
             made.valid.eq(source.valid & (room := Signal(name="room"))),
             source.ready.eq(made.ready & room),
         ]
@@ -212,24 +213,24 @@ class RendererUnit(wiring.Component):
         kept = stream.Signature(ready.payload.shape()).create(path=("kept",))
         shaded = self._components(m, kept)
         m.d.comb += [
-            kept.payload.eq(ready.payload),
+            copy(kept.payload, ready.payload),
             given.eq(ready.valid & known),
             dropped.eq(given & drops),
             kept.valid.eq(given & ~drops),
             ready.ready.eq(known & (drops | kept.ready)),
-            pipeline.i.payload.eq(shaded.payload.span),
-            *(entering.payload[name].eq(shaded.payload[name]) for name in _DEEP),
+            copy(pipeline.i.payload, shaded.payload.span),
+            *copy_fields(entering.payload, shaded.payload, _DEEP),
             entering.valid.eq(shaded.valid & pipeline.i.ready),
             pipeline.i.valid.eq(shaded.valid & entering.ready),
             shaded.ready.eq(pipeline.i.ready & entering.ready),
-            depth.i.payload.pixel.eq(pixel.payload),
-            *(depth.i.payload[name].eq(waiting.payload[name]) for name in _DEEP),
+            copy(depth.i.payload.pixel, pixel.payload),
+            *copy_fields(depth.i.payload, waiting.payload, _DEEP),
             depth.i.valid.eq(pixel.valid & there),
             pixel.ready.eq(depth.i.ready & there),
             waiting.ready.eq(taken),
-            *(self.status[name].eq(geometry.status[name]) for name in COUNTERS),
+            *copy_fields(self.status, geometry.status, COUNTERS),
             self.status.spans.eq(count),
-            *(self.status[name].eq(depth.status[name]) for name in ("pixels", "hidden")),
+            *copy_fields(self.status, depth.status, ("pixels", "hidden")),
             self.status.out_of_range_spans.eq(pipeline.status.out_of_range_spans),
         ]
         return m
@@ -278,7 +279,7 @@ class RendererUnit(wiring.Component):
         ):
             taken, given = of_source(source.payload), of_sink(sink.payload)
             m.d.comb += [
-                *(Value.cast(given[name]).eq(Value.cast(taken[name])) for name in given),
+                *copy_fields(given, taken),
                 sink.valid.eq(source.valid),
                 source.ready.eq(sink.ready),
             ]
@@ -305,7 +306,7 @@ class RendererUnit(wiring.Component):
         answers = stream.Signature(1).create(path=("answers",))
         connect_late_fifo(m, "answers", coarse.o, answers, WAITING_SPANS)
         m.d.comb += [
-            *(place[name].eq(span.payload[name]) for name in ("x", "y", "length", "depth", "depth_step")),
+            *copy_fields(place, span.payload, ("x", "y", "length", "depth", "depth_step")),
             place.picture.eq(number ^ turns),
             coarse.i.valid.eq(span.valid & taken),
             room.eq(coarse.i.ready),

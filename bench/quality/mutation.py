@@ -23,6 +23,7 @@ from blysk.bench.quality.equivalence import yosys
 from blysk.bench.tools.tool_runner import ToolError
 from blysk.bench.units.record import Record
 from blysk.bench.units.registry import RECORDS
+from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.triangles import COUNTER_BITS
 from blysk.sim.engines import cxxrtl
 from blysk.sim.engines.compilers import find_compilers
@@ -103,14 +104,14 @@ class Wrapped(Component):
             if not member.is_port:
                 source, sink = (inner, outer) if name == "o" else (outer, inner)
                 m.d.comb += [
-                    Value.cast(sink.payload).eq(Value.cast(source.payload)),
+                    copy(sink.payload, source.payload),
                     sink.valid.eq(source.valid),
                     source.ready.eq(sink.ready),
                 ]
             elif member.flow is In:
-                m.d.comb += Value.cast(inner).eq(Value.cast(outer))
+                m.d.comb += copy(inner, outer)
             elif self.signature.members[name] == member:
-                m.d.comb += Value.cast(outer).eq(Value.cast(inner))
+                m.d.comb += copy(outer, inner)
         return m
 
 

@@ -13,6 +13,7 @@ from blysk.bench.report.stability_cases import HALFWAY, STREAM_GROUP, arcs, sing
 from blysk.bench.report.stability_errors import spans_of
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.presets import preset
+from blysk.hdl.core.views import copy
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.engine import SimulationError
@@ -50,7 +51,7 @@ class _Interrupted(wiring.Component):
                 m.d.comb += written.eq(done)
             own = Array(words)[index]
             m.d.comb += [
-                Value.cast(inner.payload).eq(Value.cast(outer.payload)),
+                copy(inner.payload, outer.payload),
                 inner.valid.eq(begun & outer.valid),
                 outer.ready.eq(begun & inner.ready),
             ]
@@ -59,10 +60,10 @@ class _Interrupted(wiring.Component):
                 with m.If(inner.valid & inner.ready):
                     m.d.sync += index.eq(index + 1)
         m.d.comb += [
-            Value.cast(self.o.payload).eq(Value.cast(self._unit.o.payload)),
+            copy(self.o.payload, self._unit.o.payload),
             self.o.valid.eq(begun & self._unit.o.valid),
             self._unit.o.ready.eq(~begun | self.o.ready),
-            Value.cast(self.status).eq(Value.cast(self._unit.status)),
+            copy(self.status, self._unit.status),
         ]
         return m
 

@@ -12,6 +12,7 @@ from blysk.hdl.bus.framing import FramingUnit
 from blysk.hdl.bus.registers import RegistersUnit
 from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.bus.wishbone import Wishbone, WishboneUnit
+from blysk.hdl.core.views import copy_fields
 from blysk.hdl.port_descriptions import COUNTER_TEXTS
 
 __all__ = ["BUSES", "PORT_DESCRIPTIONS", "AxiStream", "BusUnit", "core_of"]
@@ -131,14 +132,9 @@ class BusUnit(wiring.Component):
         wiring.connect(m, front.i, registers.i)
         wiring.connect(m, registers.o, front.o)
         wiring.connect(m, wiring.flipped(getattr(self, self._member)), front.bus)
-        m.d.comb += [
-            registers.constants[name].eq(framing.status[name]) for name in registers.constants.shape().members
-        ]
+        m.d.comb += copy_fields(registers.constants, framing.status)
         if self.map.picture:
-            m.d.comb += [
-                framing.constants[name].eq(registers.picture[name])
-                for name in framing.constants.shape().members
-            ]
+            m.d.comb += copy_fields(framing.constants, registers.picture)
         if self.map.constants:
             # No frame is inside, so that a write is accepted at once.
             m.d.comb += [

@@ -10,6 +10,7 @@ from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.bus.byte_layout import bytes_of, fields_of, layout_of, misfits
 from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.triangles import COUNTER_BITS, count_events
 
 __all__ = ["FramingUnit", "given_shape", "made_shape"]
@@ -126,7 +127,7 @@ class FramingUnit(wiring.Component):
         m.d.sync += misfit.eq(accept & misfits(self.model.given, word))
         count_events(m, self.status, frames=done, misfits=misfit)
         m.d.comb += [
-            *(self.status[name].eq(core.status[name]) for name in core.status.shape().members),
+            *copy_fields(self.status, core.status, core.status.shape().members),
             self.status.busy.eq(active),
         ]
         return m
@@ -150,7 +151,7 @@ class FramingUnit(wiring.Component):
         with m.If(advance):
             m.d.sync += valid.eq(leaves)
             with m.If(made.valid):
-                m.d.sync += [held.eq(made.payload), waiting.eq(1)]
+                m.d.sync += [copy(held, made.payload), waiting.eq(1)]
             with m.Elif(empty):
                 m.d.sync += waiting.eq(0)
         with m.If(leaves):

@@ -14,6 +14,7 @@ from blysk.golden.bus.registers import (
     Register,
     RegisterMap,
 )
+from blysk.hdl.core.views import copy
 from blysk.hdl.frame_constants import write_shape
 
 __all__ = ["RegistersUnit", "access_shape", "answer_shape", "front_members"]
@@ -92,10 +93,10 @@ class RegistersUnit(wiring.Component):
         m.d.comb += [
             self.i.ready.eq(~full & ~answered),
             self.o.valid.eq(answered),
-            self.o.payload.eq(answer),
+            copy(self.o.payload, answer),
         ]
         with m.If(self.i.valid & self.i.ready):
-            m.d.sync += [access.eq(self.i.payload), full.eq(1)]
+            m.d.sync += [copy(access, self.i.payload), full.eq(1)]
         with m.If(self.o.ready):
             m.d.sync += answered.eq(0)
         refused, errors = Signal(ADDRESS_BITS, name="refused"), Signal(len(ERRORS), name="errors")

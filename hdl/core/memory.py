@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Module, Mux, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
 from amaranth.lib.memory import Memory, WritePort
 
-from blysk.hdl.core.stream import require_same_shape
+from blysk.hdl.core.views import of_shape, require_same_shape
 
 __all__ = [
     "HEADED_FIFO_LATENCY",
@@ -53,7 +53,7 @@ def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: 
     return memory
 
 
-def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Signal:
+def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> ValueLike:
     """Words that pass beside a unit while its beats are inside, in their order, without handshakes.
 
     The words are in a memory with a write and a read address. The unit's own handshakes tell when a word is
@@ -72,8 +72,8 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
 
     Returns
     -------
-    Signal
-        Word of the beat that leaves next, while one is inside.
+    ValueLike
+        Word of the beat that leaves next, while one is inside, in the shape of ``word``.
     """
     bits = (depth - 1).bit_length()
     words = words_in_turn(m, name, word, written, 1 << bits)
@@ -85,7 +85,7 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
         m.d.sync += [address.eq(following), following.eq(following + 1)]
     # Whether a beat leaves is known late: both words are read before.
     m.d.sync += leaves.eq(Mux(taken, second.data, first.data))
-    return leaves
+    return of_shape(word, leaves)
 
 
 def registered_read(

@@ -3,7 +3,7 @@
 from amaranth.hdl import Module, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
 
-from blysk.hdl.core.stream import require_same_shape
+from blysk.hdl.core.views import copy, require_same_shape
 
 __all__ = ["connect_register", "hold_output"]
 
@@ -43,7 +43,7 @@ def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     """Drive a stream from a register that stands until its payload is taken; return whether it may change.
 
     This is `skid_buffer` without the spare register. So logic behind it sees the sink's ready on the same
-    cycle. The parameters are those of `skid_buffer`.
+    cycle. The parameters and errors are those of `skid_buffer`.
     """
-    m.d.comb += [output.valid.eq(valid), Value.cast(output.payload).eq(Value.cast(payload))]
+    m.d.comb += [output.valid.eq(valid), copy(output.payload, payload, "payload")]
     return ~Value.cast(valid) | output.ready

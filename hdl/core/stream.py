@@ -2,11 +2,22 @@
 
 from collections.abc import Mapping
 
-from amaranth.hdl import Cat, EnableInserter, Module, Mux, Shape, ShapeLike, Signal, Value, ValueLike
-from amaranth.lib import data, fifo, stream, wiring
+from amaranth.hdl import (
+    Cat,
+    EnableInserter,
+    Module,
+    Mux,
+    Shape,
+    ShapeLike,
+    Signal,
+    Value,
+    ValueCastable,
+    ValueLike,
+)
+from amaranth.lib import fifo, stream, wiring
 from amaranth.lib.wiring import In, Member, Out
 
-from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.views import copy, require_same_shape
 
 __all__ = [
     "FIFO_LATENCY",
@@ -17,7 +28,6 @@ __all__ = [
     "connect_slice",
     "count_down",
     "moving",
-    "require_same_shape",
     "skid_buffer",
     "stop_output",
 ]
@@ -32,32 +42,10 @@ SLICE_LATENCY = 1
 """Cycles that a payload takes through the register of `connect_slice`."""
 
 
-def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
-    """Refuse two payload shapes that differ in a field, a width, a sign or a fixed-point format.
-
-    Amaranth compares payloads by width alone. So a moved binary point would pass.
-
-    Raises
-    ------
-    TypeError
-        If the shapes differ. The message names the field.
-    """
-    if isinstance(a, data.StructLayout) and isinstance(b, data.StructLayout):
-        if list(a.members) != list(b.members):
-            raise TypeError(
-                f"{path} has fields {list(a.members)} on one side, {list(b.members)} on the other"
-            )
-        for name, shape in a.members.items():
-            require_same_shape(shape, b.members[name], f"{path}.{name}")
-    elif isinstance(a, data.ArrayLayout) and isinstance(b, data.ArrayLayout):
-        if a.length != b.length:
-            raise TypeError(f"{path} has {a.length} elements on one side, {b.length} on the other")
-        require_same_shape(a.elem_shape, b.elem_shape, f"{path}[]")
-    else:
-        custom = (FixedShape, data.Layout)
-        same = a == b if isinstance(a, custom) or isinstance(b, custom) else Shape.cast(a) == Shape.cast(b)
-        if not same:
-            raise TypeError(f"{path} is {a!r} on one side, {b!r} on the other")
+def _require_payload(output: stream.Interface, payload: ValueLike) -> None:
+    """Refuse a payload of another shape than the stream's; bits without a format pass."""
+    if isinstance(payload, ValueCastable):
+        require_same_shape(payload.shape(), output.payload.shape())
 
 
 def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
@@ -77,9 +65,8 @@ def connect(m: Module, source: stream.Interface, sink: stream.Interface) -> None
     TypeError
         If the payloads differ in a field or in a fixed-point format.
     """
-    require_same_shape(source.payload.shape(), sink.payload.shape())
     m.d.comb += [
-        Value.cast(sink.payload).eq(Value.cast(source.payload)),
+        copy(sink.payload, source.payload, "payload"),
         sink.valid.eq(source.valid),
         source.ready.eq(sink.ready),
     ]
@@ -152,7 +139,13 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     -------
     Value
         ``advance``, one bit.
+
+    Raises
+    ------
+    TypeError
+        If the payload is a view, or a fixed-point value, of another shape than that of the stream.
     """
+    _require_payload(output, payload)
     held, moves = Signal(name="held"), Signal(name="moves", init=1)
     spare = Signal(len(Value.cast(payload)), name="spare", reset_less=True)
     m.d.comb += [
@@ -188,10 +181,16 @@ def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload:
     -------
     Value
         Whether registers take their next values. This is a register.
+
+    Raises
+    ------
+    TypeError
+        As for `skid_buffer`.
     """
+    _require_payload(output, payload)
     moves = Signal(name="moves", init=1)
     m.d.sync += moves.eq(Mux(moves, ~Value.cast(coming), output.ready))
-    m.d.comb += [output.valid.eq(~moves), Value.cast(output.payload).eq(Value.cast(payload))]
+    m.d.comb += [output.valid.eq(~moves), Value.cast(output.payload).eq(payload)]
     return moves
 
 

@@ -16,6 +16,7 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import reciprocal_words
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.views import choose
 from blysk.hdl.core.word import Word
 from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.half_chord import half_chord_words, normalised_words
@@ -131,7 +132,7 @@ class AngularSetupUnit(PipelinedUnit):
         total = g.register("dot_sum", lambda a, b: a + b, dot_left, dot_right)
         difference = g.register("dot_difference", lambda a, b: b - a, dot_left, dot_right)
         major, minor = (
-            g.register(name, lambda *words: _choice(*words), obtuse, *words)
+            g.register(name, lambda *words: choose(*words), obtuse, *words)
             for name, words in (("major", (difference, total)), ("minor", (total, difference)))
         )
         shortest = p.SHORTEST_SUM
@@ -307,7 +308,7 @@ class AngularSetupUnit(PipelinedUnit):
         width, direction_width = p.ROTATED_FORMAT.width, p.DIRECTION_FORMAT.width
         first, second = (
             g.register(
-                name, lambda *words: Value.cast(_choice(*words).extend(p.ROTATED_FORMAT)), obtuse, *words
+                name, lambda *words: Value.cast(choose(*words).extend(p.ROTATED_FORMAT)), obtuse, *words
             )
             for name, words in (("x_exchanged", (y, x)), ("y_exchanged", (x, y)))
         )
@@ -368,11 +369,6 @@ def _magnitude(cross: FixedValue) -> FixedValue:
 def _sum(terms: Sequence[Value], width: int) -> Value:
     """Sum of terms in a signed word."""
     return sum(terms)[:width].as_signed()
-
-
-def _choice(condition, a, b):
-    """Value a if the condition holds, else b; both of one fixed-point format."""
-    return FixedValue(a.format, Mux(condition, Value.cast(a), Value.cast(b)))
 
 
 def _halved(a, times):

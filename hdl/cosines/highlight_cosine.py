@@ -11,6 +11,7 @@ from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit, count_down, skid_buffer
+from blysk.hdl.core.views import choose
 
 __all__ = ["HighlightCosineUnit", "highlight_shape"]
 
@@ -147,7 +148,7 @@ class HighlightCosineUnit(wiring.Component):
         one = FixedValue.constant(UQ(1, 25), 1)
         beta = carried.pop("beta")
         minus, plus = (one - beta).extend(SQ(3, 25)), (one + beta).extend(SQ(3, 25))
-        base = FixedValue(SQ(3, 25), Mux(carried["back"], Value.cast(plus), Value.cast(minus)))
+        base = choose(carried["back"], plus, minus)
         carried["base"] = base
         carry(9)
         term = register(m, aligned.round_half_up(25), "term_10")

@@ -10,6 +10,7 @@ from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
+from blysk.hdl.core.views import choose, copy
 
 __all__ = ["RecurrenceUnit"]
 
@@ -153,9 +154,8 @@ class RecurrenceUnit(wiring.Component):
             for k, word in enumerate(held):
                 following = held[min(k + 1, len(held) - 1)]
                 given = payload[which][k + 1]
-                m.d.sync += Value.cast(word).eq(Mux(load, Value.cast(given), Value.cast(following)))
-            chosen = Mux(load, Value.cast(payload[which][0]), Value.cast(held[0]))
-            words.append(FixedValue(p.state_format, chosen))
+                m.d.sync += copy(word, choose(load, given, following))
+            words.append(choose(load, payload[which][0], held[0]))
         return words
 
     def _delayed(self, m, value, cycles, name):
@@ -218,7 +218,7 @@ class RecurrenceUnit(wiring.Component):
             m.d.sync += [x.eq(first), other.eq(second)]
         with m.Elif(ends):
             m.d.sync += [
-                Value.cast(x).eq(Mux(is_first, Value.cast(given), Value.cast(following))),
+                copy(x, choose(is_first, given, following)),
                 other.eq(before),
             ]
         bits = p.result_format.fraction_bits

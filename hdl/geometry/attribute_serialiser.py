@@ -8,6 +8,7 @@ from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
 from blysk.golden.geometry.triangles import ATTRIBUTE, ATTRIBUTES, DEPTH
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.views import copy
 
 __all__ = ["AttributeSerialiserUnit", "corner_attributes_shape", "serial_attribute_shape"]
 
@@ -77,7 +78,7 @@ class AttributeSerialiserUnit(wiring.Component):
         if self._skid:
             m.d.comb += advance.eq(skid_buffer(m, self.o, valid, result))
         else:
-            m.d.comb += [advance.eq(~valid), self.o.valid.eq(valid), self.o.payload.eq(result)]
+            m.d.comb += [advance.eq(~valid), self.o.valid.eq(valid), copy(self.o.payload, result)]
             with m.If(self.o.ready):
                 m.d.sync += valid.eq(0)
         rounds, gives = (step != 0) & (step <= ATTRIBUTES), step >= _GIVES
@@ -97,13 +98,13 @@ class AttributeSerialiserUnit(wiring.Component):
             with m.If(rounds | (advance & gives)):
                 for words in corners:
                     m.d.sync += [
-                        Value.cast(word).eq(Value.cast(following))
+                        copy(word, following)
                         for word, following in zip(words, [*words[1:], words[0]], strict=True)
                     ]
         with m.If(advance):
             m.d.sync += [valid.eq(gives), result.least.eq(least)]
             for name, words in zip(("first", "middle", "last"), corners, strict=True):
-                m.d.sync += Value.cast(result[name]).eq(Value.cast(words[0]))
+                m.d.sync += copy(result[name], words[0])
         return m
 
     def _least(self, m: Module, step: Signal, words: list) -> Signal:

@@ -13,6 +13,7 @@ from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.views import copy, copy_fields
 
 __all__ = ["CoarseDepthUnit", "deep_span_shape"]
 
@@ -115,10 +116,10 @@ class CoarseDepthUnit(wiring.Component):
         m.d.comb += old.eq(Mux(there.tag == tag, there, 0))
         for k in reversed(range(3)):
             with m.If(same[k]):
-                m.d.comb += old.eq(written[k].word)
+                m.d.comb += copy(old, written[k].word)
         limit, mask = ~old.nearness, old.mask | part.mask
         candidate = Mux(part.hi > old.candidate, part.hi, old.candidate)
-        m.d.comb += [new.eq(old), new.tag.eq(tag), hidden.eq((part.lo > limit) & (part.begins | so_far))]
+        m.d.comb += [copy(new, old), new.tag.eq(tag), hidden.eq((part.lo > limit) & (part.begins | so_far))]
         with m.If(part.hi < limit):
             with m.If(mask.all()):
                 m.d.comb += [new.nearness.eq(~candidate), new.candidate.eq(0), new.mask.eq(0)]
@@ -127,15 +128,15 @@ class CoarseDepthUnit(wiring.Component):
         of_part = (part.valid, part.place), *((of.valid, of.place) for of in written[:2])
         with m.If(advance):
             m.d.sync += [
-                part.eq(bound),
-                there.eq(read.data),
+                copy(part, bound),
+                copy(there, read.data),
                 *(
                     flag.eq(on & (place == bound.place))
                     for flag, (on, place) in zip(same, of_part, strict=True)
                 ),
                 written[0].eq(Cat(part.valid, part.place, new)),
-                written[1].eq(written[0]),
-                written[2].eq(written[1]),
+                copy(written[1], written[0]),
+                copy(written[2], written[1]),
                 valid.eq(part.valid & part.ends),
                 answer.eq(hidden),
                 so_far.eq(hidden),
@@ -224,7 +225,7 @@ class CoarseDepthUnit(wiring.Component):
                 block.valid.eq(following_valid),
                 block.begins.eq(1),
                 block.ends.eq(~following.left.any()),
-                *(block[name].eq(following[name]) for name in ends),
+                *copy_fields(block, following, ends),
                 # Where the block begins, which may be before the span.
                 block.depth.eq(following.depth - following.back),
             ]
@@ -257,14 +258,14 @@ class CoarseDepthUnit(wiring.Component):
         not_over = [Const(1)] + [marked >= k for k in range(1, given.block)]
         with m.If(advance):
             m.d.sync += [
-                *(steps[name].eq(block[name]) for name in copied),
+                *copy_fields(steps, block, copied),
                 steps.mask.eq(Cat(map(and_, begun, not_over))),
                 steps.falls.eq(slope < 0),
                 steps.near.eq(_times(slope, block.first)),
                 steps.far.eq(_times(slope, Mux(block.ends, block.last, last))),
-                *(ends[name].eq(steps[name]) for name in (*common, "falls", "outside")),
+                *copy_fields(ends, steps, (*common, "falls", "outside")),
                 *(ends[name].eq(steps.depth + steps[name]) for name in both),
-                *(bound[name].eq(ends[name]) for name in common),
+                *copy_fields(bound, ends, common),
                 # Never behind a bound, and never before it: what is there stays.
                 bound.lo.eq(Mux(ends.outside, 0, self._upper(Mux(ends.falls, ends.far, ends.near)))),
                 bound.hi.eq(

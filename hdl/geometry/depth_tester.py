@@ -12,6 +12,7 @@ from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.pixel_assembler import pixel_shape
 
@@ -193,8 +194,8 @@ class DepthTesterUnit(wiring.Component):
         with m.If(advance):
             m.d.sync += [
                 valid[0].eq(accept),
-                *(stages[0][name].eq(incoming.pixel[name]) for name in "xyrgb"),
-                *(to.eq(pixel) for pixel, to in pairwise(stages)),
+                *copy_fields(stages[0], incoming.pixel, "xyrgb"),
+                *(copy(to, pixel) for pixel, to in pairwise(stages)),
                 *(to.eq(passes) for passes, to in pairwise(valid)),
                 stages[1].depth.eq(depth),
                 valid[last].eq(drawn),
@@ -203,7 +204,7 @@ class DepthTesterUnit(wiring.Component):
                     for flag, pixel in zip(same, nexts, strict=True)
                 ),
                 *(
-                    to.eq(word)
+                    copy(to, word)
                     for earlier, later in pairwise(late)
                     for word, to in zip(earlier, later, strict=True)
                 ),
@@ -212,8 +213,8 @@ class DepthTesterUnit(wiring.Component):
             port.read_enable.eq(advance),
             port.write_enable.eq(advance & valid[last]),
             port.write_data.eq(stages[last].depth),
-            *(port.read_place[name].eq(stages[0][name]) for name in "xy"),
-            *(port.write_place[name].eq(stages[last][name]) for name in "xy"),
+            *copy_fields(port.read_place, stages[0], "xy"),
+            *copy_fields(port.write_place, stages[last], "xy"),
         ]
         if self.clears:
             # Nor is a pixel left with which those of the next picture would be compared.
@@ -238,7 +239,7 @@ class DepthTesterUnit(wiring.Component):
         with m.If(sweeps):
             m.d.comb += [
                 port.write_enable.eq(1),
-                port.write_place.eq(place),
+                copy(port.write_place, place),
                 port.write_data.eq(DepthTester.CLEARED),
             ]
             m.d.sync += place.x.eq(Mux(ends["x"], 0, place.x + 1))

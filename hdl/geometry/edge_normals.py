@@ -1,6 +1,6 @@
 """Edge normals ([T] figure 4.10): unit normals at both ends of every piece of a span."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -9,6 +9,7 @@ from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.views import choose, copy, copy_fields
 from blysk.hdl.geometry.span_attributes import pieces_shape, span_words_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.geometry.vector_normaliser import SharedVectorNormaliserUnit, VectorNormaliserUnit
@@ -110,10 +111,10 @@ class EdgeNormalsUnit(wiring.Component):
             begins = begun
         m.d.comb += rest.w_en.eq(begins)
         for k in range(3):
-            chosen = Mux(turn, Value.cast(piece.right[k]), Value.cast(piece.left[k]))
-            m.d.comb += Value.cast(normaliser.i.payload.vector[k]).eq(chosen)
+            chosen = choose(turn, piece.right[k], piece.left[k])
+            m.d.comb += copy(normaliser.i.payload.vector[k], chosen)
         with m.If(self.i.ready):
-            m.d.sync += [busy.eq(self.i.valid), turn.eq(0), piece.eq(self.i.payload)]
+            m.d.sync += [busy.eq(self.i.valid), turn.eq(0), copy(piece, self.i.payload)]
         with m.Elif(moves):
             m.d.sync += turn.eq(1)
             if self.compact:
@@ -133,20 +134,20 @@ class EdgeNormalsUnit(wiring.Component):
             normaliser.o.ready.eq(advance & rest.r_rdy),
             moves.eq(normaliser.o.valid & normaliser.o.ready),
             rest.r_en.eq(moves & last),
-            Value.cast(normal).eq(Mux(lost, Value.cast(good), Value.cast(normaliser.o.payload.normal))),
+            copy(normal, choose(lost, good, normaliser.o.payload.normal)),
         ]
         with m.If(moves):
-            m.d.sync += [good.eq(normal), turn.eq(~last)]
+            m.d.sync += [copy(good, normal), turn.eq(~last)]
             with m.If(~turn):
-                m.d.sync += left.eq(normal)
+                m.d.sync += copy(left, normal)
         with m.If(advance):
             m.d.sync += [
                 valid.eq(moves & last),
-                Value.cast(result.normal_left).eq(Mux(turn, Value.cast(left), Value.cast(normal))),
-                result.normal_right.eq(normal),
-                result.line_left.eq(words.left),
-                result.line_right.eq(words.right),
-                *(result[name].eq(words[name]) for name in span_words_shape()),
+                copy(result.normal_left, choose(turn, left, normal)),
+                copy(result.normal_right, normal),
+                copy(result.line_left, words.left),
+                copy(result.line_right, words.right),
+                *copy_fields(result, words, span_words_shape()),
             ]
         return moves & lost
 
@@ -166,16 +167,16 @@ class EdgeNormalsUnit(wiring.Component):
             normaliser.o.ready.eq(~valid & ~gone & rest.r_rdy),
             moves.eq(normaliser.o.valid & normaliser.o.ready),
             rest.r_en.eq(gone),
-            Value.cast(normal).eq(Mux(lost, Value.cast(good), Value.cast(normaliser.o.payload.normal))),
+            copy(normal, choose(lost, good, normaliser.o.payload.normal)),
             self.o.valid.eq(valid),
-            *(result.normal_left.eq(left), result.normal_right.eq(good)),
-            *(result.line_left.eq(words.left), result.line_right.eq(words.right)),
-            *(result[name].eq(words[name]) for name in span_words_shape()),
+            *(copy(result.normal_left, left), copy(result.normal_right, good)),
+            *(copy(result.line_left, words.left), copy(result.line_right, words.right)),
+            *copy_fields(result, words, span_words_shape()),
         ]
         with m.If(moves):
-            m.d.sync += [good.eq(normal), turn.eq(~last), valid.eq(last)]
+            m.d.sync += [copy(good, normal), turn.eq(~last), valid.eq(last)]
             with m.If(~turn):
-                m.d.sync += left.eq(normal)
+                m.d.sync += copy(left, normal)
         with m.Elif(self.o.ready):
             m.d.sync += valid.eq(0)
         return moves & lost

@@ -13,6 +13,7 @@ from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register, hold_output
 from blysk.hdl.core.stream import connect, moving
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.attribute_serialiser import AttributeSerialiserUnit, serial_attribute_shape
 from blysk.hdl.geometry.edge_normals import EdgeNormalsUnit, true_spans_shape
 from blysk.hdl.geometry.edge_setup import EdgeSetupUnit
@@ -107,10 +108,10 @@ class _TriangleSetup(wiring.Component):
             m.submodules[name] = getattr(self, f"_{name}")
         serialiser, edges, planes = self._serialiser, self._edges, self._planes
         drawn = wiring.flipped(self.i)
-        m.d.comb += self._assembler.constants.eq(self.constants)
+        m.d.comb += copy(self._assembler.constants, self.constants)
         _fork(m, drawn, edges.i, serialiser.i)
         for to in (edges.i.payload, serialiser.i.payload):
-            m.d.comb += [to[name].eq(drawn.payload[name]) for name in to.shape().members]
+            m.d.comb += copy_fields(to, drawn.payload)
 
         # Largest number of triangles whose edges wait for their planes.
         delay = planes.latency + self._gradients.latency + ATTRIBUTES * self._gradients.initiation_interval
@@ -118,7 +119,7 @@ class _TriangleSetup(wiring.Component):
         corners, walks = _between("corners", planes.i), _between("walk", self.walks)
         _fork(m, edges.o, corners, walks)
         for to in (corners.payload, walks.payload):
-            m.d.comb += [to[name].eq(edges.o.payload[name]) for name in to.shape().members]
+            m.d.comb += copy_fields(to, edges.o.payload)
         # Registers end the chain of readies from the assembler to the sort.
         connect_register(m, "waiting_corners", corners, planes.i)
         if self._compact:
@@ -143,8 +144,8 @@ class _TriangleSetup(wiring.Component):
             to.valid.eq(attributes.valid & scales.valid),
             attributes.ready.eq(to.ready & scales.valid),
             scales.ready.eq(moves & (turn == ATTRIBUTES - 1)),
-            *(to.payload[name].eq(attributes.payload[name]) for name in serial_attribute_shape().members),
-            *(to.payload[name].eq(scales.payload[name]) for name in scales_shape()),
+            *copy_fields(to.payload, attributes.payload, serial_attribute_shape().members),
+            *copy_fields(to.payload, scales.payload, scales_shape()),
         ]
         m.d.sync += self.sliver.eq(scales.ready & scales.payload.sliver)
         connect(m, self._gradients.o, self._assembler.i)
@@ -255,7 +256,7 @@ class GeometryUnit(wiring.Component):
         for k, lane in enumerate(self._lanes):
             m.submodules[f"setup_{k}"] = lane
         for unit in (self._sort, self._walk, self._clip, *self._lanes):
-            m.d.comb += unit.constants.eq(self.constants)
+            m.d.comb += copy(unit.constants, self.constants)
         connect(m, wiring.flipped(self.i), self._sort.i)
         walks, planes = self._set_up(m)
         connect(m, walks, self._walk.i)
@@ -327,8 +328,8 @@ class GeometryUnit(wiring.Component):
                 m.d.sync += lane.eq(lane + 1)
             ends = lane == ATTRIBUTES - 1
         m.d.comb += [
-            to.payload.planes.eq(planes.payload),
-            to.payload.row.eq(rows.payload),
+            copy(to.payload.planes, planes.payload),
+            copy(to.payload.row, rows.payload),
             to.valid.eq(rows.valid & (planes.valid | ~first)),
             rows.ready.eq(to.ready & (planes.valid | ~first) & ends),
             planes.ready.eq(to.ready & rows.valid & first),

@@ -10,6 +10,7 @@ from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.views import choose
 from blysk.hdl.geometry.plane_setup import scales_shape
 from blysk.hdl.geometry.wide_product import three_products, wide_product
 
@@ -119,8 +120,8 @@ class GradientSetupUnit(PipelinedUnit):
             g.use(shifter, name, (word, shift), self._to_shift, since=part)
             for name, word, shift in (("row", along, row_shift), ("step", inward, column_shift))
         )
-        short = g.register("short", lambda a, b, right: _either(right, a + b, a - b), row, part, right)
-        long = g.register("long", lambda a, b, right: _either(right, a - b, a + b), short, step, right)
+        short = g.register("short", lambda a, b, right: choose(right, a + b, a - b), row, part, right)
+        long = g.register("long", lambda a, b, right: choose(right, a - b, a + b), short, step, right)
         start = self._start(first, short, step, right)
 
         def cut_size(step):
@@ -219,7 +220,3 @@ class GradientSetupUnit(PipelinedUnit):
 
 def _quarter(term: Value, total: Value | None) -> Value:
     return (term if total is None else term + total) >> 2
-
-
-def _either(right: Value, then: FixedValue, otherwise: FixedValue) -> FixedValue:
-    return FixedValue(then.format, Mux(right, Value.cast(then), Value.cast(otherwise)))

@@ -8,6 +8,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.frame_constants import LIGHT_STRIDE
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.views import copy
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.vector_adapter import vector_spans_shape
 
@@ -92,12 +93,12 @@ class LightAdapterUnit(wiring.Component):
         m.d.comb += [
             advance.eq(~(valid[-1] & waits)),
             self.o.valid.eq(offered),
-            self.o.payload.eq(output),
+            copy(self.o.payload, output),
         ]
         moves = valid[-1] & ~waits
         m.d.sync += [waits.eq(still), offered.eq(still | moves)]
         with m.If(moves):
-            m.d.sync += output.eq(result)
+            m.d.sync += copy(output, result)
         axis, last = Signal(range(_AXES), name="axis"), Signal(name="last_turn")
         ends_row = Signal(name="ends_row")
         m.d.comb += [

@@ -9,6 +9,7 @@ from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.triangles import ATTRIBUTES, LIMIT_BITS
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.gradient_setup import gradient_shape
 from blysk.hdl.geometry.triangles import frame_shape
 
@@ -107,7 +108,7 @@ class PlaneAssemblerUnit(wiring.Component):
                 m.d.sync += given.eq(given + 1)
             ends = given == ATTRIBUTES - 1
         else:
-            m.d.comb += self.o.payload.eq(result)
+            m.d.comb += copy(self.o.payload, result)
         m.d.sync += offers.eq(full & found & ~(moves & ends))
         with m.If(moves & ends):
             m.d.sync += full.eq(0)

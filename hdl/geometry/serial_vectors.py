@@ -11,6 +11,7 @@ from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.bits import select
+from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.span_attributes import whole_span_shape
 from blysk.hdl.geometry.span_halver import is_apart, is_kept, shorter, size_of
 from blysk.hdl.geometry.triangles import count_events, counters_shape
@@ -232,13 +233,13 @@ class SerialVectorsUnit(wiring.Component):
         m.d.sync += size.keeps.eq(heads["new_near"][-1] == heads["new_far"][-1])
         with m.If(tested):
             m.d.sync += [
-                before.eq(size),
+                copy(before, size),
                 long.eq(is_long | (~begins & (long | both(before) | both(zeroth)))),
                 large.eq(is_large | (~begins & large)),
                 steep.eq(is_steep | (~begins & steep)),
             ]
             with m.If(begins):
-                m.d.sync += zeroth.eq(size)
+                m.d.sync += copy(zeroth, size)
         m.d.comb += fits.eq(is_kept(pixels, long, large, steep))
         return shift
 
@@ -263,7 +264,7 @@ class SerialVectorsUnit(wiring.Component):
             m.d.sync += signal.eq(value)
             return signal
 
-        m.d.sync += [after.eq(before) for before, after in pairwise(notes)]
+        m.d.sync += [copy(after, before) for before, after in pairwise(notes)]
 
         # All with the step's fraction bits: the first pixel's value under 1, and the step modulo 2.
         value, step = Mux(right, heads["far"], heads["near"]), heads["step"]
@@ -309,4 +310,8 @@ class SerialVectorsUnit(wiring.Component):
             m.d.sync += there.eq(1)
         with m.Elif(self.o.ready):
             m.d.sync += there.eq(0)
-        m.d.comb += [self.o.valid.eq(there), self.o.payload.eq(result), self.o.payload.exponent.eq(exponent)]
+        m.d.comb += [
+            self.o.valid.eq(there),
+            copy(self.o.payload, result),
+            self.o.payload.exponent.eq(exponent),
+        ]

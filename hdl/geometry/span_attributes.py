@@ -10,6 +10,7 @@ from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BIT
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.plane_assembler import plane_shape, planes_shape
 from blysk.hdl.geometry.span_clip import clipped_rows_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
@@ -130,7 +131,7 @@ class SpanAttributesUnit(wiring.Component):
         pace = _AttributeTurns(m, self.i, busy, self.serial, not self.whole)
         m.d.comb += [accept.eq(pace.accepts), loads.eq(accept & row.covered)]
         with m.If(pace.goes & pace.loads):
-            m.d.sync += [tag[name].eq(row[name]) for name in ("y", "right", "flip", "material")]
+            m.d.sync += copy_fields(tag, row, ("y", "right", "flip", "material"))
 
         # A whole span is the last piece of its own.
         most = Mux(first, _mask(planes.piece), mask)
@@ -164,7 +165,7 @@ class SpanAttributesUnit(wiring.Component):
                 valid.eq(along.emits),
                 found.x.eq(along.x),
                 found.length.eq(along.pixels + 1),
-                found.tag.eq(tag),
+                copy(found.tag, tag),
                 found.ends.eq(pace.ends),
             ]
         self._give(m, pace, along, valid, found)
@@ -186,7 +187,7 @@ class SpanAttributesUnit(wiring.Component):
         result, result_valid = Signal(self.o.payload.shape(), name="result"), Signal(name="result_valid")
         if self.serial:
             # The words that are found replace the result, which must have been taken by then.
-            m.d.comb += [self.o.valid.eq(result_valid), self.o.payload.eq(result)]
+            m.d.comb += [self.o.valid.eq(result_valid), copy(self.o.payload, result)]
             stands = Mux(result_valid, ~self.o.ready, valid & found.ends)
             m.d.comb += pace.advances.eq(Mux(pace.advance, ~(stands & along.gives), self.o.ready))
             with m.If(self.o.ready):
@@ -201,9 +202,9 @@ class SpanAttributesUnit(wiring.Component):
     def _whole(found, result) -> list:
         """A whole span of what was found, or an attribute of it."""
         words = (("near", found.near), ("far", found.far), ("inward", found.step))
-        places = [result[name].eq(found[name]) for name in ("x", "length")]
-        tag = [result[name].eq(found.tag[name]) for name in _tag_shape().members]
-        return [*(Value.cast(result[name]).eq(Value.cast(word)) for name, word in words), *places, *tag]
+        places = copy_fields(result, found, ("x", "length"))
+        tag = copy_fields(result, found.tag, _tag_shape().members)
+        return [*(Value.cast(result[name]).eq(word) for name, word in words), *places, *tag]
 
     @staticmethod
     def _found_shape(count: int) -> data.StructLayout:
@@ -261,8 +262,8 @@ class SpanAttributesUnit(wiring.Component):
         step = Value.cast(found.step[-1])
         m.d.sync += [
             Value.cast(result.depth_step).eq(Mux(right, -step, step)[:_BITS]),
-            *(result[name].eq(found[name]) for name in ("x", "length")),
-            *(result[name].eq(found.tag[name]) for name in ("y", "flip", "material")),
+            *copy_fields(result, found, ("x", "length")),
+            *copy_fields(result, found.tag, ("y", "flip", "material")),
         ]
 
 

@@ -9,6 +9,7 @@ from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.span_attributes import whole_spans_shape
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
@@ -140,7 +141,7 @@ class SpanHalverUnit(wiring.Component):
             result.x.eq(Mux(turned, x + rest, x)),
             result.length.eq(pixels),
             result.turned.eq(turned),
-            *(result[name].eq(tag[name]) for name in ("y", "flip", "material")),
+            *copy_fields(result, tag, ("y", "flip", "material")),
         ]
         count_events(m, self.status, cut=retries & uncut)
         return m

@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.golden.reference.scene import BACK_FACES
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.triangles import (
     corners_shape,
     count_events,
@@ -279,7 +280,7 @@ class VertexSortUnit(wiring.Component):
             m.d.sync += valid.eq(0)
         m.d.comb += [
             self.o.valid.eq(valid),
-            *(result[name].eq(words[name]) for name in words.shape().members),
+            *copy_fields(result, words, words.shape().members),
             *(result.area.eq(area), result.right.eq(right), result.flip.eq(flip)),
         ]
         return done & zero, done & culled & ~zero
@@ -288,7 +289,7 @@ class VertexSortUnit(wiring.Component):
     def _sorted(result, corners):
         for k, corner in enumerate(corners):
             for name in corner.shape().members:
-                yield result[name][k].eq(corner[name])
+                yield copy(result[name][k], corner[name])
 
 
 def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Value]:

@@ -17,6 +17,7 @@ from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.memory import pass_beside
 from blysk.hdl.core.stream import PipelinedUnit, connect, connect_fifo
+from blysk.hdl.core.views import copy
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.lobe import LobeMemory, LobeUnit
@@ -223,7 +224,7 @@ class LightUnit(wiring.Component):
             # A specular unit that is not built for a fixed exponent.
             m.d.comb += specular.constants.exponent.eq(self.exponent)
         elif "constants" in self.signature.members:
-            m.d.comb += Value.cast(specular.constants).eq(Value.cast(self.constants))
+            m.d.comb += copy(specular.constants, self.constants)
         if self.skips_dark:
             self._skip(m, diffuse, specular, given, dark, o)
             return m
@@ -246,7 +247,7 @@ class LightUnit(wiring.Component):
             # As many as the units have inside, their outputs included.
             most = self._depth + self._diffuse.latency + 1 if self.skips_dark else self._specular.latency + 1
             word = pass_beside(m, "factors", self.i.payload.factor, accepted, taken, most)
-            m.d.comb += Value.cast(factor.i.payload.factor).eq(word)
+            m.d.comb += copy(factor.i.payload.factor, word)
         return factor.i
 
     @property

@@ -7,6 +7,7 @@ from blysk.golden.methods.angular_interpolator import AngularInterpolator
 from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit, highlight_shape
 from blysk.hdl.methods.interpolator import InterpolatorUnit
@@ -60,15 +61,12 @@ class AngularInterpolatorUnit(InterpolatorUnit, model=AngularInterpolator):
             m.submodules[f"cosine_{name}_{light}"] = cosine
             prepared = stream.Signature(highlight_shape()).create(path=(f"prepared_{name}_{light}",))
             m.d.comb += [
-                setup.i.payload.normal_left.eq(self.i.payload.normal_left),
-                setup.i.payload.normal_right.eq(self.i.payload.normal_right),
+                copy(setup.i.payload.normal_left, self.i.payload.normal_left),
+                copy(setup.i.payload.normal_right, self.i.payload.normal_right),
                 setup.i.payload.length.eq(self.i.payload.length),
-                setup.i.payload.vector.eq(self.constants[light][name]),
+                copy(setup.i.payload.vector, self.constants[light][name]),
                 setup.i.valid.eq(self.i.valid),
-                *(
-                    prepared.payload[field].eq(setup.o.payload[field])
-                    for field in ("phase", "step", "cos_beta", "length")
-                ),
+                *copy_fields(prepared.payload, setup.o.payload, ("phase", "step", "cos_beta", "length")),
                 prepared.valid.eq(setup.o.valid),
                 setup.o.ready.eq(prepared.ready),
                 cosine.o.ready.eq(self.o.ready),

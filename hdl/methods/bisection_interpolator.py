@@ -6,6 +6,7 @@ from amaranth.lib import stream
 from blysk.golden.methods.bisection_interpolator import BisectionInterpolator
 from blysk.golden.number.unit_vector import ONE
 from blysk.hdl.core.shapes import normal_shape
+from blysk.hdl.core.views import copy
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit, span_words
 from blysk.hdl.normals.adaptive_normaliser import SEGMENT_CYCLES, AdaptiveNormaliserUnit
 
@@ -67,7 +68,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpola
         normals = stream.Signature(normal_shape()).create(path=("normals",))
         pixel = normaliser.o.payload
         m.d.comb += [
-            normals.payload.eq(pixel.normal),
+            copy(normals.payload, pixel.normal),
             normals.valid.eq(normaliser.o.valid),
             normaliser.o.ready.eq(normals.ready),
         ]

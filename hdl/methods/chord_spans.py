@@ -12,6 +12,7 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.memory import words_in_turn
 from blysk.hdl.core.stream import FIFO_LATENCY, connect
+from blysk.hdl.core.views import copy
 from blysk.hdl.cosines.chord_setup import (
     ChordSetupUnit,
     chord_differences_shape,
@@ -254,7 +255,7 @@ class ChordSpansUnit(wiring.Component):
         length, is_long = lengths.r_data[:-1], lengths.r_data[-1]
         room, waits = self._count(m, accepted, popped)
         m.d.comb += [
-            setup.i.payload.eq(span),
+            copy(setup.i.payload, span),
             setup.i.valid.eq(self.i.valid & gate_ready & room & self.long),
             setup.o.ready.eq(1),
             self.i.ready.eq(room & gate_ready & (setup.i.ready | ~self.long)),
@@ -319,7 +320,7 @@ class ChordSpansUnit(wiring.Component):
         kept, entered = Signal.like(start, name="kept", reset_less=True), Signal(name="entered")
         length = Signal(len(lengths.w_data), name="length", reset_less=True)
         m.d.sync += [
-            kept.eq(start),
+            copy(kept, start),
             length.eq(Cat(self.i.payload.length, self.long)),
             entered.eq(accepted),
         ]

@@ -15,6 +15,7 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import PipelinedUnit, connect
+from blysk.hdl.core.views import copy
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
@@ -288,5 +289,5 @@ class NormalInterpolatorUnit(InterpolatorUnit):
         m.submodules.products = products = self._products
         connect(m, normals, products.i)
         connect(m, products.o, wiring.flipped(self.o))
-        m.d.comb += [products.constants.eq(self.constants), self.out_of_range.eq(out_of_range)]
+        m.d.comb += [copy(products.constants, self.constants), self.out_of_range.eq(out_of_range)]
         return m

@@ -6,6 +6,7 @@ from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.normals.gpq import GPQ
 from blysk.hdl.core.memory import connect_wide_fifo
 from blysk.hdl.core.stream import SLICE_LATENCY
+from blysk.hdl.core.views import copy
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
@@ -53,7 +54,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
         differences = [span.normal_right[c] - span.normal_left[c] for c in range(3)]
         m.d.comb += [
             *(operands.p[c].eq(differences[c].saturate(GPQ.P_FORMAT)) for c in range(3)),
-            operands.q.eq(span.normal_left),
+            copy(operands.q, span.normal_left),
             operands.length.eq(span.length),
             setup.i.valid.eq(self.i.valid),
             self.i.ready.eq(setup.i.ready),

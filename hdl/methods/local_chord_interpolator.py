@@ -3,12 +3,13 @@
 from collections.abc import Iterator
 
 import numpy as np
-from amaranth.hdl import Module, Signal, Value
+from amaranth.hdl import Module, Signal
 from amaranth.lib import data, wiring
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
+from blysk.hdl.core.views import copy
 from blysk.hdl.cosines.chord_setup import span_operands_shape
 from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_spans import ChordSpansUnit
@@ -87,7 +88,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
         m.d.comb += [
             pair.eq(span.length == 2),
             spans.i.valid.eq(self.i.valid | second),
-            spans.i.payload.eq(span),
+            copy(spans.i.payload, span),
             spans.long.eq((span.length > 2) & ~second),
             self.i.ready.eq(spans.i.ready & ~second),
             self.out_of_range.eq(spans.out_of_range),
@@ -99,9 +100,9 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
         for name, given, values in self._values(spans.i.payload, span):
             end = Signal.like(values[2], name=f"{name}_end", reset_less=True)
             with m.If(second):
-                m.d.comb += Value.cast(given[0]).eq(Value.cast(end))
+                m.d.comb += copy(given[0], end)
             with m.Else():
-                m.d.sync += Value.cast(end).eq(Value.cast(values[2]))
+                m.d.sync += copy(end, values[2])
         connect(m, spans.o, wiring.flipped(self.o))
         if "constants" in spans.signature.members:
             m.d.comb += spans.constants.eq(self.constants)

@@ -6,6 +6,7 @@ from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.quadratic_evaluator import QuadraticEvaluator
 from blysk.hdl.core.memory import connect_wide_fifo
 from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit
 from blysk.hdl.normals.difference_accumulator import DifferenceAccumulatorUnit
 from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
@@ -84,16 +85,13 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
         m.d.comb += [
             self.i.ready.eq(middle.i.ready),
             middle.i.valid.eq(self.i.valid),
-            middle.i.payload.normal_left.eq(span.normal_left),
-            middle.i.payload.normal_right.eq(span.normal_right),
-            *(
-                gpq.i.payload[name].eq(middle.o.payload[name])
-                for name in ("normal_left", "normal_middle", "normal_right")
-            ),
+            copy(middle.i.payload.normal_left, span.normal_left),
+            copy(middle.i.payload.normal_right, span.normal_right),
+            *copy_fields(gpq.i.payload, middle.o.payload, ("normal_left", "normal_middle", "normal_right")),
             gpq.i.valid.eq(middle.o.valid),
             middle.o.ready.eq(gpq.i.ready),
             # A length comes before its coefficients, which take longer: both start on the same cycle.
-            *(curve.i.payload[name].eq(gpq.o.payload[name]) for name in "gpq"),
+            *copy_fields(curve.i.payload, gpq.o.payload, "gpq"),
             curve.i.payload.length.eq(length.payload),
             curve.i.valid.eq(gpq.o.valid),
             gpq.o.ready.eq(curve.i.ready),

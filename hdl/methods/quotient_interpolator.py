@@ -9,6 +9,7 @@ from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
+from blysk.hdl.core.views import copy
 from blysk.hdl.cosines.quotient import QuotientUnit
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit, vectors_shape
 from blysk.hdl.methods.interpolator import InterpolatorUnit, flag_spans
@@ -86,7 +87,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         m.submodules.quotient_spans = spans = self._spans
         m.submodules.quotient = quotient = self._quotient
         for name in self.i.payload.shape().members:
-            m.d.comb += spans.i.payload[name].eq(self.i.payload[name])
+            m.d.comb += copy(spans.i.payload[name], self.i.payload[name])
         m.d.comb += [
             spans.i.valid.eq(self.i.valid),
             self.i.ready.eq(spans.i.ready),

@@ -1,11 +1,12 @@
 """The recurrence method ([T] 3.3): cosines of equal steps on the great circle, one product each."""
 
-from amaranth.hdl import Module, Value
+from amaranth.hdl import Module
 
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.core.stream import SLICE_LATENCY, connect_slice
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.cosines.recurrence_setup import RecurrenceSetupUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit, span_words
@@ -61,10 +62,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator)
             m.submodules[f"recurrence_{light}"] = unit
             starts, result = prepared.payload.lights[light], self.o.payload[light]
             m.d.comb += [
-                *(
-                    Value.cast(unit.i.payload[name]).eq(Value.cast(starts[name]))
-                    for name in ("diffuse", "highlight")
-                ),
+                *copy_fields(unit.i.payload, starts, ("diffuse", "highlight")),
                 *(
                     unit.i.payload[name].eq(prepared.payload[name])
                     for name in ("coefficient", "shift", "length")
@@ -80,7 +78,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator)
         m.d.comb += [
             prepared.ready.eq(self._recurrences[0].i.ready),
             self.o.valid.eq(self._recurrences[0].o.valid),
-            setup.constants.eq(self.constants),
+            copy(setup.constants, self.constants),
             self.out_of_range.eq(setup.o.valid & setup.o.ready & setup.o.payload.out_of_range),
         ]
         return m

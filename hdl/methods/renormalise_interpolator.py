@@ -9,6 +9,7 @@ from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.core.memory import connect_wide_fifo
 from blysk.hdl.core.shapes import normal_shape, span_normals_shape
 from blysk.hdl.core.stream import SLICE_LATENCY
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.methods.interpolator import NormalInterpolatorUnit, flag_spans
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 from blysk.hdl.normals.line_setup import LineSetupUnit, line_shape
@@ -97,10 +98,10 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInter
         line = stream.Signature(accumulator.i.payload.shape()).create(path=("line",))
         parity = Signal()
         m.d.comb += [
-            *(setup.i.payload[name].eq(self.i.payload[name]) for name in self.i.payload.shape().members),
+            *copy_fields(setup.i.payload, self.i.payload, self.i.payload.shape().members),
             setup.i.valid.eq(self.i.valid),
             self.i.ready.eq(setup.i.ready),
-            line.payload.line.eq(setup.o.payload),
+            copy(line.payload.line, setup.o.payload),
             line.payload.length.eq(setup.o.payload.length),
             line.payload.span.eq(parity),
             line.valid.eq(setup.o.valid),
@@ -112,10 +113,10 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInter
         normals = stream.Signature(normal_shape()).create(path=("normals",))
         result = renormaliser.o.payload
         m.d.comb += [
-            renormaliser.i.payload.eq(accumulator.o.payload),
+            copy(renormaliser.i.payload, accumulator.o.payload),
             renormaliser.i.valid.eq(accumulator.o.valid),
             accumulator.o.ready.eq(renormaliser.i.ready),
-            normals.payload.eq(result.normal),
+            copy(normals.payload, result.normal),
             normals.valid.eq(renormaliser.o.valid),
             renormaliser.o.ready.eq(normals.ready),
         ]

@@ -15,6 +15,7 @@ from blysk.hdl.core.multiplier import SteppedMultiplier
 from blysk.hdl.core.reciprocal import reciprocal_codes
 from blysk.hdl.core.shapes import normal_shape, span_normals_shape
 from blysk.hdl.core.stream import count_down, skid_buffer
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.normals.bisection import BisectionUnit
 
 __all__ = ["AdaptiveNormaliserUnit"]
@@ -186,7 +187,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         with m.If(bisection.o.valid):
             m.d.comb += [
                 address.eq(r.write_index),
-                write.data.eq(bisection.o.payload.normal_middle),
+                copy(write.data, bisection.o.payload.normal_middle),
                 write.en.eq(1),
                 r.level_done.eq(r.write_index + r.half == whole),
             ]
@@ -203,12 +204,12 @@ class AdaptiveNormaliserUnit(wiring.Component):
         whole, bisection = 1 << self.model.depth, self._bisection
         m.d.comb += [
             self.i.ready.eq(bisection.i.ready),
-            bisection.i.payload.normal_a.eq(self.i.payload.normal_left),
-            bisection.i.payload.normal_b.eq(self.i.payload.normal_right),
+            copy(bisection.i.payload.normal_a, self.i.payload.normal_left),
+            copy(bisection.i.payload.normal_b, self.i.payload.normal_right),
             bisection.i.valid.eq(self.i.valid & (self.i.payload.length != 0)),
         ]
         m.d.sync += [
-            r.span.eq(self.i.payload),
+            copy(r.span, self.i.payload),
             r.half.eq(whole >> 1),
             r.write_index.eq(whole >> 1),
             r.level.eq(1),
@@ -221,15 +222,15 @@ class AdaptiveNormaliserUnit(wiring.Component):
         bisection, bits = self._bisection, self.model.depth + 1
         m.d.comb += [
             read.addr.eq(Cat(Mux(r.step == 0, r.index, r.next_index)[:bits], r.bank)),
-            bisection.i.payload.normal_a.eq(r.end_a),
-            bisection.i.payload.normal_b.eq(r.end_b),
+            copy(bisection.i.payload.normal_a, r.end_a),
+            copy(bisection.i.payload.normal_b, r.end_b),
         ]
         with m.If(r.step != 3):
             m.d.sync += r.step.eq(r.step + 1)
         with m.If(r.step == 1):
-            m.d.sync += r.end_a.eq(read.data)
+            m.d.sync += copy(r.end_a, read.data)
         with m.If(r.step == 2):
-            m.d.sync += r.end_b.eq(read.data)
+            m.d.sync += copy(r.end_b, read.data)
         with m.If(r.step == 3):
             m.d.comb += bisection.i.valid.eq(1)
             with m.If(bisection.i.ready):
@@ -313,7 +314,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 s.levels.eq(r.levels),
                 s.spacing.eq((1 << self.model.depth) >> r.levels),
                 s.amount.eq(Mux(r.shift > r.levels, r.shift - 1 - r.levels, 0)),
-                s.left.eq(r.span.normal_left),
+                copy(s.left, r.span.normal_left),
                 s.remaining.eq(r.span.length),
                 s.out_of_range.eq(r.out_of_range),
                 r.bank.eq(~r.bank),
@@ -356,8 +357,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
             read.addr.eq(Cat(Mux(s.index == whole, s.index, following)[: len(s.index)], s.bank)),
         ]
         with m.If(s.step == 1):
-            m.d.sync += s.right.eq(read.data)
-        moved = [s.left.eq(s.right), s.index.eq(following), s.step.eq(0)]
+            m.d.sync += copy(s.right, read.data)
+        moved = [copy(s.left, s.right), s.index.eq(following), s.step.eq(0)]
         with m.If((s.step == 2) & (s.offset >= s.steps)):
             # No pixel lies in this segment.
             m.d.sync += [s.offset.eq(s.offset - s.steps), *moved]
@@ -378,8 +379,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
             segment.count.eq(s.count),
             segment.last.eq(s.last),
             segment.out_of_range.eq(s.out_of_range),
-            *(segment.start[c].eq(s.start[c]) for c in range(3)),
-            *(segment.step[c].eq(s.slope[c]) for c in range(3)),
+            *copy_fields(segment.start, s.start, range(3)),
+            *copy_fields(segment.step, s.slope, range(3)),
             fifo.w_data.eq(segment.as_value()),
         ]
 

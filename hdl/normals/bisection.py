@@ -9,6 +9,7 @@ from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.views import copy_fields
 
 __all__ = ["BisectionUnit", "coefficient"]
 
@@ -103,8 +104,8 @@ class BisectionUnit(PipelinedUnit):
         read = {name: value(word, self.latency) for name, word in self._words.items()}
         result = Signal(self.o.payload.shape())
         m.d.comb += [
-            *(result.normal_middle[c].eq(read[c]) for c in range(3)),
-            *(result[name].eq(read[name]) for name in ("one_minus_cosine", "out_of_range")),
+            *copy_fields(result.normal_middle, read, range(3)),
+            *copy_fields(result, read, ("one_minus_cosine", "out_of_range")),
         ]
         return result
 

@@ -9,6 +9,7 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.multiplier import SteppedMultiplier
 from blysk.hdl.core.shapes import normal_shape
+from blysk.hdl.core.views import copy
 from blysk.hdl.normals.bisection import coefficient
 from blysk.hdl.normals.dot_product import DotProductUnit
 
@@ -86,7 +87,7 @@ class BisectionChainUnit(wiring.Component):
                 with m.If(self.i.valid):
                     word = registers.u.format
                     m.d.sync += [
-                        span.eq(self.i.payload),
+                        copy(span, self.i.payload),
                         registers.remaining.eq(self.i.payload.level),
                         step.eq(0),
                         registers.first_round.eq(1),
@@ -118,8 +119,8 @@ class BisectionChainUnit(wiring.Component):
         """``u = 1 - cos psi`` of the span's normals, `_ANGLE_STEPS` - 1 cycles after these."""
         m.submodules.dot_product = dot_product = DotProductUnit()
         m.d.comb += [
-            dot_product.i.payload.a.eq(r.span.normal_left),
-            dot_product.i.payload.b.eq(r.span.normal_right),
+            copy(dot_product.i.payload.a, r.span.normal_left),
+            copy(dot_product.i.payload.b, r.span.normal_right),
             dot_product.i.valid.eq(1),
             dot_product.o.ready.eq(1),
         ]

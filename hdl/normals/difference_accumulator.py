@@ -10,6 +10,7 @@ from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import count_down, skid_buffer
+from blysk.hdl.core.views import copy
 from blysk.hdl.normals.difference_setup import difference_shape
 
 __all__ = ["AccumulatorUnit", "DifferenceAccumulatorUnit"]
@@ -87,7 +88,7 @@ class AccumulatorUnit(wiring.Component):
         """
         self._span = Signal(self.i.payload.shape(), name="span", reset_less=True)
         with m.If(self.i.ready):
-            m.d.sync += self._span.eq(self.i.payload)
+            m.d.sync += copy(self._span, self.i.payload)
 
     @classmethod
     def begin(cls, model: DifferenceAccumulator, start: FixedValue) -> FixedValue:

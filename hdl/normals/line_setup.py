@@ -11,6 +11,7 @@ from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.views import copy
 from blysk.hdl.normals.renormaliser import vector_shape
 
 __all__ = ["LineSetupUnit", "line_shape"]
@@ -125,7 +126,7 @@ class LineSetupUnit(PipelinedUnit):
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for name in ("start", "length"):
-            m.d.comb += result[name].eq(value(self._words[name], self.latency))
+            m.d.comb += copy(result[name], value(self._words[name], self.latency))
         for c in range(3):
             m.d.comb += result.step[c].eq(value(self._words["step", c], self.latency))
         return result

@@ -9,6 +9,7 @@ from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.views import copy_fields
 
 __all__ = ["MiddleNormalUnit"]
 
@@ -81,8 +82,8 @@ class MiddleNormalUnit(PipelinedUnit):
         read = {name: value(word, self.latency) for name, word in self._words.items()}
         result = Signal(self.o.payload.shape())
         m.d.comb += [
-            *(result[name].eq(read[name]) for name in ("normal_left", "normal_right", "out_of_range")),
-            *(result.normal_middle[c].eq(read[c]) for c in range(3)),
+            *copy_fields(result, read, ("normal_left", "normal_right", "out_of_range")),
+            *copy_fields(result.normal_middle, read, range(3)),
         ]
         return result
 

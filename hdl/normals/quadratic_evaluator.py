@@ -14,6 +14,7 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import reciprocal_words
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit, connect
+from blysk.hdl.core.views import choose, copy, copy_fields
 from blysk.hdl.normals.gpq import curve_shapes
 
 __all__ = ["QuadraticEvaluatorUnit"]
@@ -80,7 +81,7 @@ class QuadraticEvaluatorUnit(wiring.Component):
             advance.eq(~valid | pixel.ready),
             span.ready.eq(advance & (remaining == 0)),
             pixel.payload.minus_t.eq(total.truncate(17)),
-            *(pixel.payload[name].eq(coefficients[name]) for name in ("g", "p", "q")),
+            *copy_fields(pixel.payload, coefficients, ("g", "p", "q")),
         ]
         half_step = FixedValue.constant(p.SUM_FORMAT, COMPONENT.step / 2)
         with m.If(span.valid & span.ready):
@@ -91,7 +92,7 @@ class QuadraticEvaluatorUnit(wiring.Component):
                 total.eq(half_step),
                 step_held.eq(span.payload.step),
             ]
-            m.d.sync += [coefficients[name].eq(span.payload[name]) for name in ("g", "p", "q")]
+            m.d.sync += copy_fields(coefficients, span.payload, ("g", "p", "q"))
         with m.Elif(advance):
             m.d.sync += [
                 valid.eq(remaining != 0),
@@ -120,7 +121,7 @@ class _StepUnit(PipelinedUnit):
         """The graph, read at the stage of the step."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
-        m.d.comb += [result[name].eq(value(word, self.latency)) for name, word in self._words.items()]
+        m.d.comb += [copy(result[name], value(word, self.latency)) for name, word in self._words.items()]
         return result
 
     def _describe(self, span) -> dict:
@@ -186,8 +187,7 @@ class _HornerUnit(PipelinedUnit):
         at, register = self.at, self.register
         held = register(m, operands, "operands_3", when=at(2))
         q = register(m, held.q, "q_5", when=at(4))
-        minus_t = register(m, Mux(at(1), Value.cast(operands.minus_t), Value.cast(held.minus_t)), "minus_t")
-        minus_t = FixedValue(COMPONENT, minus_t)
+        minus_t = register(m, choose(at(1), operands.minus_t, held.minus_t), "minus_t")
         result = Signal(self.o.payload.shape())
         for c in range(3):
             total = Signal(FixedShape(SQ(3, 34)), name=f"total_{c}")
@@ -195,7 +195,7 @@ class _HornerUnit(PipelinedUnit):
             first = Value.cast(operands.g[c].extend(COMPONENT))
             factor = register(m, Mux(at(1), first, Value.cast(rounded)), f"factor_{c}")
             product = register(m, FixedValue(COMPONENT, factor) * minus_t, f"product_{c}")
-            addend = FixedValue(COMPONENT, Mux(at(3), Value.cast(held.p[c]), Value.cast(q[c])))
+            addend = choose(at(3), held.p[c], q[c])
             m.d.sync += total.eq(_with_half(addend) - product)
             m.d.comb += result[c].eq(register(m, rounded, f"normal_{c}"))
         return result

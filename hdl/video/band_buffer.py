@@ -7,6 +7,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.band_buffer import BandBuffer
+from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.depth_tester import is_inside
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.video.display_timing import timing_shape
@@ -210,7 +211,7 @@ class BandBufferUnit(wiring.Component):
         later = Signal.like(timing, name="timing_shown")
         coloured = Signal(name="coloured")
         m.d.pixel += [later.eq(timing), coloured.eq(is_shown)]
-        m.d.comb += [self.shown[name].eq(later[name]) for name in timing.shape().members]
+        m.d.comb += copy_fields(self.shown, later, timing.shape().members)
         word = Mux(coloured, read.data, Const(0, len(read.data))) ^ self._clear
         for channel, bits in zip("rgb", given.colour_bits, strict=True):
             code, word = word[:bits], word[bits:]

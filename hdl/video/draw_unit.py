@@ -12,6 +12,7 @@ from blysk.golden.video.draw_unit import Drawing
 from blysk.golden.video.triangle_assembly import COUNTERS
 from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect
+from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.render import STATUS as RENDERED
 from blysk.hdl.render import RendererUnit
@@ -107,7 +108,7 @@ class DrawUnit(wiring.Component):
         connect(m, self.assembly.o, render.i)
         wiring.connect(m, render.memory, self.depth.memory)
         m.d.comb += [
-            *(self.pixels.payload[name].eq(drawn.payload[name]) for name in "xyrgb"),
+            *copy_fields(self.pixels.payload, drawn.payload, "xyrgb"),
             self.pixels.valid.eq(drawn.valid),
             drawn.ready.eq(self.pixels.ready),
             self.controls.buttons.eq(self.buttons),
@@ -158,8 +159,8 @@ class DrawUnit(wiring.Component):
             commands.i.payload.first_band.eq(first),
             self.motion.i.payload.slot.eq(command.index),
             self.motion.i.payload.angle.eq(angle),
-            *(self.mesh.i.payload[name].eq(command[name]) for name in ("first", "count")),
-            *(self.assembly.i.payload[name].eq(command[name]) for name in ("first", "count")),
+            *copy_fields(self.mesh.i.payload, command, ("first", "count")),
+            *copy_fields(self.assembly.i.payload, command, ("first", "count")),
             self.assembly.i.payload.material.eq(command.index),
             render.write.payload.address.eq(command.index),
             render.write.payload.data.eq((command.count << 12) | command.first),
@@ -250,6 +251,6 @@ class DrawUnit(wiring.Component):
         own = self.status
         count_events(m, own, **events)
         m.d.comb += [
-            *(own[name].eq(self.assembly.status[name]) for name in COUNTERS),
-            *(own[name].eq(self.render.status[name]) for name in RENDERED),
+            *copy_fields(own, self.assembly.status, COUNTERS),
+            *copy_fields(own, self.render.status, RENDERED),
         ]

@@ -8,6 +8,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import MATERIAL_BITS
 from blysk.golden.video.triangle_assembly import COUNTERS, TriangleAssembly
+from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.triangles import count_events, counters_shape, first_centre, triangle_shape
 from blysk.hdl.video.mesh_memory import range_shape
 from blysk.hdl.video.vertex_unit import screen_vertex_shape
@@ -96,7 +97,7 @@ class TriangleAssemblyUnit(wiring.Component):
             # A skid buffer would cost 400 bits for nothing: the next unit takes 5 cycles or more a triangle.
             advance.eq(~valid | self.o.ready),
             self.o.valid.eq(valid),
-            self.o.payload.eq(result),
+            copy(self.o.payload, result),
         ]
 
         # A triangle's word is read a cycle before the address of its first corner, and held for three.
@@ -153,9 +154,9 @@ class TriangleAssemblyUnit(wiring.Component):
             m.d.sync += [came.eq(arrives), first_row.eq(first), judged.eq(whole), was_outside.eq(outside)]
             with m.If(arrives):
                 m.d.sync += [
-                    corners[0].eq(corners[1]),
-                    corners[1].eq(corners[2]),
-                    corners[2].eq(word),
+                    copy(corners[0], corners[1]),
+                    copy(corners[1], corners[2]),
+                    copy(corners[2], word),
                     row.eq(first_centre(word.y, grid)),
                     outside.eq(word.outside | (outside & ~first)),
                 ]
@@ -189,7 +190,9 @@ class TriangleAssemblyUnit(wiring.Component):
             # All corners are there a cycle before the test of the band has a result.
             with m.If(found["whole"]):
                 for k, corner in enumerate(found["corners"]):
-                    m.d.sync += [result[name][k].eq(corner[name]) for name in ("x", "y", "depth", "normal")]
+                    m.d.sync += [
+                        copy(result[name][k], corner[name]) for name in ("x", "y", "depth", "normal")
+                    ]
                 m.d.sync += result.material.eq(found["material"])
         moves = advance & judged
         count_events(

@@ -11,6 +11,7 @@ from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.views import copy
 from blysk.hdl.core.word import Word
 from blysk.hdl.geometry.reciprocal import reciprocal_word, shared_table
 from blysk.hdl.geometry.wide_product import wide_product
@@ -200,7 +201,9 @@ class VertexUnit(PipelinedUnit):
         vertex = result.vertex
         m.d.comb += [
             result.index.eq(value["index"]),
-            *(Value.cast(vertex[name]).eq(Value.cast(value[name])) for name in ("x", "y", "depth")),
+            # A place is counted from the picture's edge to the other, its code in parts of a pixel.
+            *(copy(vertex[name], value[name].scale(self.model.scale_bits)) for name in "xy"),
+            Value.cast(vertex.depth).eq(value["depth"]),
             *(Value.cast(vertex.normal[k]).eq(value[f"normal_{k}"]) for k in range(3)),
             vertex.outside.eq(value["outside"] | value["x_over"] | value["y_over"]),
         ]

@@ -14,6 +14,7 @@ from blysk.golden.number.fixed import Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.views import copy
 from blysk.hdl.pipeline import ShadingPipelineUnit
 
 __all__ = ["ObservedPipeline", "Probe", "probes_of"]
@@ -109,7 +110,7 @@ class ObservedPipeline(Component):
                 continue
             source, sink = (outer, inner) if member.flow == In else (inner, outer)
             m.d.comb += [
-                Value.cast(sink.payload).eq(Value.cast(source.payload)),
+                copy(sink.payload, source.payload),
                 sink.valid.eq(source.valid),
                 source.ready.eq(sink.ready),
             ]
@@ -123,7 +124,7 @@ class ObservedPipeline(Component):
         if self.design.gate:
             m.d.sync += gated.eq(gated + (taken.valid & taken.ready & taken.payload.gated))
         for probe, value in _words(self.unit, fragment):
-            m.d.comb += Value.cast(self.status[probe.name]).eq(Value.cast(value))
+            m.d.comb += copy(self.status[probe.name], value)
         return m
 
 

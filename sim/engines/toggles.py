@@ -8,6 +8,7 @@ from amaranth.hdl import Cat, Const, Elaboratable, Fragment, Module, Signal, Val
 from amaranth.lib import data
 from amaranth.lib.wiring import Component, Out
 
+from blysk.hdl.core.views import copy
 from blysk.sim.engines.simulate import Run, simulate
 
 __all__ = ["ToggleCounter", "count_toggles"]
@@ -57,12 +58,12 @@ class ToggleCounter(Component):
             if hasattr(outer, "payload"):
                 source, sink = (inner, outer) if name == "o" else (outer, inner)
                 m.d.comb += [
-                    Value.cast(sink.payload).eq(Value.cast(source.payload)),
+                    copy(sink.payload, source.payload),
                     sink.valid.eq(source.valid),
                     source.ready.eq(sink.ready),
                 ]
             else:
-                m.d.comb += Value.cast(inner).eq(Value.cast(outer))
+                m.d.comb += copy(inner, outer)
         # Registers that never change: an AND with a constant would be written bit by bit, and take minutes
         # to compile.
         masks = [Signal(_WORD, init=mask, name=f"mask_{step}") for step, mask in enumerate(_Ones.MASKS)]

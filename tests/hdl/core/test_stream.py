@@ -6,106 +6,15 @@ from functools import partial
 
 import numpy as np
 import pytest
-from amaranth.hdl import Cat, Module, Signal, Value, signed, unsigned
-from amaranth.lib import data, enum, stream, wiring
+from amaranth.hdl import Cat, Module, Signal, Value, unsigned
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
-from blysk.hdl.core.fixed import SQ, UQ, FixedShape
-from blysk.hdl.core.stream import PipelinedUnit, connect, connect_slice, require_same_shape
+from blysk.hdl.core.fixed import SQ, FixedShape
+from blysk.hdl.core.single_register import hold_output
+from blysk.hdl.core.stream import PipelinedUnit, connect, connect_slice, skid_buffer, stop_output
 from blysk.sim.engines.simulate import simulate
-
-
-def struct(**fields):
-    return data.StructLayout(fields)
-
-
-class Color(enum.Enum, shape=2):
-    RED = 0
-    GREEN = 1
-
-
-class Size(enum.Enum, shape=2):
-    SMALL = 0
-    LARGE = 1
-
-
-EQUAL = [
-    lambda: unsigned(5),
-    lambda: signed(3),
-    lambda: SQ(1, 17),
-    lambda: UQ(-1, 18),
-    lambda: Color,
-    lambda: data.ArrayLayout(SQ(1, 17), 3),
-    lambda: struct(a=SQ(1, 17), b=data.ArrayLayout(struct(c=unsigned(2), d=UQ(0, 4)), 2)),
-    lambda: struct(),
-    lambda: data.UnionLayout({"a": unsigned(3), "b": signed(4)}),
-]
-
-# Two shapes, of equal width wherever that can be, and the end of the message.
-DIFFERENT = [
-    (SQ(1, 17), SQ(2, 16), "payload is SQ(1, 17) on one side, SQ(2, 16) on the other"),
-    (SQ(1, 17), UQ(1, 17), "payload is SQ(1, 17) on one side, UQ(1, 17) on the other"),
-    (SQ(1, 17), signed(18), "payload is SQ(1, 17) on one side, signed(18) on the other"),
-    (unsigned(18), UQ(1, 17), "payload is unsigned(18) on one side, UQ(1, 17) on the other"),
-    (unsigned(4), signed(4), "payload is unsigned(4) on one side, signed(4) on the other"),
-    (unsigned(4), unsigned(5), "payload is unsigned(4) on one side, unsigned(5) on the other"),
-    (
-        struct(a=SQ(1, 7), b=SQ(1, 7)),
-        struct(a=SQ(1, 7), b=SQ(2, 6)),
-        "payload.b is SQ(1, 7) on one side, SQ(2, 6) on the other",
-    ),
-    (
-        struct(a=unsigned(4)),
-        struct(b=unsigned(4)),
-        "payload has fields ['a'] on one side, ['b'] on the other",
-    ),
-    (
-        struct(a=unsigned(4), b=unsigned(4)),
-        struct(b=unsigned(4), a=unsigned(4)),
-        "payload has fields ['a', 'b'] on one side, ['b', 'a'] on the other",
-    ),
-    (
-        data.ArrayLayout(unsigned(6), 2),
-        data.ArrayLayout(unsigned(4), 3),
-        "payload has 2 elements on one side, 3 on the other",
-    ),
-    (
-        struct(n=data.ArrayLayout(struct(x=SQ(1, 3)), 2)),
-        struct(n=data.ArrayLayout(struct(x=SQ(0, 4)), 2)),
-        "payload.n[].x is SQ(1, 3) on one side, SQ(0, 4) on the other",
-    ),
-]
-
-
-@pytest.mark.parametrize("make", EQUAL)
-def test_equal_shapes_are_accepted(make):
-    require_same_shape(make(), make())
-
-
-@pytest.mark.parametrize(("a", "b", "message"), DIFFERENT, ids=[str(k) for k in range(len(DIFFERENT))])
-def test_different_shapes_are_refused(a, b, message):
-    with pytest.raises(TypeError) as error:
-        require_same_shape(a, b)
-    assert str(error.value) == message
-    with pytest.raises(TypeError):
-        require_same_shape(b, a)
-
-
-@pytest.mark.parametrize(
-    ("a", "b"),
-    [
-        (struct(a=unsigned(4)), unsigned(4)),
-        (struct(a=unsigned(4)), data.ArrayLayout(unsigned(4), 1)),
-        (data.ArrayLayout(unsigned(2), 2), unsigned(4)),
-        (data.UnionLayout({"a": unsigned(3)}), data.UnionLayout({"b": unsigned(3)})),
-    ],
-)
-def test_kinds_are_told_apart(a, b):
-    """A structure is no plain number, nor an array, though the bits are as many."""
-    for one, other in ((a, b), (b, a)):
-        with pytest.raises(TypeError, match=r"on one side, .* on the other$"):
-            require_same_shape(one, other)
 
 
 def streams(source_shape, sink_shape):
@@ -121,7 +30,16 @@ def test_a_moved_binary_point_is_refused(join):
         join(Module(), *streams(SQ(1, 17), SQ(2, 16)))
 
 
-@pytest.mark.parametrize("shape", [SQ(1, 7), struct(a=SQ(1, 3), b=unsigned(4)), unsigned(8)])
+@pytest.mark.parametrize("drive", [skid_buffer, stop_output, hold_output])
+def test_an_output_refuses_a_register_of_another_format(drive):
+    output, _ = streams(SQ(1, 17), SQ(1, 17))
+    with pytest.raises(TypeError, match=r"^payload is SQ\(2, 16\) on one side, SQ\(1, 17\) on the other$"):
+        drive(Module(), output, Signal(), Signal(SQ(2, 16)))
+
+
+@pytest.mark.parametrize(
+    "shape", [SQ(1, 7), data.StructLayout({"a": SQ(1, 3), "b": unsigned(4)}), unsigned(8)]
+)
 def test_connect_carries_payload_valid_and_ready(shape):
     source, sink = streams(shape, shape)
     m = Module()

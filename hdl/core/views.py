@@ -1,0 +1,137 @@
+"""Copies of views, and choices between views: two shapes that differ in a field or a format are refused."""
+
+from collections.abc import Iterable
+
+from amaranth.hdl import Mux, Shape, ShapeCastable, ShapeLike, Value, ValueLike
+from amaranth.lib import data
+
+from blysk.hdl.core.fixed import FixedShape
+
+__all__ = ["choose", "copy", "copy_fields", "of_shape", "require_same_shape"]
+
+
+def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
+    """Refuse two shapes that differ in a field, a width, a sign or a fixed-point format.
+
+    Amaranth assigns views by width alone, so that a moved binary point would pass.
+
+    Parameters
+    ----------
+    a, b : ShapeLike
+        Shapes.
+    path : str
+        What has the shapes, for the message.
+
+    Raises
+    ------
+    TypeError
+        If the shapes differ, naming the field.
+    """
+    if isinstance(a, data.StructLayout) and isinstance(b, data.StructLayout):
+        if list(a.members) != list(b.members):
+            raise TypeError(
+                f"{path} has fields {list(a.members)} on one side, {list(b.members)} on the other"
+            )
+        for name, shape in a.members.items():
+            require_same_shape(shape, b.members[name], f"{path}.{name}")
+    elif isinstance(a, data.ArrayLayout) and isinstance(b, data.ArrayLayout):
+        if a.length != b.length:
+            raise TypeError(f"{path} has {a.length} elements on one side, {b.length} on the other")
+        require_same_shape(a.elem_shape, b.elem_shape, f"{path}[]")
+    else:
+        custom = (FixedShape, data.Layout)
+        same = a == b if isinstance(a, custom) or isinstance(b, custom) else Shape.cast(a) == Shape.cast(b)
+        if not same:
+            raise TypeError(f"{path} is {a!r} on one side, {b!r} on the other")
+
+
+def copy(target, source, path: str = "view"):
+    """Assignment of all bits of a view, a fixed-point value or a plain value to another of the same shape.
+
+    Parameters
+    ----------
+    target, source : ValueLike
+        Where to, and where from.
+    path : str
+        What is copied, for the message.
+
+    Returns
+    -------
+    Assign
+        The assignment.
+
+    Raises
+    ------
+    TypeError
+        If the shapes differ in a field, a width, a sign or a fixed-point format.
+    """
+    require_same_shape(source.shape(), target.shape(), path)
+    return Value.cast(target).eq(Value.cast(source))
+
+
+def copy_fields(target, source, names: Iterable[str] | None = None) -> list:
+    """Assignments of fields to fields of the same name and shape.
+
+    Parameters
+    ----------
+    target, source : View or mapping of str to ValueLike
+        Where to, and where from. Each has the fields.
+    names : iterable of str, optional
+        Names of the fields; all of the target without it.
+
+    Returns
+    -------
+    list of Assign
+        An assignment a field.
+
+    Raises
+    ------
+    TypeError
+        If the shapes of a field differ, naming the field.
+    """
+    if names is None:
+        names = target.shape().members if isinstance(target, data.View) else target
+    return [copy(target[name], source[name], name) for name in names]
+
+
+def choose(condition: ValueLike, a, b):
+    """The view ``a`` where the condition holds, else ``b``: `Mux` of two values of one shape.
+
+    Parameters
+    ----------
+    condition : ValueLike
+        Condition.
+    a, b : ValueLike
+        Views, fixed-point values or plain values.
+
+    Returns
+    -------
+    ValueLike
+        Value of the shape that both have.
+
+    Raises
+    ------
+    TypeError
+        If the shapes differ in a field, a width, a sign or a fixed-point format.
+    """
+    require_same_shape(a.shape(), b.shape(), "choice")
+    return of_shape(a, Mux(condition, Value.cast(a), Value.cast(b)))
+
+
+def of_shape(like, bits: Value):
+    """Bits that come from a view, as a view of its shape again: from a memory, or from a `Mux`.
+
+    Parameters
+    ----------
+    like : ValueLike
+        View, fixed-point value or plain value.
+    bits : Value
+        Its bits, or those of a value of the same shape.
+
+    Returns
+    -------
+    ValueLike
+        The bits in the shape of ``like``; as they are where this has a plain shape.
+    """
+    shape = like.shape()
+    return shape(bits) if isinstance(shape, ShapeCastable) else bits
