@@ -479,7 +479,7 @@ def test_pairs_are_divided(prove):
     [
         ("second.eq(pair & ~second)", "second.eq(0)"),
         ("self.i.ready.eq(spans.i.ready & ~second)", "self.i.ready.eq(spans.i.ready)"),
-        ("Value.cast(given[0]).eq(Value.cast(end))", "Value.cast(given[0]).eq(Value.cast(values[2]))"),
+        ("copy(given[0], end)", "copy(given[0], values[2])"),
     ],
 )
 def test_lost_second_pixels_are_found(refute, inject, text, change):

@@ -211,8 +211,8 @@ BUGS = {
     "coordinates of another row": (
         "diffuse",
         "_carry_coordinates",
-        "eq(self.i.payload[name])",
-        "eq(self.i.payload[name] ^ (name == 'y'))",
+        "copy_fields(source.payload, self.i.payload, layout.members)",
+        "(source.payload[k].eq(self.i.payload[k] ^ (k == 'y')) for k in layout.members)",
     ),
     "the interpolator takes what waits": (
         "diffuse",
