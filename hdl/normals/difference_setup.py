@@ -16,7 +16,6 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import PipelinedUnit
-from blysk.hdl.core.views import copy
 from blysk.hdl.core.word import Word
 from blysk.hdl.normals.gpq import curve_shapes
 

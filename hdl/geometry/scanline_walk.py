@@ -1,0 +1,245 @@
+"""Walk along a scanline: which pixels a piece has, and the values of attributes at its ends.
+
+Parts of `SpanAttributesUnit`. All attributes are computed on one cycle. In the *serial* form the same
+adders compute one attribute after the other.
+"""
+
+from amaranth.hdl import Const, Module, Mux, Signal, Value, ValueLike
+from amaranth.lib import stream
+
+from blysk.golden.geometry.gradient_setup import GradientSetup
+from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
+
+__all__ = ["AttributeRing", "AttributeTurns", "ScanlineWalk"]
+
+_BITS = GradientSetup.FORMAT.width
+
+
+class AttributeTurns:
+    """Control of the attributes' turns: all attributes on one cycle, or *serial* one a cycle, four in all.
+
+    In the serial form the first attribute decides for all four whether a scanline comes in. The control of
+    the walk moves on with the last attribute, `ends`. With ``ahead`` registers tell whether the walk
+    advances.
+    """
+
+    def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool, ahead: bool):
+        self.serial, self.row_valid = serial, rows.valid
+        ahead &= serial
+        self.advance, self.leaves = Signal(name="advance", init=ahead), Signal(name="would_leave")
+        self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
+        # ``accepts``: a scanline comes in, on a step of each attribute; ``goes``: the control moves on;
+        # ``takes``: it takes a scanline; ``loads``: it takes one with pixels.
+        self.accepts, self.goes, self.takes = (Signal(name=name) for name in ("accepts", "goes", "takes"))
+        self.loads, covered = Signal(name="loads_walk"), rows.payload.row.covered
+        opens = ~busy | self.leaves
+        if not serial:
+            moves = ~busy | self.advance
+            m.d.comb += [self.ends.eq(1), self.steps.eq(1), rows.ready.eq(opens & moves)]
+            m.d.comb += [self.accepts.eq(rows.valid & rows.ready), self.takes.eq(self.accepts)]
+            m.d.comb += self.goes.eq(self.accepts | (busy & self.advance))
+            m.d.comb += self.loads.eq(self.takes & covered)
+            return
+        first, taken, moves = self.lane == 0, Signal(name="taken"), Signal(name="moves", init=ahead)
+        m.d.comb += [
+            rows.ready.eq(Mux(first, opens, taken) & moves),
+            self.accepts.eq(Mux(first, rows.valid & opens, taken)),
+            self.steps.eq(moves & Mux(first, busy | self.accepts, ~taken | rows.valid)),
+            self.ends.eq(self.lane == ATTRIBUTES - 1),
+            self.goes.eq(self.ends & moves & (~taken | rows.valid)),
+            self.takes.eq(taken),
+            self.loads.eq(taken & (has_pixels := Signal(name="has_pixels"))),
+        ]
+        with m.If(rows.valid):
+            m.d.sync += has_pixels.eq(covered)
+        if ahead:
+            # Whether the output lets the walk advance is known a cycle before.
+            stays, advances = Signal(name="stays_busy"), Signal(name="advances")
+            self.advances = advances
+            m.d.comb += stays.eq(Mux(self.goes, self.loads | (busy & ~self.leaves), busy))
+            m.d.sync += [self.advance.eq(advances), moves.eq(~stays | advances)]
+        else:
+            m.d.comb += moves.eq(~busy | self.advance)
+        with m.If(self.steps):
+            m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(self.accepts)]
+
+    def late(self, m: Module, value: ValueLike, name: str) -> Value:
+        """*Serial*: the value on the step before, from a register; else the value itself."""
+        if not self.serial:
+            return Value.cast(value)
+        register = Signal(len(Value.cast(value)), name=name)
+        with m.If(self.steps):
+            m.d.sync += register.eq(value)
+        return register
+
+
+class AttributeRing:
+    """A register of one attribute; *serial* a ring with a word of each attribute, moved on by every step.
+
+    A *late* word is replaced one step later, on its way round the ring, by values from
+    `AttributeTurns.late`.
+    """
+
+    def __init__(self, m: Module, name: str, turns: AttributeTurns, late: bool = False):
+        self.value = self._next = Signal(_BITS, name=name)
+        self._domain = "sync"
+        if turns.serial:
+            self._next, self._domain = Signal(_BITS, name=f"{name}_next"), "comb"
+            stays = turns.late(m, self.value, f"{name}_stays") if late else self.value
+            m.d.comb += self._next.eq(stays)
+            ring = [self.value, *(Signal(_BITS, name=f"{name}_{k}") for k in range(1, ATTRIBUTES - late))]
+            with m.If(turns.steps):
+                m.d.sync += [
+                    word.eq(other) for word, other in zip(ring, [*ring[1:], self._next], strict=True)
+                ]
+
+    def becomes(self, m: Module, value: ValueLike) -> None:
+        """Replace the word; a word that is not replaced stays."""
+        m.d[self._domain] += self._next.eq(value)
+
+
+class ScanlineWalk:
+    """Control of the walk along a scanline: first pixels to skip, then pieces, one or two bits a step.
+
+    A mask is the pixels of a whole piece, less one: ``loaded_mask`` for the span that comes in, ``mask`` for
+    the span inside.
+    """
+
+    def __init__(
+        self, m: Module, row, tag, loaded_mask: Value, mask: Signal, loads: Signal, busy: Signal, turns
+    ):
+        # ``left``: pixels of the span that are left, less one; ``bits``: bits of a number still to be walked.
+        left, bits = Signal(PIXEL_BITS, name="left"), Signal(PIXEL_BITS, name="bits")
+        self.pixels, begin = Signal(PIXEL_BITS, name="pixels"), Signal(PIXEL_BITS, name="begin")
+        self.turns = turns
+        self.emits, self.gives, self.cuts = (Signal(name=name) for name in ("emits", "gives", "cuts"))
+        self.skipping, whole = Signal(name="skipping"), Signal(name="whole")
+        self.moves, self.ends = (Signal(name=name) for name in ("moves", "ends"))
+        radix = 2 if turns.serial else 1
+        self.digit = Signal(radix, name="digit")
+        self.single, self.double = Signal(name="single"), Signal(name="double") if turns.serial else Const(0)
+        m.d.comb += [
+            self.digit.eq(bits[:radix]),
+            self.moves.eq(busy if turns.serial else busy & turns.advance),
+            self.gives.eq(busy & self.ends & ~self.skipping),
+            self.emits.eq(self.gives & turns.advance & turns.steps),
+        ]
+        # A whole piece that is not the last takes one pixel more than the mask: minus mask, minus 1.
+        after = (left + ~mask)[:PIXEL_BITS]
+        count = row.length - 1
+        if turns.serial:
+            # The scanline is there for three cycles before it is taken, and a step takes four cycles: the
+            # numbers that follow from both are computed one a cycle, with registers between them.
+            def registered(value, name):
+                register = Signal.like(value, name=name)
+                m.d.sync += register.eq(value)
+                return register
+
+            waiting, whole_piece = (Signal(PIXEL_BITS, name=name) for name in ("waiting", "waiting_mask"))
+            skip_ends = Signal(name="skip_ends")
+            with m.If(turns.row_valid):
+                m.d.sync += [
+                    waiting.eq(count),
+                    whole_piece.eq(loaded_mask),
+                    skip_ends.eq(~row.skip[radix:].any()),
+                ]
+            pixels, more = _piece(waiting, whole_piece)
+            count = waiting
+            loaded_piece = registered(pixels, "waiting_pixels"), registered(more, "waiting_more")
+            after = registered(Mux(self.skipping, left, after), "after")
+            pixels, more = _piece(after, mask)
+            next_piece = registered(pixels, "next_pixels"), registered(more, "next_more")
+            loaded_ends, next_ends = (
+                registered(~words[0][radix:].any(), "ends") for words in (loaded_piece, next_piece)
+            )
+            shift_ends = registered(~bits[2 * radix :].any(), "shift_ends")
+            with m.If(turns.goes):
+                with m.If(turns.loads):
+                    m.d.sync += [
+                        self.ends.eq(Mux(row.skips, skip_ends, loaded_ends)),
+                        turns.leaves.eq(~row.skips & loaded_ends & ~loaded_piece[1]),
+                    ]
+                with m.Else():
+                    m.d.sync += [
+                        self.ends.eq(Mux(self.ends, next_ends, shift_ends)),
+                        turns.leaves.eq(
+                            Mux(self.ends, next_ends & ~next_piece[1], shift_ends & ~self.skipping & ~whole)
+                        ),
+                    ]
+        else:
+            loaded_piece = _piece(count[:PIXEL_BITS], loaded_mask)
+            next_piece = _piece(Mux(self.skipping, left, after), mask)
+            m.d.comb += [
+                self.ends.eq(~bits[radix:].any()),
+                turns.leaves.eq(self.ends & ~self.skipping & ~whole),
+            ]
+        first = Signal(name="first_piece")
+        m.d.comb += self.cuts.eq(turns.goes & busy & self.ends & ~self.skipping & whole & first)
+        with m.If(turns.goes):
+            with m.If(turns.loads):
+                m.d.sync += [
+                    left.eq(count),
+                    self.skipping.eq(row.skips),
+                    bits.eq(Mux(row.skips, row.skip, loaded_piece[0])),
+                    self.pixels.eq(loaded_piece[0]),
+                    whole.eq(loaded_piece[1]),
+                    first.eq(1),
+                ]
+            with m.Elif(~self.ends):
+                m.d.sync += bits.eq(bits >> radix)
+            with m.Else():
+                m.d.sync += [
+                    bits.eq(next_piece[0]),
+                    self.pixels.eq(next_piece[0]),
+                    whole.eq(next_piece[1]),
+                    self.skipping.eq(0),
+                ]
+                with m.If(~self.skipping):
+                    m.d.sync += [left.eq(after), first.eq(0)]
+        slides = self.gives & ~tag.right
+        if turns.serial:
+            slides = registered(slides, "slides")
+        with m.If(turns.goes & (turns.loads | slides)):
+            m.d.sync += begin.eq(Mux(turns.loads, row.x, begin + self.pixels + 1))
+        self.x = Mux(tag.right, begin + left - self.pixels, begin)[:PIXEL_BITS]
+
+    def values(self, m: Module, name: str, loads, base, inward, following_step) -> tuple[Value, Value]:
+        """Values of an attribute at both ends of the piece.
+
+        Its step is ``inward`` when a span is loaded, and ``following_step`` later.
+        """
+        # Chosen behind registers: the sums take a whole cycle.
+        nears, totals = (
+            AttributeRing(m, f"{name}_{word}", self.turns, late=True) for word in ("near", "total")
+        )
+        steps = AttributeRing(m, f"{name}_step", self.turns)
+        near, total, step = nears.value, totals.value, steps.value
+        far = (total + sum(Mux(bit, step << k, 0) for k, bit in enumerate(self.digit)))[:_BITS]
+        whole = Mux(self.single, step, Mux(self.double, step << 2, step << 1))
+        following = (near + whole)[:_BITS]
+        with m.If(loads):
+            steps.becomes(m, inward)
+        with m.Elif(self.moves):
+            steps.becomes(m, Mux(self.ends, following_step, step << len(self.digit)))
+        controls = (loads, self.moves, self.ends, self.skipping, base, far, following)
+        names = ("loads", "moves", "ends", "skipping", "base", "far", "following")
+        loaded, moved, ended, skipped, base, end, following = (
+            self.turns.late(m, value, f"{name}_late_{word}")
+            for word, value in zip(names, controls, strict=True)
+        )
+        with m.If(loaded):
+            for word in (nears, totals):
+                word.becomes(m, base)
+        with m.Elif(moved):
+            with m.If(~ended):
+                totals.becomes(m, end)
+            with m.Else():
+                for word in (nears, totals):
+                    word.becomes(m, Mux(skipped, end, following))
+        return near, far
+
+
+def _piece(left: Value, mask: Value) -> tuple[Value, Value]:
+    """Pixels of the next piece, less one, and whether another piece follows it."""
+    more = (left & ~mask).any()
+    return Mux(more, mask, left), more
