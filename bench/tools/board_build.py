@@ -1,4 +1,4 @@
-"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, and the clocks reached."""
+"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, and the reached clocks."""
 
 import contextlib
 import json
@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 PERIODS = 1
-"""Periods of the reader's clock that a path between two clocks may take; crossing words stay longer."""
+"""Periods of the reader's clock that a path between two clocks may take. Crossing words stay longer."""
 
 _LIBRARY = """\
 read_verilog -lib -specify +/lattice/cells_sim_ecp5.v
@@ -34,7 +34,7 @@ read_verilog -lib +/lattice/cells_bb_ecp5.v
 """
 
 _FEWEST = 16
-"""Least number of registers of an enable or a reset; with fewer it becomes logic before the registers.
+"""Least number of registers of an enable or a reset. With fewer it becomes logic before the registers.
 
 Each tile has few wires for enables. On a nearly full 25F at least 865 wires were used twice with all enables,
 and 7 with this limit, both without `_SETTINGS`.
@@ -48,16 +48,17 @@ dfflegalize -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r -cell $_DFF
 """Commands of Yosys's step ``map_ffs`` with the limit `_FEWEST`."""
 
 _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
-"""Options of nextpnr. This placer makes the shortest wires. Where wires are scarce, nextpnr's other router
-removes as many as it lays, and does not end on a 25F."""
+"""Options of nextpnr. This placer makes the shortest wires. If wires are scarce, nextpnr's other router
+removes as many as it lays, and does not end on a 25F.
+"""
 
 _ROUNDS, _FEW = 100, 10
-"""Rounds of the router after which it may be given up, and least number of wires used twice for that."""
+"""Rounds of the router after which it may be given up, and least number of wires used twice to give up."""
 
 _SETTINGS = {"router2/currCongWeightMult": "0.2"}
 """Settings of nextpnr, put into the netlist: the cost of a wire that is used twice grows by this each round.
 
-By default the cost is constant, and where wires are scarce some hundreds stay in use twice.
+By default the cost is constant. If wires are scarce, some hundreds then stay in use twice.
 """
 
 _PARTS = {
@@ -67,17 +68,17 @@ _PARTS = {
     "block RAMs": "DP16KD",
     "PLLs": "EHXPLLL",
 }
-"""Parts that are counted, with nextpnr's names."""
+"""Counted parts, with nextpnr's names."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock of a design that was placed, or the paths from one clock to another.
+    """A clock of a placed design, or the paths from one clock to another.
 
     Parameters
     ----------
     name : str
-        Its domain, or two domains as ``one to another``.
+        Domain of the clock, or two domains as ``one to another``.
     needed, reached : float
         Rates, MHz.
     path : str
@@ -112,7 +113,7 @@ class Built:
     bitstream : bytes
         Bitstream that the FPGA loads.
     words : int
-        Number of memory words that were read back from the bitstream and are equal.
+        Number of equal memory words read back from the bitstream.
     """
 
     parts: dict[str, tuple[int, int]]
@@ -124,13 +125,14 @@ class Built:
 
 
 def _script(draw: float) -> str:
-    """Yosys's commands for a drawing clock in MHz: those of a unit, with the cells of pins and PLL.
+    """Yosys's commands for a drawing clock in MHz, as for a unit, with the cells of pins and PLL.
 
-    Small enables become logic. Multiplexers that join two look-up tables are not used: both tables would have
-    to be placed side by side, and few are saved (20,101 instead of 20,150 on a 25F, with 1,336 of them).
+    Small enables become logic. Multiplexers that join two look-up tables are not used. Both tables would have
+    to be placed side by side, and few tables are saved (20,101 instead of 20,150 on a 25F, with 1,336
+    multiplexers).
 
     The mapper saves look-up tables on paths that take less than a third of the clock's period by its
-    estimate: wires on a nearly full device are three times as long as it assumes.
+    estimate. Wires on a nearly full device are three times as long as in the estimate.
     """
     mapped = re.sub(r"(?<=abc9\.D )\d+", str(round(1e6 / draw / 3)), ECP5.synthesis)
     *before, synthesis = mapped.splitlines(keepends=True)
@@ -140,7 +142,7 @@ def _script(draw: float) -> str:
 
 
 def _stuck(said: str) -> str:
-    """Reason why the router will not end, from its log; empty while it may end.
+    """Reason why the router will not end, from its log. Empty while it may end.
 
     In all runs that ended, the number of wires used twice at least halved when the rounds doubled.
     """
@@ -173,7 +175,8 @@ def build(
     rates : dict of str to float
         Clock rates of its PLL in MHz, by domain.
     seeds : int
-        Most placements to try until every clock is met; if none meets all, the result is the best one.
+        Largest number of placements to try until every clock is met. If none meets all, the result is the
+        best placement.
     progress : callable
         Called with the name of each step.
 
@@ -236,7 +239,7 @@ def build(
 
 
 def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
-    """Refuse a netlist that does not fit: the placer would fail after minutes, or try for ever.
+    """Refuse a netlist that does not fit. The placer would fail after minutes, or try for ever.
 
     Parameters
     ----------
@@ -248,7 +251,7 @@ def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
     Raises
     ------
     TooLarge
-        If it takes more of some part than the device has; the message names all such parts.
+        If it takes more of a part than the device has. The message names all these parts.
     """
     kinds = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
     counts = {
@@ -285,7 +288,7 @@ def _used(report: Mapping[str, Any], kind: str) -> tuple[int, int]:
 
 
 def _clocks(report: Mapping[str, Any], rates: Mapping[str, float]) -> tuple[Clock, ...]:
-    """Clocks of nextpnr's report, each with its slowest path; then the paths between clocks."""
+    """Clocks of nextpnr's report, each with its slowest path, then the paths between clocks."""
     names, result = {}, []
     for net, rate in report["fmax"].items():
         name = next(
@@ -320,8 +323,8 @@ def _described(path: Sequence[Mapping[str, Any]], delay: float) -> str:
 def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
     """Make ``top.bit`` of a configuration in text, read it back, and compare.
 
-    The read-back text may name settings differently, as several names stand for one bit. So it is packed
-    again, which must give the same bytes; the contents of memories are compared directly.
+    The read-back text may name settings differently, because several names stand for one bit. So the text is
+    packed again, and must give the same bytes. The contents of memories are compared directly.
 
     Returns
     -------

@@ -22,7 +22,7 @@ OPTIONS = {
     for name, option in {**SCENE, **DESIGN, "method": DESIGN["method"]._replace(help=_METHOD)}.items()
     if name not in _LEFT_OUT
 }
-"""Options of the command, with the defaults that its help tells.
+"""Options of the command, with the defaults in its help.
 
-The size is that of the display, and the camera a perspective one.
+The size is the display's size, and the camera has perspective.
 """

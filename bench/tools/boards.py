@@ -27,18 +27,19 @@ class Board:
     reference : int
         Rate of its clock, Hz.
     buttons : tuple of (str, int)
-        Name and number of up to six button resources; the top gives each its meaning.
+        Name and number of up to six button resources. The top gives each its meaning.
     luts, block_rams, multipliers : int
-        Parts of its device, which has as many flip-flops as look-up tables.
+        Parts of its device. The device has as many flip-flops as look-up tables.
     lines : int
         Lines of a band, by the memory of the device.
     loader : str
         Name of the board for openFPGALoader.
     compact : bool
-        Whether the device is small: geometry of compact style, and setup interval 9 of methods that have it.
+        Whether the device is small. It then gets geometry of compact style, and setup interval 9 for methods
+        that have it.
     known : str
-        What is known of the bitstream of its default design, with commits. The command prints it before a
-        build, and the guide's table is made of it.
+        Known facts on the bitstream of its default design, with commits. The command prints them before a
+        build, and the guide's table is made from them.
     """
 
     name: str
@@ -132,7 +133,7 @@ def board_named(name: str) -> Board:
     Raises
     ------
     InputError
-        If there is none of that name; the message lists the names.
+        If there is no board of this name. The message lists the names.
     """
     if name not in BOARDS:
         raise InputError(f"board {name}", "unknown", f"use {', '.join(BOARDS)}")
@@ -145,7 +146,7 @@ def packages_missing() -> None:
     Raises
     ------
     InputError
-        If tools are missing; the message names all of them.
+        If tools are missing. The message names all of them.
     """
     needed = ("amaranth-boards", "pyosys", ECP5.package)
     missing = [package for package in needed if version_of(package) is None]

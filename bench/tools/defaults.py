@@ -1,4 +1,4 @@
-"""Values of the tools' options where none is given, as the help of their commands tells them."""
+"""Defaults of the tools' options, as the help of their commands shows them."""
 
 __all__ = ["EXPONENT", "SAMPLES", "SEED", "SEEDS", "SIZE"]
 
@@ -15,4 +15,4 @@ EXPONENT = 50
 """Exponent of the sweep of `blysk explore`."""
 
 SIZE = (320, 240)
-"""Width and height of its picture."""
+"""Width and height of the picture of `blysk explore`."""

@@ -28,7 +28,7 @@ def inline(text: str) -> str:
 
 
 def _table(lines: Sequence[str]) -> list[str]:
-    """A table whose columns are marked by runs of ``=``, as a table of Markdown."""
+    """A table with columns marked by runs of ``=``, as a table of Markdown."""
     starts = [match.start() for match in re.finditer("=+", lines[0])]
     spans = list(pairwise([*starts, None]))
     rules = [k for k, line in enumerate(lines) if set(line.strip()) <= {"=", " "}]
@@ -61,7 +61,7 @@ def markdown_table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list
 
 
 _SECTIONS = {"Parameters", "Members", "Attributes", "Raises", "Returns", "Yields"}
-"""Sections that are lists of names; others are text."""
+"""Sections that are lists of names. Other sections are text."""
 
 
 def markdown(text: str) -> str:

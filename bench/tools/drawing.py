@@ -1,7 +1,7 @@
 """Drawing of a structure: boxes in columns from left to right, arrows between them.
 
-A wide drawing is folded: its columns are in bands below each other, and an arrow from one band to another
-ends at a tag and continues at a tag of the same number.
+A wide drawing is folded, with its columns in bands below each other. An arrow from band to band ends at a
+tag, and continues at a tag of the same number.
 """
 
 from collections import Counter, defaultdict
@@ -24,11 +24,13 @@ _GAP = 9.0
 _WIDEST = 860.0
 """Width above which a drawing is folded."""
 _BETWEEN = 30.0
-"""Width between columns, about."""
+"""Approximate width between columns."""
 _FORMULAS, _LONGEST, _SHORT = 4, 40, 20
-"""Most formulas in a box, and most characters of one in a box and in a tag; a name replaces a longer one."""
+"""Most formulas in a box, and most characters of a formula in a box and in a tag. A name replaces a longer
+formula.
+"""
 _TAGS = 70.0
-"""Width that tags take on a side of a band, about."""
+"""Approximate width that tags take on a side of a band."""
 _BAND = 6
 """Number of cut arrows that weigh as much as a further band."""
 _FACES = {
@@ -80,7 +82,7 @@ class _Band:
 
 
 def _shown(operations: Counter[str]) -> Counter[str]:
-    """Operations as a box shows them: constants are marked at products only, which need no multiplier."""
+    """Operations as a box shows them. Constants are marked only at products, which need no multiplier."""
     shown: Counter[str] = Counter()
     for symbol, number in operations.items():
         shown["× const" if symbol == "×c" else symbol.removesuffix("c")] += number
@@ -197,7 +199,7 @@ class _Layout:
         return count
 
     def _order(self) -> None:
-        """Order each column by its neighbours' mean places; the order with fewest crossings counts."""
+        """Order each column by its neighbours' mean places. The order with fewest crossings counts."""
         best, fewest = [list(c) for c in self.columns], self._crossings()
         last = len(self.columns) - 1
         for sweep in range(40):
@@ -236,7 +238,7 @@ class _Layout:
                     self.places[k].y = float(y)
 
     def _close_gaps(self) -> None:
-        """Take out empty stripes, as between parts that no arrow joins."""
+        """Take out empty stripes, such as between parts that no arrow joins."""
         shift, bottom = 0.0, -np.inf
         for place in sorted(self.places, key=lambda p: p.y - p.height / 2):
             top = place.y - place.height / 2

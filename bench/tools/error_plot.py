@@ -24,7 +24,7 @@ _PUBLISHED = "total, as published"
 
 
 def _envelope(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Largest error in each interval; NaN in an interval without operands."""
+    """Largest error in each interval. NaN in an interval without operands."""
     place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, len(edges) - 2)
     largest = np.full(len(edges) - 1, -1.0)
     np.maximum.at(largest, place, errors)
@@ -32,7 +32,7 @@ def _envelope(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 
 def _shares(at: np.ndarray, errors: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Share of errors in each interval; NaN in an interval without operands."""
+    """Share of errors in each interval. NaN in an interval without operands."""
     counts, wrong = np.histogram(at.ravel(), edges)[0], np.histogram(at.ravel()[errors], edges)[0]
     return np.divide(wrong, counts, out=np.full(len(counts), np.nan), where=counts > 0)
 
@@ -45,7 +45,7 @@ class _Measured:
 
 
 def _distinct(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> list[_Measured]:
-    """Measured entries; entries with equal results are merged."""
+    """Measured entries. Entries with equal results are merged."""
     found: list[_Measured] = []
     for entry, sample in zip(entries, samples, strict=True):
         if sample is None:
@@ -83,7 +83,7 @@ def _with_published(measured: Sequence[_Measured]) -> list[tuple[_Measured, _Mea
 def _intervals(
     logarithmic: bool, first: np.ndarray, low: float, high: float, bins: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds and middles of the intervals of an axis; ``first`` are operands of a variant."""
+    """Bounds and middles of the intervals of an axis. ``first`` are operands of a variant."""
     if logarithmic:
         low = 1.0 if low == 0 and np.all(first == np.rint(first)) else max(low, 1e-3)
         edges = np.geomspace(low, high, bins + 1)
@@ -100,7 +100,7 @@ def draw_errors(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> F
     entries : sequence of Entry
         Variants of the unit.
     samples : sequence of Sample or None
-        Sample of each variant; ``None`` if it was not measured.
+        Sample of each variant. ``None`` if the variant was not measured.
     """
     panels = _with_published(_distinct(entries, samples))
     columns = 2 if len(panels) == 4 else min(len(panels), 3)
@@ -181,7 +181,7 @@ _CURVES = {
 
 
 def _curves_of(sample: Sample) -> list[tuple[str, np.ndarray]]:
-    """Names of the curves of an entry, and the errors of every result; the last is the total error."""
+    """Names of the curves of an entry, and the errors of every result. The last is the total error."""
     found, exact = np.asarray(sample.found), np.asarray(sample.exact)
     if isinstance(sample, Decisions):
         return [("yes by mistake", (found > exact).ravel()), ("no by mistake", (found < exact).ravel())]

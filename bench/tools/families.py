@@ -62,9 +62,9 @@ class Family:
     synthesis : str
         Yosys's commands from a flat netlist to mapped cells, a line each.
     look_up_tables : str
-        Their name in nextpnr's report.
+        Name of look-up tables in nextpnr's report.
     flip_flop, multiplier, block_ram, distributed_ram : str
-        Patterns of the kinds of cells that are counted.
+        Patterns of the counted kinds of cells.
     logic : str
         Pattern of the other kinds of cells.
     untimed : str
@@ -72,11 +72,12 @@ class Family:
     registers : str
         A sentence on registers inside multipliers.
     limit : float or None
-        Largest clock rate, MHz, that is quoted for a design with a multiplier that got registers on both
-        sides by `absorb_registers`, since nextpnr does not time the path between them. ``None``: registers
-        stay as Yosys leaves them.
+        Largest quoted clock rate, MHz, of a design with a multiplier with registers on both sides by
+        `absorb_registers`. nextpnr does not time the path between these registers. ``None``: registers stay
+        as Yosys leaves them.
     target : int
-        Clock rate, MHz, that nextpnr is asked for. Far above what a design reaches, its router does not end.
+        Target clock rate of nextpnr, MHz. If it is far above the rate that a design reaches, nextpnr's router
+        does not end.
     """
 
     device: str
@@ -165,7 +166,7 @@ synth_lattice -family lifcl -top top -noiopad -run map_cells:""",
 FAMILIES = {"ecp5": ECP5, "nexus": NEXUS}
 
 DEVICES = FAMILIES | {"ecp5-85f": ECP5_85F}
-"""Devices by name: that of each family's figures, and larger ones."""
+"""Devices by name: the device of each family's figures, and larger devices."""
 
 DEVICE = ECP5.device
 """Device of the figures if no family is chosen."""
@@ -180,17 +181,17 @@ class Place:
     seed : int
         Seed of the placement.
     fmax : float
-        Largest clock rate, MHz; at most `Family.limit` if a multiplier is closed.
+        Largest clock rate, MHz. At most `Family.limit` if a multiplier is closed.
     start, end : str
         Registers, or memories, at the ends of the slowest path.
     logic, routing : float
-        Nanoseconds of that path in cells and between them.
+        Nanoseconds of the slowest path in cells, and between them.
     kinds : dict of str to int
-        Number of cells of each kind on it.
+        Number of cells of each kind on the slowest path.
     closed : int
-        Multipliers with registers inside on both sides; nextpnr does not time the path between these.
+        Multipliers with registers inside on both sides. nextpnr does not time the path between these.
     rerouted : bool
-        Whether the target was out of reach, so that slow paths were not routed again and again.
+        Whether the target was out of reach, so that slow paths were not routed again.
     """
 
     seed: int
@@ -205,7 +206,7 @@ class Place:
 
 
 def signal_name(cell: str, family: Family) -> str:
-    """Name of the register or memory from which a cell has its name."""
+    """Name of the register or memory that gives a cell its name."""
     # nextpnr names the pieces of a cell by a `$` or `/` and a word.
     name = re.split(rf"_(?:{family.cells})_|(?<!^)[$/][A-Za-z]", cell)[0]
     # The pieces of a memory, and what Amaranth tells equal names apart by.

@@ -15,8 +15,8 @@ __all__ = ["Formulas"]
 class Formulas:
     r"""Formulas by the names of registers, from a unit's data flows and from its class.
 
-    The registers of a functional unit have the formulas of all operations on it: an operand's register those
-    of its operands, another one those of the results, or the names of their words.
+    The registers of a functional unit have the formulas of all operations on it. An operand's register has
+    the formulas of operands. Another register has the formulas of results, or the names of their words.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Formulas:
             found[name].append(formula.text)
 
     def of(self, name: str) -> tuple[str, ...]:
-        """Formulas of a register; empty if it has none."""
+        """Formulas of a register. Empty if it has none."""
         for pattern, text in self._stated.items():
             if match := re.fullmatch(pattern, name):
                 return (match.expand(text),)

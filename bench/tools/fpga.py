@@ -1,20 +1,21 @@
 """Place and route: parts of an FPGA that a unit or the pipeline takes, and its clock rate.
 
-``blysk fpga`` prints it, from tools that pip installs: Yosys (package ``pyosys``) maps the netlist to the
-cells of a family of FPGAs, nextpnr (a package a family) places and routes them on a device of the family in
-its slowest speed grade, out of context: ports are no pins. Placement starts from a seed, and the clock rate
-differs by a few per cent between seeds. There is a `Family` for Lattice's ECP5 and one for Nexus.
+``blysk fpga`` prints it, from tools that pip installs. Yosys (package ``pyosys``) maps the netlist to the
+cells of a family of FPGAs. nextpnr (a package for each family) places and routes them on a device of the
+family in its slowest speed grade. This is out of context, so ports are no pins. Placement starts from a seed.
+The clock rate differs by a few per cent between seeds. There is a `Family` for Lattice's ECP5 and one for
+Nexus.
 
 Every port has a register before or behind it, so that every path of the design is between registers and
-counts; these registers are not among the counted parts. The delay of reset is not counted.
+counts. These registers are not among the counted parts. The delay of reset is not counted.
 
-On ECP5 `absorb_registers` moves registers beside a multiplier into it, as Yosys does not. nextpnr times a
-multiplier with registers on one side in full, but not the path between registers on both sides. The clock
+On ECP5 `absorb_registers` moves registers beside a multiplier into it, because Yosys does not. nextpnr times
+a multiplier with registers on one side in full, but not the path between registers on both sides. The clock
 rate of a design with such a multiplier is quoted up to `Family.limit`, and the design is named below the
 table.
 
-On Nexus nextpnr times each stage of a multiplier, with its registers' clock-to-output and setup times, and
-Yosys moves registers beside a multiplier into it; only a multiplier with an adder inside has no delay, and is
+On Nexus nextpnr times each stage of a multiplier, with its registers' clock-to-output and setup times. Yosys
+moves registers beside a multiplier into it. Only a multiplier with an adder inside has no delay, and is
 refused.
 """
 
@@ -56,13 +57,13 @@ __all__ = [
 
 
 Designs = Sequence[tuple[str, Callable[[], wiring.Component]]]
-"""Name of each design, and what makes it."""
+"""Name of each design, and a function that makes it."""
 
 _HEAD = ("design", "LUT", "FF", "mult", "BRAM", "LUTRAM", "min", "median", "max", "slowest path, ns")
 
 
 def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
-    """The figures as aligned text, below the parts of the device; the path is that of the slowest seed."""
+    """The figures as aligned text, below the parts of the device. The path is from the slowest seed."""
     lines = [_HEAD, (family.device, *map(str, asdict(family.capacity).values()), "", "", "", "")]
     for layout in layouts:
         slowest = min(layout.places, key=lambda place: place.fmax)
@@ -78,14 +79,14 @@ def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
 
 
 def table_by_unit(name: str, units: Mapping[str, Parts], family: Family = ECP5) -> str:
-    """Parts of each unit as aligned text, between those of the device and those of the whole design."""
+    """Parts of each unit as aligned text, between the parts of the device and of the whole design."""
     rows = {family.device: family.capacity, **units, name: sum_parts(units)}
     head = ("unit", *_HEAD[1:6])
     return _aligned([head, *((unit, *map(str, asdict(parts).values())) for unit, parts in rows.items())], {0})
 
 
 def _aligned(lines: Sequence[Sequence[str]], left: Container[int]) -> str:
-    """Lines of words as columns; those of ``left`` begin at one place, the others end at one."""
+    """Lines of words as columns. Columns of ``left`` are aligned left, the others right."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
         " ".join(
@@ -191,9 +192,9 @@ def place(designs: Designs, family: Family, seeds: int, jobs: int, inside: bool,
     Parameters
     ----------
     designs : sequence of (str, callable)
-        Name of each, and what makes it.
+        Name of each design, and a function that makes it.
     family : Family
-        The FPGA, and the clock rate that is asked for.
+        The FPGA, and its target clock rate.
     seeds, jobs, inside
         As for `lay_out`.
     figures : str or None

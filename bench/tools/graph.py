@@ -26,9 +26,9 @@ class Node:
     detail : str
         Width, format or size.
     operations : Counter
-        Symbols of the operations in the box, and the number of each; ``×c`` is a product by a constant.
+        Symbols of the operations in the box, and the number of each. ``×c`` is a product by a constant.
     copies : int
-        Equal boxes that this one stands for.
+        Number of equal boxes that the box stands for.
     stages : int
         Registers of a plain delay that the box stands for.
     formulas : tuple of str
@@ -53,7 +53,7 @@ class Graph:
     nodes : dict of int to Node
         Boxes.
     edges : dict of (int, int) to bool
-        Arrows between boxes; true if the arrow carries data, false if it only chooses or enables.
+        Arrows between boxes. True if the arrow carries data, false if it only chooses or enables.
     """
 
     nodes: dict[int, Node] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Graph:
         return number
 
     def connect(self, source: int, target: int, is_data: bool) -> None:
-        """Add an arrow; if there are two between the same boxes, the one that carries data counts."""
+        """Add an arrow. Of two arrows between the same boxes the arrow that carries data counts."""
         self.edges[source, target] = self.edges.get((source, target), False) or is_data
 
     def neighbours(self, data_only: bool = False) -> tuple[dict[int, set[int]], dict[int, set[int]]]:
@@ -85,7 +85,7 @@ class Graph:
         self.edges = {edge: data for edge, data in self.edges.items() if numbers.issuperset(edge)}
 
     def bypass(self, number: int, loops: bool = False) -> None:
-        """Drop a box and join its sources to its targets; a box to itself only if ``loops``."""
+        """Drop a box and join its sources to its targets. A box is joined to itself only if ``loops``."""
         into = [(a, data) for (a, b), data in self.edges.items() if b == number and a != number]
         out = [(b, data) for (a, b), data in self.edges.items() if a == number and b != number]
         del self.nodes[number]

@@ -196,7 +196,7 @@ class Netlist:
                     graph.connect(source, number, data)
 
     def _find_held(self) -> set[tuple[str, int]]:
-        """Operands of multiplexers that only keep a register's word: cell, and number of the operand."""
+        """Operands of multiplexers that only keep a register's word, as cell and number of the operand."""
         choices = {}
         for name, cell in self.cells.items():
             if cell["type"] in ("$mux", "$pmux"):
@@ -314,7 +314,7 @@ def _operand_words(cell) -> list[list]:
 
 
 def _without_duplicates(cells: dict) -> tuple[dict, dict[int, int]]:
-    """Cells without those that compute the same word again, and the nets that replace the dropped ones."""
+    """Cells without duplicates of the same word, and the nets that replace the dropped nets."""
     replaced: dict[int, int] = {}
     count = -1
     while count != len(cells):

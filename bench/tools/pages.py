@@ -84,7 +84,7 @@ def _model(unit: str) -> type | None:
 
 
 def _link(text: str, path: str, folder: Path) -> str:
-    """A text that leads from a page to a file of the project; the text alone where there is no checkout."""
+    """A text that leads from a page to a file of the project. The text alone if there is no checkout."""
     file, _, anchor = path.partition("#")
     if not (PROJECT / file).exists():
         return text
@@ -398,12 +398,13 @@ def write_pages(
 ) -> None:
     """Write the pages of units, their pictures and the index.
 
-    The files of a page are written after all of them are made; pictures that it no longer has are removed.
+    The files of a page are written after all of them are made. Pictures that the page no longer has are
+    removed.
 
     Parameters
     ----------
     folder : Path
-        Folder of the pages, such as ``docs/blocks``; it is made if there is none. Links lead from there to
+        Folder of the pages, such as ``docs/blocks``. It is made if there is none. Links lead from there to
         the files of the project.
     units : sequence of str
         Keys of `RECORDS`.
@@ -415,7 +416,7 @@ def write_pages(
     Raises
     ------
     InputError
-        If the folder or a file cannot be written, or a file would be replaced that is no page.
+        If the folder or a file cannot be written, or if a file that is no page would be replaced.
     """
     check_folder(folder, units)
     # First: it tells that the folder is ours, whatever comes between.

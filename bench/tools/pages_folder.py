@@ -12,7 +12,7 @@ PROJECT = Path(__file__).resolve().parents[2]
 """Folder of the project, with its sources and documents if it is a checkout."""
 
 MADE = "made by `blysk pages`"
-"""Words of the folder's first page by which it is known."""
+"""Words of the folder's first page that mark the folder."""
 
 
 def check_folder(folder: Path, units: Sequence[str]) -> None:
@@ -28,7 +28,7 @@ def check_folder(folder: Path, units: Sequence[str]) -> None:
     Raises
     ------
     InputError
-        If it cannot be made or written, or a file would be replaced that `blysk pages` did not write.
+        If it cannot be made or written, or if a file that `blysk pages` did not write would be replaced.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -18,13 +18,13 @@ from blysk.bench.tools.tool_runner import ToolRunner
 __all__ = ["OTHERS", "parts_by_unit", "sum_parts", "units_of"]
 
 OTHERS = "others"
-"""Name of what is in no unit below the design itself."""
+"""Name of the parts in no unit below the design itself."""
 
 _LUTS = {"LUT4": 1, r"CCU2C?": 2, r"(TRELLIS_)?DPR16X4": 6}
-"""Look-up tables of a cell, by the pattern of its kind; a memory takes four, and two that write to it."""
+"""Look-up tables of a cell, by the pattern of its kind. A memory takes four, and two that write to it."""
 
 _LEVELS = 3
-"""Names in the path of a unit at most."""
+"""Largest number of names in the path of a unit."""
 
 
 def units_of(netlist: str) -> list[str]:
@@ -33,7 +33,7 @@ def units_of(netlist: str) -> list[str]:
     Parameters
     ----------
     netlist : str
-        RTLIL of a `Registered` component. A path has `_LEVELS` names or less; the datapath of a pipelined
+        RTLIL of a `Registered` component. A path has `_LEVELS` names or less. The datapath of a pipelined
         unit counts as the unit.
     """
     found = re.findall(r"^module \\top\.unit\.(\S+)$", netlist, re.MULTILINE)
@@ -45,8 +45,8 @@ def parts_by_unit(
 ) -> dict[str, Parts]:
     """Parts of each unit of a component without those of the units inside it, by its path.
 
-    Yosys maps the whole component, so that logic may be shared between units: it is counted where its cell
-    has its name. Look-up tables are those of the mapped cells; nextpnr adds some at the ends of carries.
+    Yosys maps the whole component, so that units may share logic. Shared logic counts for the unit in its
+    cell's name. Look-up tables are of the mapped cells. nextpnr adds some at the ends of carries.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def parts_by_unit(
     InputError
         If a tool is not installed.
     ToolError
-        If it fails.
+        If a tool fails.
     """
     versions_of(family)
     netlist = rtlil.convert(Registered(component), name="top", emit_src=False)

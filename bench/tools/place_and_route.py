@@ -67,7 +67,7 @@ YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()
 _RIPUP = "--tmg-ripup"
 _SLACK = re.compile(r"ripped up due to negative slack WNS=(-?[\d.]+)ns")
 _ROUNDS = 10
-"""Rounds of the router for paths that are too slow, in which the slowest must become faster."""
+"""Rounds of the router for paths that are too slow. In this number the slowest path must become faster."""
 
 _LARGE = 1000
 """Least number of look-up tables of a large design."""
@@ -82,7 +82,7 @@ class Layout:
     name : str
         The design.
     parts : Parts
-        Its parts, the same for every seed.
+        Parts of the design, the same for every seed.
     places : tuple of Place
         A place for each seed.
     """
@@ -99,7 +99,7 @@ class Layout:
 
     @property
     def closed(self) -> int:
-        """Multipliers with registers inside on both sides; nextpnr does not time the path between these."""
+        """Multipliers with registers inside on both sides. nextpnr does not time the path between these."""
         return max(place.closed for place in self.places)
 
     def as_dict(self) -> dict[str, Any]:
@@ -119,7 +119,7 @@ class Layout:
 class Registered(wiring.Component):
     """A component with a register at every port except clock and reset.
 
-    The registers break its handshakes: it is only for timing, not for simulation.
+    The registers break its handshakes, so it is only for timing, not for simulation.
 
     Parameters
     ----------
@@ -160,12 +160,12 @@ class Registered(wiring.Component):
 
 
 def tool_versions(family: Family = ECP5) -> dict[str, str | None]:
-    """Version of each tool by its package, ``None`` if it is not installed; without importing any."""
+    """Version of each tool by its package, without an import. ``None`` if it is not installed."""
     return {package: version_of(package) for package in ("pyosys", family.package)}
 
 
 def versions_of(family: Family) -> dict[str, str]:
-    """Versions of the tools; `InputError` if one is not installed."""
+    """Versions of the tools. `InputError` if a tool is not installed."""
     versions = tool_versions(family)
     missing = [package for package, version in versions.items() if version is None]
     if missing:
@@ -182,12 +182,12 @@ def ports_of(netlist: Mapping[str, Any]) -> set[int]:
 
 
 def at_port(cell: Mapping[str, Any], ports: set[int]) -> bool:
-    """Whether a flip-flop is one of those at the ports: with it nothing else is there."""
+    """Whether a flip-flop is a register of `Registered` at a port, with nothing else there."""
     return any(ports & {*cell["connections"].get(pin, ())} for pin in ("D", "DI", "Q"))
 
 
 def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Family = ECP5) -> Parts:
-    """Parts of a mapped netlist; the number of look-up tables comes from nextpnr's report.
+    """Parts of a mapped netlist. The number of look-up tables comes from nextpnr's report.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
 
 
 def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
-    """Refuse a netlist that does not fit, by its cells of each kind: the placer would try for ever."""
+    """Refuse a netlist that does not fit, by its cells of each kind. The placer would try for ever."""
     for name, pattern, most in (
         ("flip-flops", family.flip_flop, family.capacity.flip_flops),
         ("multipliers", family.multiplier, family.capacity.multipliers),
@@ -238,7 +238,7 @@ def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
 
 
 def _write_without_ports(path: Path, netlist: Mapping[str, Any]) -> None:
-    """Write a netlist without its ports for placement, as it may have more ports than the FPGA has pins."""
+    """Write a netlist without its ports for placement. It may have more ports than the FPGA has pins."""
     top = {**netlist["modules"]["top"], "ports": {}}
     path.write_text(json.dumps({**netlist, "modules": {**netlist["modules"], "top": top}}), encoding="utf-8")
 
@@ -310,10 +310,11 @@ def _store(path: Path, parts: Parts, place: Place) -> None:
 
 
 def _stuck(said: str) -> str:
-    """Why the router will not end, from its log; "" if it may.
+    """Reason why the router will not end, from its log. Empty if it may end.
 
-    nextpnr routes wires of slow paths again for as long as there are such paths. Where the target cannot be
-    met at all it goes on for ever: of the bisection the slowest path was the same to 10 ps in 27 rounds.
+    nextpnr routes wires of slow paths again for as long as there are slow paths. If the target cannot be met
+    at all, it goes on for ever. An example is the bisection, with the same slowest path to 10 ps in 27
+    rounds.
     """
     slack = [float(worst) for worst in _SLACK.findall(said)]
     stuck = len(slack) > _ROUNDS and max(slack[-_ROUNDS:]) <= max(slack[:-_ROUNDS])
@@ -356,7 +357,7 @@ def lay_out(
     InputError
         If a tool is not installed.
     TooLarge
-        If it does not fit.
+        If the design does not fit.
     ToolError
         If a tool fails, or the netlist cannot be timed.
     """
@@ -387,7 +388,7 @@ def lay_out(
 def map_cells(
     netlist: str, folder: Path, runner: ToolRunner, family: Family, absorb: bool
 ) -> tuple[dict[str, Any], Absorbed]:
-    """Map a netlist, in RTLIL, to a family's cells: Yosys's JSON, and what `absorb_registers` moved."""
+    """Map a netlist, in RTLIL, to a family's cells: Yosys's JSON, and counts of `absorb_registers`."""
     (folder / "top.il").write_text(netlist, encoding="utf-8")
     runner.run("Yosys", YOSYS, [], folder, MAP_BEFORE + family.synthesis + MAP_AFTER)
     mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
@@ -398,7 +399,7 @@ def map_cells(
 def _run(
     netlist: str, seeds: Sequence[int], jobs: int, family: Family, absorb: bool
 ) -> Iterator[tuple[int, tuple[Parts, Place]]]:
-    """Run the tools; yields the result of each seed as soon as it is done."""
+    """Run the tools, and yield the result of each seed as soon as it is done."""
     runner = ToolRunner()
     module = family.package.replace("-", "_")
     nextpnr = f"import sys, {module} as n; sys.exit(n.{module.replace('yowasp', 'run')}(sys.argv[1:]))"

@@ -2,9 +2,9 @@
 
 The netlist is Amaranth's own, read by Yosys. A box is a register with the operations in front of it, an
 operation that several registers share, a memory, a submodule or a port. Wires, slices, constants, inversions,
-single-bit logic and the control by valid and ready are left out, and so are multiplexers between a word and
-itself or a constant (enables, resets, saturation). Copies of one structure, such as the three components of a
-vector, are one box.
+single-bit logic and the control by valid and ready are left out. Multiplexers between a word and itself or a
+constant (enables, resets, saturation) are left out, too. Copies of one structure, such as the three
+components of a vector, are one box.
 """
 
 import re
@@ -27,7 +27,7 @@ _COMPARISONS = {"<", "≤", ">", "≥", "=", "≠"}
 _CONTROL = re.compile(r"(^|_)(ready|valid|ages)$|^(held|moves)$")
 
 MOST_BOXES = 48
-"""Largest number of boxes of a drawing before more of them are left out."""
+"""Largest number of boxes of a drawing. With more, kinds of boxes are left out."""
 
 
 def _reached(starts: Iterable[int], following: dict[int, set[int]]) -> set[int]:

@@ -1,4 +1,4 @@
-"""Designs of a sweep of the design space, and the choices that they are combined of."""
+"""Designs of a sweep of the design space, and the choices that they combine."""
 
 import json
 import shlex
@@ -31,7 +31,7 @@ OPERANDS = get_args(Operand)
 
 
 SERVED = LOBES | MIRROR_LOBES | MODELS
-"""Specular units by reflection model; a model with a roughness takes the roughness of the exponent."""
+"""Specular units by reflection model. A model with a roughness takes the roughness of the exponent."""
 
 DEGREES = sorted({degree for of in METHODS.values() for degree in of.degrees})
 """Degrees that polynomials of methods can have."""
@@ -59,7 +59,7 @@ class Candidate:
     Raises
     ------
     ValueError
-        If there is no such design.
+        If the combination is impossible.
     """
 
     method: str
@@ -75,7 +75,7 @@ class Candidate:
 
     @cached_property
     def design(self) -> ShadingPipeline:
-        """Its `ShadingPipeline`: the bit-accurate model of the pipeline."""
+        """The design's `ShadingPipeline`, the bit-accurate model of the pipeline."""
         usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
         interpolator = usual.interpolator
         if interpolator.needs_table and self.model in MODELS:
@@ -87,7 +87,7 @@ class Candidate:
         return replace(usual, interpolator=interpolator)
 
     def unit(self) -> "ShadingPipelineUnit":
-        """Its hardware."""
+        """The design's hardware."""
         # The hardware's description takes a second to import, and a sweep is listed without it.
         from blysk.hdl.pipeline import ShadingPipelineUnit
 

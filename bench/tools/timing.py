@@ -19,7 +19,7 @@ from blysk.sim.engines.simulate import stimulus_of
 __all__ = ["Waves", "draw_timing", "waves_of"]
 
 _BEATS, _MOST_RESULTS, _MOST_COLUMNS = 3, 6, 44
-"""Number of input beats if none are given; most results, and most columns of a diagram."""
+"""Default number of input beats, most results, and most columns of a diagram."""
 
 PIXELS = 3
 """Pixels of a span in a diagram, if the unit makes pixels of spans."""
@@ -45,7 +45,7 @@ class Waves:
     levels : dict of str to bool array
         ``i.valid``, ``i.ready``, ``o.valid`` and ``o.ready``.
     inputs, outputs : list of (str or None)
-        Name of the beat that each stream offers in a cycle; ``None``: no beat.
+        Name of the beat that each stream offers in a cycle. ``None``: no beat.
     """
 
     levels: dict[str, np.ndarray]
@@ -61,16 +61,17 @@ class Waves:
 def waves_of(unit: Component, beat: dict | None = None, example: UnitRun | None = None) -> Waves:
     """Simulate a unit with a pause of the source and a stall of the sink.
 
-    The source pauses for two cycles before its last beat; the sink is not ready for two cycles at the first
-    result, or at the second if a beat has several. While no beat is offered, every bit of the payload is 1.
+    The source pauses for two cycles before its last beat. The sink is not ready for two cycles at the first
+    result, or at the second result if a beat has several. While no beat is offered, every bit of the payload
+    is 1.
 
     Parameters
     ----------
     unit : Component
         Unit.
     beat : dict, optional
-        Fields of three input beats; other fields and the constants are 0. A field ``length`` is replaced by
-        `PIXELS`: a beat is then a span with that number of results.
+        Fields of three input beats. Other fields and the constants are 0. A field ``length`` is replaced by
+        `PIXELS`. A beat is then a span with this number of results.
     example : UnitRun, optional
         Beats, constants and writes before them, in place of ``beat``. It ends with the first few results.
 
@@ -152,13 +153,13 @@ def _letter(k: int) -> str:
 
 
 def _offered(valid: np.ndarray, ready: np.ndarray, names: list[str]) -> list[str | None]:
-    """Name of the offered beat in each cycle: the next after the beats that have moved."""
+    """Name of the offered beat in each cycle, the next after the moved beats."""
     moved = np.cumsum(valid & ready) - (valid & ready)
     return [names[k] if is_valid else None for k, is_valid in zip(moved, valid, strict=True)]
 
 
 def _shown(waves: Waves) -> list[int | None]:
-    """Cycles of the diagram; `None` for a stretch that is left out."""
+    """Cycles of the diagram. `None` stands for a stretch that is left out."""
     states = [
         (
             waves.levels["i.valid"][k],

@@ -1,4 +1,4 @@
-"""Runs the tools that map, place and route: in a folder, with a limit to what they try."""
+"""Runs the tools that map, place and route, in a folder, with a limit to their attempts."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ _SECONDS = 5
 """Seconds between two readings of a tool's output."""
 
 MOUNT = "/job"
-"""Path, in the tool's sandbox, of the folder in which it runs, the only one that it sees."""
+"""Path, in the tool's sandbox, of the folder in which it runs. The tool sees only this folder."""
 
 
 class ToolError(SimulationError):
@@ -51,7 +51,7 @@ class ToolRunner:
     ) -> None:
         """Run Python code in a folder, with a text as its standard input.
 
-        `given_up` is called every few seconds with the tool's output so far; if it returns a reason, the tool
+        `given_up` is called every few seconds with the tool's output so far. If it returns a reason, the tool
         is stopped and `GivenUp` raised. `ToolError` is raised if the tool fails, or was stopped by `stop`.
         """
         # Python's own warnings are none of the tool's.

@@ -24,7 +24,7 @@ _HEADING = re.compile(r"<(h[1-6])>(.*?)</\1>", re.DOTALL)
 
 
 def slug(heading: str) -> str:
-    """Anchor of a heading, as hosts of Markdown name it; HTML in the heading is ignored."""
+    """Anchor of a heading, as hosts of Markdown name it. HTML in the heading is ignored."""
     text = re.sub(r"<[^>]+>|&\w+;", "", heading).strip().lower()
     return re.sub(r"[^\w\- ]", "", text).replace(" ", "-")
 
@@ -32,8 +32,8 @@ def slug(heading: str) -> str:
 def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Path]]:
     """Pages of folders as HTML, and their pictures.
 
-    Links between the folders stay. Those to Python files of the project stay as well: each file has a page
-    in the folder ``source``. Those that lead elsewhere become plain text.
+    Links between the folders stay. Links to Python files of the project stay, too, because each file has a
+    page in the folder ``source``. Other links become plain text.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
     Returns
     -------
     pages : dict of str to str
-        By file of the site; ``README.md`` is ``index.html``.
+        Pages by file of the site. ``README.md`` is ``index.html``.
     pictures : dict of str to Path
         SVG and PNG files to copy, by file of the site.
     """
@@ -87,7 +87,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
 
 
 def _image(match: re.Match, name: str, folder: Path, pictures: dict[str, Path]) -> str:
-    """Reference to a picture; one from outside the folder is added to the folder's pictures."""
+    """Reference to a picture. A picture from outside the folder is added to the folder's pictures."""
     path = (folder / match[1]).resolve()
     if path.is_file() and path.suffix in (".svg", ".png"):
         pictures[f"{name}/{path.name}"] = path
@@ -96,7 +96,7 @@ def _image(match: re.Match, name: str, folder: Path, pictures: dict[str, Path]) 
 
 
 def _link(match: re.Match, name: str, folders: Mapping[str, Path], sources: dict[str, Path]) -> str:
-    """A link of a page, changed to the files of the site; a source file that it leads to is added."""
+    """A link of a page, changed to the files of the site. A source file that it leads to is added."""
     address, anchor, others, text = match[1], match[2] or "", match[3], match[4]
     if not address:
         return match[0]
@@ -119,7 +119,7 @@ def _link(match: re.Match, name: str, folders: Mapping[str, Path], sources: dict
 
 
 def _source(match: re.Match, name: str, target: Path, sources: dict[str, Path]) -> str:
-    """A link to the page of a Python file of the project, which is added; of another file its text."""
+    """A link to the page of a Python file of the project, which is added. For another file the text alone."""
     if target.suffix != ".py" or not target.is_file() or not target.is_relative_to(PROJECT):
         return match[4]
     file = target.relative_to(PROJECT).as_posix()

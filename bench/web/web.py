@@ -1,7 +1,7 @@
 """``blysk web``: a static site in which a browser simulates the pipeline, cycle by cycle, as WebAssembly.
 
 The page gets all formats, addresses, models and words from the Python objects, as JSON. Data and modules are
-scripts that are loaded when needed: a page from disk can load nothing else.
+scripts that are loaded when needed, because a page from disk can load nothing else.
 """
 
 import json
@@ -92,7 +92,7 @@ def write_site(
     report: Path | None = None,
     folders: Mapping[str, Path] | None = None,
 ) -> None:
-    """Write the site. Each file is whole or not there; files that only an earlier site has are removed.
+    """Write the site. Each file is whole or not there. Files that only an earlier site has are removed.
 
     Parameters
     ----------
@@ -222,14 +222,14 @@ def make_site(
     designs: Sequence[tuple[str, str]],
     jobs: int,
 ) -> None:
-    """Make what a site consists of, and write it.
+    """Make the parts of a site, and write the site.
 
     Parameters
     ----------
     folder, report, folders
-        As for `write_site`; without a report a quick one is measured.
+        As for `write_site`. Without a report a quick report is measured.
     designs : sequence of (method, model)
-        Designs of the modules; if empty, `DESIGNS`.
+        Designs of the modules. If empty, `DESIGNS`.
     jobs : int
         Processes.
 

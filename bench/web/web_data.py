@@ -78,7 +78,7 @@ WIDTH, HEIGHT = 320, 240
 """Size of the pictures."""
 
 BANDS = (100, MAX_EXPONENT)
-"""Exponents for which spans are cut; a frame uses the smallest that is at least its own exponent."""
+"""Exponents for which spans are cut. A frame uses the smallest that is at least its own exponent."""
 
 ROUGHNESSES = tuple(round(step / 100, 2) for step in range(10, 101))
 """Roughnesses that a model with a roughness may have."""
@@ -104,7 +104,7 @@ START = {
 """Settings of the page at its start."""
 
 RIVAL = "linear"
-"""Method that a frame may be compared with, in hardware too."""
+"""Method for comparison with a frame, in hardware, too."""
 
 REFERENCES = {
     "method": {
@@ -129,7 +129,7 @@ REFERENCES = {
         "model": "blinn",
     },
 }
-"""References with which the frame may be compared; ``None``: the design's own curve or model."""
+"""References for comparison with the frame. ``None``: the design's own curve or model."""
 
 
 # What is drawn.
@@ -290,9 +290,9 @@ def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tu
 
 
 def with_vectors(spans: Spans, scene: Scene, design: ShadingPipeline) -> Spans:
-    """Spans of `spans_of` for the light of a scene: of a method that takes vectors with these.
+    """Spans of `spans_of` for the light of a scene. A method that takes vectors gets them.
 
-    The page's script computes the same, a product and a sum at a time.
+    The page's script computes the same, one product and one sum at a time.
     """
     if design.interpolator.brings_ends:
         return spans
@@ -384,7 +384,7 @@ def module_of(method: str, model: str) -> dict[str, Any]:
 
 
 def lobe_of(design: ShadingPipeline) -> dict[str, Any] | None:
-    """Values for frame constants with a table, which the page makes itself; ``None`` without tables.
+    """Values for frame constants with a table, which the page makes itself. ``None`` without tables.
 
     Returns
     -------

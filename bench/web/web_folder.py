@@ -1,4 +1,4 @@
-"""Folders that a site is written into and made of, checked before long work."""
+"""Folders that a site is made from and written into, checked before long work."""
 
 import importlib.util
 import json
@@ -25,7 +25,7 @@ def folders_of(pages: Path | None) -> dict[str, Path]:
     Parameters
     ----------
     pages : Path, optional
-        Folder that ``blysk pages`` wrote; ``None``: the project's folder, if there is one.
+        Folder that ``blysk pages`` wrote. ``None``: the project's folder, if there is one.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def check_extras() -> None:
 
 
 def earlier(folder: Path) -> dict[str, Any] | None:
-    """The mark of a folder, if this program wrote it as a site; else ``None``."""
+    """The mark of a folder if this program wrote it as a site, else ``None``."""
     try:
         mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -59,7 +59,7 @@ def earlier(folder: Path) -> dict[str, Any] | None:
 
 
 def check_folder(folder: Path) -> None:
-    """Check, before long work, that a site can be written into a folder; writes nothing.
+    """Check, before long work, that a site can be written into a folder. The check writes nothing.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def check_folder(folder: Path) -> None:
 
 
 def report_files(folder: Path) -> list[Path]:
-    """Files of a report; `InputError` if the folder is none."""
+    """Files of a report. `InputError` if the folder is no report."""
     try:
         report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
         names = report["files"] if report["program"] == "blysk" else []
