@@ -88,11 +88,6 @@ def light_difference(span):
     return span.lights[0].diffuse.first
 
 
-def gate_word(span):
-    """Of a span, decided by the stub of a gate."""
-    return Value.cast(span["values"][0].highlight[0])[0]
-
-
 def phase(span):
     return span.phase
 

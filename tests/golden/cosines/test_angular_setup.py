@@ -215,23 +215,6 @@ def test_stiff_short_and_long_spans(length, share):
     assert step.values * share == pytest.approx(angle.values, rel=2.1e-5)
 
 
-def test_better_than_by_arccos():
-    """At 1 degree the published way, with the corrected table, misses by degrees of lambda."""
-    left, right, vector, length = operands(10, 1.0)
-    pixel = pixels(length)
-    t = pixel / (length - 1)
-    target = exact(left, right, vector, t)
-    to_left, to_right, cross = (
-        dot(a, b) / ONE**2 for a, b in ((left, vector), (right, vector), (left, right))
-    )
-    psi = Arccos("corrected").compute(Fixed.round(SQ(2, 16), cross))[0].values
-    phase = np.arctan2((to_right - np.cos(psi) * to_left) / np.sin(psi), to_left)
-    published = to_left / np.cos(phase) * np.cos(phase - t * psi)
-    ours = cosines(setup(left, right, vector, length), pixel)
-    # The ends are met all the same: between them the curve bulges with the square of psi.
-    assert np.abs(published - target).max() > 200 * np.abs(ours - target).max()
-
-
 @pytest.mark.parametrize("degrees", [0, 1e-3, 1, 10, 45, 90, 150])
 def test_with_the_highlight_cosine_unit(degrees):
     *vectors, length = operands(11, degrees, count=400)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from blysk.bench.units.operands import pairs_at
-from blysk.golden.methods.angular_interpolator import AngularInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
@@ -62,35 +61,6 @@ def test_spans_do_not_depend_on_each_other():
         np.testing.assert_array_equal(single.cosine.codes, whole.cosine.codes[pixels])
         np.testing.assert_array_equal(single.highlight.codes, whole.highlight.codes[pixels])
         assert single.out_of_range == whole.out_of_range[k]
-
-
-def test_agrees_with_the_angular_method():
-    """The same curve, found in another way."""
-    rng = np.random.default_rng(3)
-    left, right = (quantise(v) for v in pairs_at(rng, 300, rng.uniform(0, 45, 300)))
-    length = rng.integers(1, 100, 300)
-    vectors = [quantise(pairs_at(rng, 1, 0.0)[0]) for _ in range(2)]
-    found, other = (
-        operands_of(interpolator, left, right, length, *vectors)
-        for interpolator in (RecurrenceInterpolator(), AngularInterpolator())
-    )
-    assert np.abs(found.cosine.values - other.cosine.values).max() < 5e-5
-    assert np.abs(found.highlight.values - other.highlight.values).max() < 5e-5
-
-
-def test_direct_form_is_unstable():
-    """As drawn, in the same words: harmless in short spans, useless in long ones."""
-    rng = np.random.default_rng(4)
-    left, right = (quantise(v) for v in pairs_at(rng, 100, 10.0))
-    vectors = [quantise(pairs_at(rng, 1, 0.0)[0]) for _ in range(2)]
-    for length, least, most in ((8, 0, 1e-4), (256, 1e-3, 0.05), (2000, 0.02, 3)):
-        lengths = np.full(100, length)
-        direct, stable = (
-            errors(RecurrenceInterpolator(form), left, right, lengths, *vectors)[0].max()
-            for form in ("direct", "reinsch")
-        )
-        assert least <= direct < most
-        assert stable < 3e-5
 
 
 def test_refuses_a_form():

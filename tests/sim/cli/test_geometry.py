@@ -151,7 +151,6 @@ POINT_LIGHT = "--point-light", "3,4,5"
 SPANS = "a specialised pipeline takes spans; leave out specialise"
 VALUES = "triangles give normals, and chord-local takes values"
 LOCAL = "--method", "chord-local"
-QUOTIENT = "--method", "quotient"
 NO_SETUP = "spans need no triangle setup; "
 UNKNOWN = "use one of software, hardware"
 
