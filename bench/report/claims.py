@@ -137,7 +137,7 @@ class ClaimTable:
         return Table(self.name, self.title, [columns[k] for k in used], rows, self.note, grades)
 
 
-_COLUMNS = ("source", "kind", "stated", "in its place", "quantity", "printed", "measured", "as printed")
+_COLUMNS = ("source", "kind", "stated", "our replacement", "quantity", "printed", "measured", "as printed")
 _VERDICT = _COLUMNS.index("as printed")
 
 
@@ -195,8 +195,9 @@ class Document:
         text = [*self.text]
         if verdicts:
             text.append(
-                f"{sum(verdicts)} of {len(verdicts)} printed values come out as printed. A value that "
-                f"is computed from the document's statement may differ by {AGREEMENT:.1%}."
+                f"{sum(verdicts)} of {len(verdicts)} printed values come out as printed. Where we compute "
+                "the printed value from the document's statement, both values may differ by "
+                f"{AGREEMENT:.1%}."
             )
         plots = [plot.draw([found[_identity(task)] for task in plot.tasks(quick)]) for plot in self.plots]
         return Section(self.name, self.title, text, [*tables, *plots], appendix=self.appendix)

@@ -31,13 +31,13 @@ _SIZES = (640, 480), (1920, 1080)
 _TRIANGLES = (100, 1000, 10_000, 100_000, 1_000_000)
 
 BAD_INPUT = {
-    "a file that is not there": ("render", "none.obj"),
+    "a missing file": ("render", "none.obj"),
     "an unknown method": ("render", "teapot", "--method", "nothing"),
     "an exponent out of range": ("render", "teapot", "--exponent", "0"),
     "a picture without pixels": ("render", "teapot", "--size", "0x0"),
-    "a place that cannot be written": ("render", "teapot", "-o", "no/such/folder/a.png"),
+    "an output path in a missing folder": ("render", "teapot", "-o", "no/such/folder/a.png"),
 }
-"""Command lines by what is wrong in them."""
+"""Command lines with bad input, by the kind of fault."""
 
 
 @lru_cache(maxsize=1)
@@ -139,7 +139,7 @@ def _frame(triangles: int, size: Sequence[int], method: str) -> dict[str, Any]:
 def _criteria(quick: bool) -> list[Claim]:
     found = []
     for size in _SIZES:
-        # Short spans are what it is about, so one size has all of them.
+        # Short spans matter most here, so one size has all numbers of triangles.
         for triangles in _TRIANGLES[: -1 if quick and size != _SIZES[0] else None]:
             settings = _frame(triangles, size, _METHOD)
             scene = f"teapot of {triangles:,} triangles at {size[0]}x{size[1]}"
@@ -178,7 +178,11 @@ def _cycles(quick: bool) -> list[Claim]:
 def _simulated(quick: bool) -> list[Claim]:
     return [
         _claim(
-            "", f"cycles by the model over simulated cycles, {method}", simulated, {"method": method}, "ratio"
+            "",
+            f"cycles of the model divided by simulated cycles, {method}",
+            simulated,
+            {"method": method},
+            "ratio",
         )
         for method in METHODS
     ]
@@ -200,27 +204,28 @@ _DOCUMENT = Document(
     "criteria",
     "The documents' criteria",
     [
-        "[T] 1.3 asks some questions of a shading method. These are the answers for the default pipeline, "
+        "[T] 1.3 lists criteria of a shading method. This section answers them for the default pipeline: "
         f"`{_METHOD}` with `{_MODEL}`, one light and exponent {_EXPONENT}. The section *Energy proxy* "
-        "answers for energy, the section *More than one pixel a cycle* for several pipelines.",
-        "Cycles are those of the cycle model, from the first write of a constant to the last pixel; a "
-        "table compares it with simulation. The clock rate is that of place and route on one device, out "
-        "of context; geometry and frame buffer keep up. Spans that are out of range, empty or past the "
-        "edge are counted in `status`, and the pipeline goes on.",
+        "treats energy. The section *More than one pixel a cycle* treats several pipelines.",
+        "The cycle model gives the cycles, from the first write of a constant to the last pixel. A table "
+        "compares the model with simulation. Place and route on one device, out of context, gives the "
+        "clock rate. We assume that geometry and frame buffer keep up. The pipeline counts in `status` the "
+        "spans that are out of range, empty or past the edge, and goes on.",
     ],
     [
-        ClaimTable("criteria", "The criteria, one by one", _criteria),
+        ClaimTable("criteria", "Answers to the criteria", _criteria),
         ClaimTable(
             "criteria-triangles",
             "Cycles by number of triangles",
             _cycles,
-            "Small triangles have short spans, so work that is done once a span weighs more than the "
-            "pixels. A span of `quotient` takes three cycles at least, but of one pixel one.",
+            "Small triangles have short spans. Work that is done once a span then takes more cycles than "
+            "the pixels. A span of `quotient` takes at least three cycles, and a span of one pixel takes "
+            "one cycle.",
             {"cycles": "cycles", "pixels": "pixels", "spans": "spans", "spans before cutting": "uncut_spans"},
         ),
         ClaimTable(
             "criteria-simulated",
-            "The cycle model beside simulation",
+            "The cycle model compared with simulation",
             _simulated,
             "Teapot of 992 triangles at 160x120.",
             {"cycles, simulated": "simulated", "cycles, model": "modelled"},
@@ -229,7 +234,7 @@ _DOCUMENT = Document(
             "criteria-bad-input",
             "Bad input",
             _refused,
-            "No file is written.",
+            "A refused command line writes no file.",
             {"lines": "lines", "answer": "says"},
         ),
     ],

@@ -149,20 +149,23 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     shares = {block: _a_pixel(pair[False], block) / _total(pair[False]) for block in blocks}
     largest = max(shares, key=shares.get)
     text = [
-        f"Register bits that change, on the teapot at {width}x{height} in one light, one pixel a cycle: what "
-        "a pixel costs in switching, block by block, from simulation.",
+        "This section counts the register bits that change while a pixel is shaded, block by block. The "
+        f"counts come from simulation: the teapot at {width}x{height}, one light, one pixel a cycle.",
         f"The default pipeline, `{method}` with `{model}`, switches {_total(pair[False]):.0f} bits a pixel "
-        f"at exponent {exponent}, `{rival}` with `{other}` {_total(gated[False]):.0f}. Most is in the block "
-        f"*{largest}*: {shares[largest]:.0%}. What is done once a span weighs more, the shorter spans are: "
-        f"these have {pair[False]['pixels'] / pair[False]['spans']:.1f} pixels.",
-        "A highlight gate, which methods of unit normals can have, makes the specular unit stand still in "
-        "spans without a highlight, and itself switches once a span. With it the whole pipeline's count "
-        f"changes by {' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}.",
+        f"at exponent {exponent}. `{rival}` with `{other}` switches {_total(gated[False]):.0f}. The block "
+        f"*{largest}* has the largest share of the default pipeline: {shares[largest]:.0%}. Work done once "
+        "a span counts more when spans are short. These spans have "
+        f"{pair[False]['pixels'] / pair[False]['spans']:.1f} pixels on average.",
+        "Methods of unit normals can have a highlight gate. The gate stops the specular unit in spans "
+        "without a highlight, and its own registers switch once a span. With the gate the count of the "
+        "whole pipeline changes by "
+        f"{' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}.",
         "**Not counted**: bits inside multipliers and other logic between two registers, glitches, wires, "
-        "the clock's own tree, and the bits inside memories. It compares designs; it is no number of joules.",
+        "the clock tree, and bits inside memories. The count compares designs. It is not an energy in "
+        "joules.",
     ]
     if not all(frame["same"] for frame in all_frames):
-        text.append("**The pixels of a simulation are not the model's: these figures are void.**")
+        text.append("**The pixels of a simulation differ from the model's. These figures are void.**")
     parts = [_table(found, saved, blocks), _drawing(found, blocks)]
     return Section("energy", "Energy proxy: register bits that switch", text, parts)
 
@@ -193,10 +196,10 @@ def _table(found: dict, saved: dict, blocks: Sequence[str]) -> Table:
             grade: Grade = ("good" if saved[key] > 0 else "fair") if gate else ""
             grades.append([""] * (len(columns) - 1) + [grade])
     note = (
-        "Toggled register bits over pixels shaded, hidden ones too. Green: the gate saves more than it "
-        "takes; yellow: it takes more."
+        "Toggled register bits, divided by the shaded pixels, hidden pixels included. Green: the gate saves "
+        "more bits than it toggles. Yellow: the gate toggles more bits than it saves."
     )
-    return Table("energy", "Register bits that toggle, a pixel", columns, rows, note, grades)
+    return Table("energy", "Register bits that toggle for a pixel", columns, rows, note, grades)
 
 
 def _drawing(found: dict, blocks: Sequence[str]) -> Drawing:
@@ -209,7 +212,7 @@ def _drawing(found: dict, blocks: Sequence[str]) -> Drawing:
         for (method, model, exponent), of in found.items()
         for gate, frame in of.items()
     ]
-    # The two of a frame stand together.
+    # The two bars of a frame stand together.
     group = np.repeat(np.arange(len(found)), [len(of) for of in found.values()])
     place = np.arange(len(bars)) + group * 0.5
     start = np.zeros(len(bars))
@@ -224,7 +227,7 @@ def _drawing(found: dict, blocks: Sequence[str]) -> Drawing:
     axes.set_axisbelow(True)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
     note = (
-        "Blocks in the order in which a span passes them, from left to right. The sums of `quotient` are in "
-        "its setup of spans, and so are the normals of `bisection`."
+        "From left to right: blocks in the order in which a span passes through them. The block *setup of "
+        "spans* includes the sums of `quotient` and the normals of `bisection`."
     )
-    return Drawing("energy-blocks", "Register bits that toggle a pixel, by block", svg(figure), note)
+    return Drawing("energy-blocks", "Register bits that toggle for a pixel, by block", svg(figure), note)

@@ -108,18 +108,17 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
     best = min(fast, key=lambda of: of["total_error"][1])
     scenes = max(of["samples"] for of in timed)
     sentence = (
-        f"**`{best['label']}`** shades a pixel in {best['cycles'][1]:.2f} cycles; its largest error "
-        f"against exact Blinn shading, found on {scenes} scenes, is {best['total_error'][1]:.2f} LSB, with "
-        f"{_costs(best)}"
+        f"**`{best['label']}`** shades a pixel in {best['cycles'][1]:.2f} cycles. Its largest error against "
+        f"exact Blinn shading on {scenes} scenes is {best['total_error'][1]:.2f} LSB. It takes {_costs(best)}"
     )
     compared = [of for of in timed if of is not best and _is_compared(of)]
     equals = [of for of in compared if all(of[key][1] <= best[key][1] for key in ("cycles", "total_error"))]
     if not equals:
-        sentence += f". None of {len(compared)} others is both as fast and as exact"
+        sentence += f". Of {len(compared)} other designs none is both as fast and as exact"
     others = [f"`{of['label']}` ({_says(of)})" for of in on_front if of is not best]
     if others:
         more = f" and {len(others) - 3} more" if len(others) > 3 else ""
-        sentence += f"; also on the front {'is' if len(others) == 1 else 'are'} {', '.join(others[:3])}{more}"
+        sentence += f". The front also has {', '.join(others[:3])}{more}"
     rivals = _cheapest_first(
         of for of in timed if of["method"] == "renormalise" and of["total_error"][1] <= 1
     )
@@ -127,29 +126,28 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
         rival = rivals[0]
         times = rival["cycles"][1] / best["cycles"][1]
         sentence += (
-            f". Normalising at every pixel in its best form, `{rival['label']}`, errs by "
-            f"{rival['total_error'][1]:.2f} LSB and takes {times:.2f} times the cycles, with {_costs(rival)}"
+            ". Of the designs that normalise at every pixel, with an error of at most 1 LSB, "
+            f"`{rival['label']}` has the fewest multipliers. Its largest error is "
+            f"{rival['total_error'][1]:.2f} LSB. It takes {times:.2f} times the cycles and {_costs(rival)}"
         )
     prepared = _cheapest_first(of for of in timed if of["is_prepared"] and of["total_error"][1] <= 1)
     if prepared:
         sentence += (
-            f". `{prepared[0]['label']}` takes {_costs(prepared[0])}, but the dot products at three points "
-            f"of every "
-            "span are made before it and not counted"
+            f". `{prepared[0]['label']}` takes {_costs(prepared[0])}. Its spans bring dot products at three "
+            "points, whose computation is not counted"
         )
     mirrors = _cheapest_first(of for of in timed if of["is_mirror"])
     if mirrors:
         of = mirrors[0]
         sentence += (
-            f". True Phong highlights, (R·V)^n by `{of['label']}`, take {of['cycles'][1]:.2f} cycles and "
-            "err by "
-            f"{of['total_error'][1]:.2f} LSB against exact Phong shading, with {_costs(of)}"
+            f". For true Phong highlights, (R·V)^n, `{of['label']}` takes {of['cycles'][1]:.2f} cycles and "
+            f"{_costs(of)}. Its largest error against exact Phong shading is {of['total_error'][1]:.2f} LSB"
         )
     return Conclusion("What does a pixel cost, and how exact is it?", f"{sentence}.", _drawing(timed, best))
 
 
 def _is_compared(of: Mapping[str, Any]) -> bool:
-    """Whether a design may be on the front. It has to compute its dot products and draw Blinn's highlight."""
+    """Whether a design may be on the front: it computes its dot products and draws Blinn's highlight."""
     return not (of["is_prepared"] or of["is_mirror"])
 
 
@@ -172,7 +170,7 @@ def _front(found: Sequence[Mapping[str, Any]], kind: str, time: str = "cycles") 
         return []
     error, times = np.array([(of[kind][1], of[time][1]) for of in found]).T
     multipliers = np.array([of["multipliers"] or np.inf for of in found])
-    # Where one is not known, none has fewer.
+    # If a number of tables is not known, no comparison with it holds.
     luts = np.array([of["luts"] or np.nan for of in found])
     # [i, j]: whether j is better than i.
     less_error = error < error[:, np.newaxis] - _ALIKE_LSB
@@ -195,7 +193,7 @@ def _costs(of: Mapping[str, Any]) -> str:
     parts = [] if of["multipliers"] is None else [f"{of['multipliers']} multipliers"]
     if of["luts"] is not None:
         parts.append(f"{of['luts']:,} LUT at {of['fmax_mhz']:.0f} MHz")
-    return ", ".join(parts) or "not counted"
+    return ", ".join(parts) or "resources that were not counted"
 
 
 def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Drawing:
@@ -255,25 +253,23 @@ def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Dra
     scenes = max(of["samples"] for of in drawn)
     note = (
         f"A point is a design: its largest error and its median run time over up to {scenes} scenes "
-        f"(meshes, sizes, "
-        "exponents); bars go to the smallest error, and over the run times of all scenes"
+        "(meshes, sizes, exponents). A bar reaches down to the smallest error, and across the run times of "
+        "all scenes"
         + (" and seeds of placement" if in_ns else "")
-        + ". Open: as published. Asterisk: its dot products at three points of every span are made before "
-        "the pipeline, so that it is not on the front. Nor is `phong`, whose errors are against (R·V)^n. The "
-        "line is the front. Named are the front, and the "
-        "best and the worst of "
-        "each method."
-        " Not counted: spans are cut from triangles, and their normals prepared, before the pipeline (by "
-        "the host, or by "
-        "the hardware of `blysk verilog --geometry`); each part of a cut span counts with its cycles."
+        + ". An open mark is a variant as published. A design with an asterisk takes dot products at three "
+        "points of every span as input, so it is not on the front. `phong` is not on the front either, "
+        "because its errors are against (R·V)^n. The line is the front. Names stand at the front, and at the "
+        "best and the worst design of each method. Before the pipeline, the host or the hardware of "
+        "`blysk verilog --geometry` cuts spans from triangles and prepares their normals. This work is not "
+        "counted. The cycles of each part of a cut span are counted."
     )
     if in_ns and len(placed) < len(found):
         without = ", ".join(of["label"] for of in found if not of["ns"])
-        note += f" Not drawn, as they have no clock rate (not placed, or too large for the FPGA): {without}."
+        note += f" Not drawn, without a clock rate (not placed, or too large for the FPGA): {without}."
     elif not in_ns:
         note += (
-            f" {len(placed)} of {len(found)} designs have committed clock rates; "
-            "the others await `blysk fpga`, and nanoseconds are drawn once most have one, and the best."
+            f" {len(placed)} of {len(found)} designs have committed clock rates. Place the others with "
+            "`blysk fpga`. The drawing shows nanoseconds if most designs and the best have a clock rate."
         )
     return Drawing(
         "front", f"Error against {'nanoseconds' if in_ns else 'cycles'} a pixel", svg(figure), note
@@ -341,10 +337,9 @@ def spread_table(found: Sequence[Mapping[str, Any]]) -> Table:
         for of in found
     ]
     note = (
-        "Over all meshes, sizes and exponents. Cycles of the further scenes are those of the cycle model. "
-        "Parts a span: "
-        "spans after cutting over spans before, the cost of cutting. Multipliers are those of the netlist; "
-        "look-up tables "
-        "and clock rates those after place and route, where a design has been placed."
+        "Over all meshes, sizes and exponents. The cycle model gives the cycles of the further scenes. "
+        "Parts a span: number of spans after cutting, divided by the number before. Multipliers are counted "
+        "in the netlist. Look-up tables and clock rates are those after place and route, if a design has "
+        "been placed."
     )
     return Table("front", "Every design over all scenes", columns, rows, note)

@@ -97,7 +97,7 @@ def test_section():
     default, first, second = table.records()
     assert (default["method"], default["model"], default["gate"]) == (*DESIGN, "off")
     assert (default["cosines of pixels, bits a pixel"], default["saved, share"]) == (3, None)
-    assert "switches 8 bits a pixel at exponent 50, `quadratic` with `cosquad` 20. Most" in made.text[1]
+    assert "switches 8 bits a pixel at exponent 50. `quadratic` with `cosquad` switches 20." in made.text[1]
     assert (first["gate"], second["gate"]) == ("off", "on")
     assert (first["intensity, bits a pixel"], first["pipeline, bits a pixel"]) == (15, 20)
     assert second["highlight gate, bits a pixel"] == 2
