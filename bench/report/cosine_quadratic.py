@@ -186,7 +186,7 @@ _STYLES = {
     "cosquad_lin": {"color": "#009e73", "linestyle": ":", "label": "fQ2"},
 }
 
-_INFERRED = "What the published figure shows is inferred from the text; the figure itself was not at hand."
+_INFERRED = "We did not have the published figure. We infer its content from the text."
 
 
 def _highlights(results: Sequence[dict]) -> Drawing:
@@ -199,7 +199,9 @@ def _highlights(results: Sequence[dict]) -> Drawing:
     row[0].set_ylabel("brightness of the highlight")
     row[-1].legend(fontsize=8)
     title = "[C] figure 2: the models' highlights against the angle"
-    return Drawing("cosine-quadratic-2", title, svg(figure), f"fQ and fQ2 lie on each other. {_INFERRED}")
+    return Drawing(
+        "cosine-quadratic-2", title, svg(figure), f"The curves of fQ and fQ2 coincide. {_INFERRED}"
+    )
 
 
 def _errors(results: Sequence[dict]) -> Drawing:
@@ -222,8 +224,8 @@ def _errors(results: Sequence[dict]) -> Drawing:
         "cosine-quadratic-5",
         "[C] figure 5: errors against angle and exponent",
         svg(figure),
-        f"Left: where Blinn's model is at least {_SEEN}; middle: at least {ZONE}; right: at all angles. "
-        f"{_INFERRED}",
+        f"Left: angles at which Blinn's model is at least {_SEEN}. Middle: angles at which it is at least "
+        f"{ZONE}. Right: all angles. {_INFERRED}",
     )
 
 
@@ -231,18 +233,18 @@ _DOCUMENT = Document(
     "cosine-quadratic",
     "[C]: the cosine-quadratic model",
     [
-        "[C] replaces `cos^n gamma` by the square of a line, `max(k (cos gamma - 1) + 1, 0)^2`. Its f2 has "
-        "k = n/2. Its fQ has the k that meets Blinn's model at the level Q = 0.64, and its fQ2 a line "
-        "through that k, 0.448 n + 0.099.",
+        "[C] replaces `cos^n gamma` by the square of a line, `max(k (cos gamma - 1) + 1, 0)^2`. The model f2 "
+        "has k = n/2. The k of fQ makes the model equal to Blinn's at the level Q = 0.64. The model fQ2 "
+        "approximates the k of fQ by the line 0.448 n + 0.099.",
     ],
     [
         ClaimTable(
             "cosine-quadratic",
             "Errors of the models against Blinn's",
             claims,
-            f"Float64; n from {EXPONENTS[0]} to {EXPONENTS[-1]}, all angles; 1 is a full highlight. [C] does "
-            f"not define its zone. Here the zone is where Blinn's model is at least {ZONE}, which gives the "
-            "7.924 % of f2.",
+            f"Float64, n from {EXPONENTS[0]} to {EXPONENTS[-1]}, all angles. An error of 1 is a full "
+            "highlight. [C] does not define its zone. Here the zone has the angles at which Blinn's model "
+            f"is at least {ZONE}. With this zone the error of f2 is 7.924 %.",
         )
     ],
     [

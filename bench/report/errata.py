@@ -36,10 +36,10 @@ __all__ = [
 
 KINDS = {
     "slip": "a slip in print, drawing or listing",
-    "figure": "a figure that does not come out of the printed digits",
-    "unclear": "not defined, or readable in two ways",
-    "reading": "perhaps marks lost when a machine read the text that we have, and no error of the authors",
-    "form": "no error: a form or a choice that is good in its range, and that our units replace",
+    "figure": "a figure that the printed digits do not give",
+    "unclear": "a statement that is undefined, or has two meanings",
+    "reading": "perhaps no error of the authors, but marks lost when a machine read our copy of the text",
+    "form": "no error: a form or choice that is good in its range, and that our units replace",
 }
 """Explanations of the kinds of entries."""
 
@@ -170,7 +170,7 @@ def recurrence(pixels: int, degrees: float, bits: int) -> Pair:
 def worked_example() -> float:
     """[B] 5 at ``N = V = (0, 0, 1)``, ``L = (1, 1, 1)/sqrt 3``, n = 10, in one channel."""
     axis = np.array([0.0, 0, 1])
-    # I_d = 0.8 and I_s = 1: two lights, one without a highlight and one that is nothing else.
+    # I_d = 0.8 and I_s = 1 need two lights: the first has no highlight, the second only a highlight.
     dull = Material((0.1,) * 3, (0.7,) * 3, (0,) * 3, 10)
     glossy = Material((0,) * 3, (0,) * 3, (0.5,) * 3, 10)
     total = intensity(
@@ -194,7 +194,7 @@ def inverted_test() -> Pair:
     """Share of triangles of a teapot that take Gouraud shading: by the test as published, and inverted."""
     scene = scene_for(teapot(1_000), 50, 160, 120)
     every = len(scene.mesh.faces)
-    # Highlight and diffuse tests aside, which the inversion does not touch.
+    # Without the tests of highlight and diffuse term, because the inversion does not change them.
     close = int(gouraud_triangles(scene, Thresholds(highlight=math.inf, diffuse=math.inf)).sum())
     return (every - close) / every, close / every
 
@@ -271,7 +271,7 @@ CLAIMS = (
     ),
     Claim(
         "[T] table 3.1, columns A, B, C",
-        "columns A, B, C, which A x^2 + B x + C would fit, too",
+        "columns A, B, C, which could also mean A x^2 + B x + C",
         "largest error on [0, 0.5], rad",
         order,
         ours="A + B x + C x^2",
@@ -279,11 +279,11 @@ CLAIMS = (
     ),
     Claim(
         "[T] table 3.1, error",
-        "0.2 %, read as that of every row",
+        "0.2 %, which we read as the error of every row",
         "largest relative error on [0, 0.96]",
         arccos_rows,
         printed="0.002",
-        ours="more on [0.75, 0.96], by its own digits",
+        ours="its own digits give more on [0.75, 0.96]",
         kind="figure",
     ),
     Claim(
@@ -291,7 +291,7 @@ CLAIMS = (
         "a quadratic on [0.96, 1]",
         "largest error on [0.96, 1], corrected, rad",
         arccos_at_one,
-        ours="sqrt(1 - x) times a polynomial, or the half chord: arccos has a root's slope at 1",
+        ours="sqrt(1 - x) times a polynomial, or the half-chord: at x = 1 arccos has the slope of a root",
         kind="form",
     ),
     Claim(
@@ -301,7 +301,7 @@ CLAIMS = (
         root_error,
         {"degree": 1, "relative": True},
         printed="0.0012",
-        ours="0.12 % is that of the coefficients before they were rounded",
+        ours="0.12 % is the error of the coefficients before they were rounded",
         kind="figure",
         matter="digits-2.1",
     ),
@@ -322,7 +322,7 @@ CLAIMS = (
         root_error,
         {"degree": 2, "relative": False},
         printed="0.00002",
-        ours="both are those of the coefficients before they were rounded",
+        ours="both are errors of the coefficients before they were rounded",
         kind="figure",
         matter="digits-2.1",
     ),
@@ -332,7 +332,7 @@ CLAIMS = (
         "largest error, r from 0 to 1",
         factor_error,
         printed="0.00038",
-        ours="both are those of the coefficients before they were rounded",
+        ours="both are errors of the coefficients before they were rounded",
         kind="figure",
     ),
     Claim(
@@ -346,8 +346,8 @@ CLAIMS = (
     *(
         Claim(
             "[T] 3.3",
-            "cos(psi/m) = (cos psi - 1)/m^2 + 1, near for small psi",
-            f"1 - cos(psi/m) over the exact one, psi = {degrees} degrees",
+            "cos(psi/m) = (cos psi - 1)/m^2 + 1, approximately, for small psi",
+            f"1 - cos(psi/m), divided by its exact value, psi = {degrees} degrees",
             shortcut,
             {"degrees": degrees},
             ours="4 sin^2(psi/2m)/2 for 1 - cos(psi/m)",
@@ -359,7 +359,7 @@ CLAIMS = (
     *(
         Claim(
             "[T] figure 3.5",
-            "x(t+1) = 2 cos d x(t) - x(t-1), exact but for rounding",
+            "x(t+1) = 2 cos d x(t) - x(t-1), exact except for rounding",
             f"worst error: {pixels} pixels, {degrees} degrees, {bits} fraction bits",
             recurrence,
             {"pixels": pixels, "degrees": degrees, "bits": bits},
@@ -371,7 +371,7 @@ CLAIMS = (
     ),
     Claim(
         "[T] 4.1, worked example",
-        "0.3445, with 0.0015 for the highlight, as 0.577^10 = 0.003 would give",
+        "0.3445, with 0.0015 for the highlight; 0.577^10 = 0.003 would give this",
         "intensity",
         worked_example,
         printed="0.3445",
@@ -381,22 +381,22 @@ CLAIMS = (
     Claim(
         "[T] 4.1, MNSE",
         "each error divided by its own pixel's distance from the mean",
-        "share of a flat picture's values with a defined figure",
+        "share of a flat picture's values for which MNSE is defined",
         flat_picture,
-        ours="sum of errors over sum of distances (NMSE)",
+        ours="sum of errors divided by sum of distances (NMSE)",
         kind="form",
     ),
     Claim(
         "[T] appendix В",
-        "Phong where normals are close",
-        "share of the triangles of a teapot of 992 that the test of normals gives to Gouraud",
+        "Phong shading where normals are close",
+        "share of the triangles of a teapot of 992 for which the test of normals chooses Gouraud shading",
         inverted_test,
-        ours="Gouraud where they are close",
+        ours="Gouraud shading where normals are close",
         kind="slip",
     ),
     Claim(
         "[T] appendix Г, NormalVector",
-        "the end is extrapolated without the start vector",
+        "the end vector is extrapolated without the start vector",
         "error of the last normal, 10 degrees, 6 pixels",
         extrapolated_end,
         ours="N_l + g (N_r - N_l)",
@@ -404,16 +404,16 @@ CLAIMS = (
     ),
     Claim(
         "[T] appendix Г, NormalVector",
-        "dN is scaled in place at every pixel, from i = 0 on; read as by i/(m - 1)",
+        "dN is scaled in place at every pixel, from i = 0 on; we read the factor as i/(m - 1)",
         "error of the last normal, 10 degrees, 6 pixels",
         scaled_in_place,
-        ours="a scaled copy, dN itself kept",
+        ours="a scaled copy; dN itself does not change",
         kind="slip",
     ),
     Claim(
         "[T] appendix Д",
         "P[1]*x in green",
-        "error of green at a corner whose value is given, intensities 0.2, 0.4, 0.9",
+        "error of green at a corner with a given value, intensities 0.2, 0.4, 0.9",
         wrong_variable,
         ours="P[1]*y",
         kind="slip",
@@ -421,7 +421,7 @@ CLAIMS = (
     Claim(
         "[C], Phong's normalising coefficient",
         "(n+2)/2n",
-        "reflected energy at n = 10, to be 1",
+        "reflected energy at n = 10, ideally 1",
         energy,
         {"model": "phong", "exponent": 10},
         ours="(n+2)/(2 pi)",
@@ -431,7 +431,7 @@ CLAIMS = (
     Claim(
         "[C], Blinn's normalising coefficient",
         "((n+2)(n+4))/(8n(2^(n/2)+n))",
-        "reflected energy at n = 10, to be 1",
+        "reflected energy at n = 10, ideally 1",
         energy,
         {"model": "blinn", "exponent": 10},
         ours="((n+2)(n+4))/(8 pi (2^(-n/2)+n))",
@@ -441,14 +441,14 @@ CLAIMS = (
     Claim(
         "[C], mirror direction",
         "R = 2 (L x N) x N - L",
-        "length of R, to be 1",
+        "length of R, ideally 1",
         mirror,
-        ours="R = 2 (L·N) N - L: products are scalar",
+        ours="R = 2 (L·N) N - L: the products are scalar",
         kind="reading",
     ),
     Claim(
         "[C], epicentre zone",
-        "7.924 %, of a zone that is not defined",
+        "7.924 % in a zone that is not defined",
         "largest relative error of f2 in the zone",
         zone_error,
         printed="0.07924",
@@ -469,21 +469,22 @@ _DOCUMENT = Document(
     "errata",
     "Errata of the documents",
     [
-        f"{sum(matters().values())} matters in {len(CLAIMS)} entries. Each has a quantity that anyone can "
-        "compute again: by the printed statement, and as it comes out or is replaced. Not every entry is an "
-        f"error: {matters()['form']} matters are forms that are good in their range. The units keep the "
-        "published constants as named variants, so that their effect shows in the other sections.",
+        f"This section has {sum(matters().values())} matters in {len(CLAIMS)} entries. Each entry has a "
+        "quantity that anyone can compute again: by the printed statement, and by the right or replaced "
+        f"statement. Not every entry is an error: {matters()['form']} matters are forms that are good in "
+        "their range. The units keep the published constants as named variants. The other sections show "
+        "the effect of these constants.",
     ],
     [
         ClaimTable(
             "errata",
-            "What the documents print, and what comes out",
+            "Printed statements of the documents, and measured values",
             lambda quick: CLAIMS,
             "Kinds: "
             + "; ".join(f"*{kind}*, {meaning}" for kind, meaning in KINDS.items())
             + ". Printed: a value "
-            "that the document prints with its digits, or one that is computed from the printed statement. "
-            "docs/theory/errata.md describes the listings of [T].",
+            "that the document prints with its digits, or a value that we compute from the printed "
+            "statement. docs/theory/errata.md describes the listings of [T].",
         )
     ],
 )

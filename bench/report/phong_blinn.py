@@ -234,9 +234,9 @@ _DEGREES, _N = 50, 12
 
 _PICTURES = (
     ("phong", _N, f"true Phong, n = {_N}"),
-    ("blinn", 4 * _N, f"Blinn, 4 n = {4 * _N}: alike along"),
+    ("blinn", 4 * _N, f"Blinn, 4 n = {4 * _N}: equal along"),
     *(
-        ("blinn", n, f"Blinn, 4 n cos² a = {n}: alike across")
+        ("blinn", n, f"Blinn, 4 n cos² a = {n}: equal across")
         for n in [round(4 * _N * math.cos(math.radians(_DEGREES)) ** 2)]
     ),
 )
@@ -287,8 +287,8 @@ def _pictures(found: Sequence[dict]) -> Drawing:
         "phong-blinn-pictures",
         "True Phong and Blinn by simulated hardware",
         svg(figure),
-        f"A sphere, the light {2 * _DEGREES} degrees from the viewer. Phong's highlight is wider across the "
-        "plane of L and V than along it. Blinn's highlight is a circle in the space of normals.",
+        f"A sphere, with the light {2 * _DEGREES} degrees from the viewer. Phong's highlight is wider across "
+        "the plane of L and V than along the plane. Blinn's highlight is a circle in the space of normals.",
     )
 
 
@@ -360,28 +360,28 @@ _DOCUMENT = Document(
     "phong-blinn",
     "[P]: Phong and Blinn",
     [
-        "[P] compares Phong's model, `(R·V)^p`, with Blinn's, `(N·H)^n`. Its factor of about 4 between the "
-        "exponents holds for coplanar vectors near the peak; [P] itself says that it does not hold towards "
-        "pi/2. In the space of normals Phong's power n is as wide as Blinn's power 4 n along the plane of "
-        "L and V, and as `4 n cos^2 a` across it; 2 a is the angle from L to V. So no exponent makes both "
-        "models equal, unless L = V.",
-        "The section *Error against run time* has both models in hardware, the section *The documents' "
-        "criteria* cycles by number of triangles.",
+        "[P] compares Phong's model, `(R·V)^p`, with Blinn's, `(N·H)^n`. The factor of about 4 between the "
+        "exponents holds for coplanar vectors near the peak. [P] itself says that the factor does not hold "
+        "towards pi/2. Let 2 a be the angle from L to V. In the space of normals, along the plane of L and "
+        "V, Phong's power n is as wide as Blinn's power 4 n. Across the plane it is as wide as "
+        "`4 n cos^2 a`. So no exponent makes both models equal, unless L = V.",
+        "The section *Error against run time* has both models in hardware. The section *The documents' "
+        "criteria* has cycles by number of triangles.",
     ],
     [
         ClaimTable(
             "phong-blinn-exponents",
             "Blinn's exponent for Phong's highlight",
             _shapes,
-            "Half-widths are found from R·V itself; a in degrees.",
+            "We compute half-widths from R·V itself. The angle a is in degrees.",
         ),
         ClaimTable(
             "phong-blinn-operations",
-            "Operations and time of a pixel's shading, against Phong by the vector R",
+            "Operations and time to shade a pixel, compared with Phong by the vector R",
             _counts,
-            "One channel, one light, diffuse and ambient light included, a power as one function. Counted "
-            "and timed while NumPy does them in float64. Times are of one run, in turn, the fastest of "
-            "many.",
+            "One channel and one light, with diffuse and ambient light. A power counts as one function. "
+            "Operations are counted and timed while NumPy computes in float64. The ways run in turn in the "
+            "same run, and the fastest of many times counts.",
             {"operations": "all"}
             | {
                 kind: kind
@@ -392,9 +392,9 @@ _DOCUMENT = Document(
             "phong-blinn-frames",
             "Time of a frame with Phong's and with Blinn's model",
             _frames,
-            f"Teapot, exponent {_EXPONENT}; processor time of the golden renderer, NumPy in float64, both "
-            "models in one run. The renderer shades only what is seen, and what a model saves counts the "
-            "less, the more geometry takes.",
+            f"Teapot, exponent {_EXPONENT}. Processor time of the golden renderer, NumPy in float64, with "
+            "both models in one run. The renderer shades only visible pixels. If geometry takes more of the "
+            "time, a model saves a smaller share.",
             {"Phong, ns a visible pixel": "phong", "Blinn, ns a visible pixel": "blinn"},
         ),
     ],

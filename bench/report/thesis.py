@@ -172,7 +172,7 @@ def software(way: str, baseline: str, pixels: int, printed: float, repeats: int)
     pair = WAYS[way], WAYS[baseline]
     results = zip(*(one(*operands, pixels) for one in pair), strict=True)
     difference = max(float(np.abs(ours - theirs).max()) for ours, theirs in results)
-    # So many runs at once that a timing is no matter of microseconds.
+    # Several runs at once, so that a time is longer than some microseconds.
     runs = max(1, 64 // pixels)
     time, baseline_time = fastest(
         [lambda one=one: [_finish(one(*operands, pixels)) for _ in range(runs)] for one in pair], repeats
@@ -203,7 +203,7 @@ def prices(repeats: int) -> dict[str, float]:
     x = np.random.default_rng(1).uniform(0.5, 1, SPANS)
     actions = {"a multiplication": lambda: x * x, "a division": lambda: x / x}
     actions |= {"a root": lambda: np.sqrt(x), "a cosine": lambda: np.cos(x)}
-    # Many at once: one takes some microseconds.
+    # Many at once, because a single action takes some microseconds.
     loops = [lambda action=action: [action() for _ in range(100)] for action in actions.values()]
     product, *times = fastest(loops, repeats)
     return {name: time / product for name, time in zip(list(actions)[1:], times, strict=True)}
@@ -324,7 +324,7 @@ def _speeds(quick: bool) -> list[Claim]:
                         Claim(
                             speed.source,
                             f"{speed.name}: {speed.printed} times as fast",
-                            f"times as fast: {way}, against {baseline}{where}",
+                            f"times as fast: {way}, compared with {baseline}{where}",
                             software,
                             settings,
                             "ratio",
@@ -340,7 +340,15 @@ def _prices(quick: bool) -> list[Claim]:
     settings = {"repeats": 15 if quick else 40}
     kinds = ("a division", "a root", "a cosine")
     return [
-        Claim("this machine", "", f"{kind} of NumPy, multiplications", prices, settings, kind, timed=True)
+        Claim(
+            "this machine",
+            "",
+            f"time of {kind} of NumPy, in multiplications",
+            prices,
+            settings,
+            kind,
+            timed=True,
+        )
         for kind in kinds
     ]
 
@@ -356,7 +364,7 @@ def _units(quick: bool) -> list[Claim]:
                     Claim(
                         speed.source,
                         f"{speed.name}: {speed.printed} times as fast, in software",
-                        f"cycles a result of the {baseline} over those of the {unit}",
+                        f"cycles a result of the {baseline}, divided by those of the {unit}",
                         hardware,
                         {"unit": unit, "baseline": baseline},
                         "interval",
@@ -387,7 +395,7 @@ def _shares(quick: bool) -> list[Claim]:
     ]
 
 
-_MNSE = "MNSE: each error over its own pixel's distance from the mean"
+_MNSE = "MNSE: each error divided by its own pixel's distance from the mean"
 
 
 def _squares(quick: bool) -> list[Claim]:
@@ -401,10 +409,10 @@ def _squares(quick: bool) -> list[Claim]:
 
 def _steps(quick: bool) -> list[Claim]:
     first = _squares(quick)[0].settings
-    step = "1 LSB more in the value nearest the mean, over 1 LSB more in the farthest"
+    step = "error of 1 LSB in the value nearest the mean, divided by that of 1 LSB in the farthest value"
     share = "share of the 1 % of the values that are nearest the mean, %"
     return [
-        Claim("[T] 4.1", _MNSE, step, square_errors, first, "step", ours="NMSE: sum over sum"),
+        Claim("[T] 4.1", _MNSE, step, square_errors, first, "step", ours="NMSE: a sum divided by a sum"),
         Claim("[T] 4.1", _MNSE, share, square_errors, first, "nearest"),
     ]
 
@@ -418,62 +426,64 @@ _DOCUMENT = Document(
     "thesis",
     "[T]: speed, table 1.1, MNSE",
     [
-        "[T] states of four of its methods how much faster they are than classical normalisation, in "
-        "software. We know neither its programs nor its machine. What follows is measured in NumPy on this "
-        "machine, and does not refute it. NumPy does an operation at a time on whole arrays, so a root "
-        "costs what its unit takes and no more.",
-        "In hardware a unit that takes new operands in every cycle gives a normal a cycle whatever is inside "
-        "it. The claims turn into multipliers, cells and registers that are saved, not into cycles.",
-        "Table 1.1 of [T] has the share of shading in the time of a frame. Its published values were not at "
-        "hand. MNSE, as published, divides an error by its own pixel's distance from the mean. Values at the "
-        "mean have none; values near it count most.",
+        "For four of its methods [T] states how much faster they are in software than classical "
+        "normalisation. We know neither its programs nor its machine. Our measurements are in NumPy on "
+        "this machine, and do not refute [T]. NumPy does each operation on whole arrays, so a root costs "
+        "only the time of the processor's root unit.",
+        "A hardware unit that takes new operands in every cycle gives a normal in every cycle, whatever its "
+        "structure is. So in hardware the methods save multipliers, cells and registers, and no cycles.",
+        "Table 1.1 of [T] has the share of shading in the time of a frame. We did not have its published "
+        "values. MNSE, as published, divides an error by its own pixel's distance from the mean. For a "
+        "value at the mean it is undefined. Values near the mean count most.",
     ],
     [
         ClaimTable(
             "thesis-software",
             "Speed in software",
             _speeds,
-            f"NumPy in float64, {SPANS} spans of up to {WIDEST:g} degrees at once, setup included; both "
-            "ways in turn in one run, the least processor time of several. A bisection has a pixel more. "
-            "What [T] compared with is known as 'classical normalisation' only. Both usual forms are here, "
-            "and for the recurrence the direct evaluation of the cosines, too. Price: what a root, a "
-            "division or a cosine would have to cost, in multiplications or additions, for the counted "
-            "operations alone to give the published ratio. Difference: between the results of both, as "
-            "components of a unit normal or cosines. A line's normals lie on another curve than the great "
-            "circle; this is part of the difference.",
+            f"NumPy in float64, {SPANS} spans of up to {WIDEST:g} degrees at once, setup included. Both "
+            "ways run in turn in the same run, and the least processor time of several counts. A bisection "
+            "has one pixel more. [T] says only 'classical normalisation' of its baseline. We compare with "
+            "both usual forms, and the recurrence also with the direct evaluation of the cosines. Price: "
+            "cost of a root, division or cosine, in multiplications or additions, at which the counted "
+            "operations alone give the published ratio. Difference: between the results of both ways, as "
+            "components of a unit normal or as cosines. The normals of a line lie on another curve than "
+            "the great circle. The difference includes the distance of both curves.",
             {
                 "price of a root": "price",
                 "largest difference": "difference",
                 "operations of a result": "own",
-                "of the other": "other",
+                "operations of the baseline": "other",
             },
         ),
-        ClaimTable("thesis-prices", "Prices of dear operations", _prices),
+        ClaimTable("thesis-prices", "Cost of a division, a root and a cosine", _prices),
         ClaimTable(
             "thesis-hardware",
-            "The same in hardware: the baseline's figure over the unit's",
+            "The same in hardware: figure of the baseline, divided by that of the unit",
             _units,
-            "Above 1 the unit of [T] takes less. Cells, before technology mapping, are operators, "
-            "multiplexers, registers and memories of any width. An interpolator is whole: setup, and N·L "
-            "and N·H of one light. No figure: the unit has none. The section *Units, one by one* has each "
-            "unit's own figures. The sections *The documents' criteria* and *Place and route* have cycles "
-            "and clock rates of whole pipelines.",
+            "A figure above 1 means that the unit of [T] takes less. Cells are operators, multiplexers, "
+            "registers and memories of any width, before technology mapping. An interpolator includes its "
+            "setup, and gives N·L and N·H of one light. A dash means that the unit has none of the "
+            "resource. The section *Units, one by one* has each unit's own figures. The sections *The "
+            "documents' criteria* and *Place and route* have cycles and clock rates of whole pipelines.",
             {"multipliers": "multipliers", "cells": "cells", "register bits": "register_bits"},
         ),
         ClaimTable(
             "thesis-shading-share",
             "Table 1.1: share of shading in the time of a frame",
             _shares,
-            "Teapot, golden renderer, Phong's model. The rest of the time is projection, rasterising, "
-            "depth, and the normals at the ends of spans. Hidden pixels are not shaded.",
+            "Teapot, golden renderer, Phong's model. The renderer spends the rest of the time on "
+            "projection, rasterising, depth, and the normals at the ends of spans. It shades no hidden "
+            "pixels.",
         ),
         ClaimTable(
             "thesis-mnse",
-            "MNSE, and its well-posed form",
+            "MNSE and its well-posed form NMSE",
             _squares,
-            "Teapot, exponent 50, model cosquad, of quotient blinn, against Phong shading with Blinn's "
-            "model, so mostly the error of cosquad; frames of the bit-accurate model, which the RTL equals "
-            "to the bit. NMSE is `sum (I-O)^2 / sum (I-mean(I))^2`.",
+            "Teapot, exponent 50, model `cosquad`, but `blinn` for `quotient`. The frames are of the "
+            "bit-accurate model, which the RTL equals to the bit. The reference is Phong shading with "
+            "Blinn's model, so most of the error is that of `cosquad`. NMSE is "
+            "`sum (I-O)^2 / sum (I-mean(I))^2`.",
             {
                 "NMSE": "nmse",
                 "share of values with a defined MNSE": "defined",
@@ -481,7 +491,9 @@ _DOCUMENT = Document(
                 "99.9th percentile, LSB": "p999_lsb",
             },
         ),
-        ClaimTable("thesis-mnse-steps", "What counts in MNSE", _steps, "Of the first method above."),
+        ClaimTable(
+            "thesis-mnse-steps", "Values that count most in MNSE", _steps, "Frame of the first method above."
+        ),
     ],
 )
 

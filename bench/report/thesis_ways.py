@@ -16,9 +16,9 @@ SPANS = 4096
 
 WIDEST = 45.0
 
-# The ways in software. Each takes the spans' ends and L and H, as arrays of three rows, and gives one array
-# after the other: the pixels of all spans at one place. The loops are over places in a span, where each value
-# follows from the one before; all spans are worked on at once.
+# The ways in software. Each takes the spans' ends, L and H as arrays of three rows. It yields an array for
+# each place in a span, with the pixels of all spans at this place. A loop is over places, because each value
+# follows from the value before.
 
 Way = Callable[[np.ndarray, np.ndarray, np.ndarray, int], Iterator[np.ndarray]]
 

@@ -30,8 +30,8 @@ def _errata(document: str) -> Callable[[], str]:
                 place = claim.source.removeprefix(document).lstrip(", ")
                 numbers = (_number(float(value)) for value in claim.values(claim.task.run()))
                 rows.append([place, claim.kind, claim.stated, claim.ours, claim.quantity, *numbers])
-        head = ["place", "kind", "printed", "what comes out, or our form", "quantity", "as printed"]
-        return table([*head, "as it comes out"], rows, 5)
+        head = ["place", "kind", "printed", "our correction or form", "quantity", "as printed"]
+        return table([*head, "measured"], rows, 5)
 
     return made
 
