@@ -46,7 +46,7 @@ MAX_LIGHTS = 4
 _SHINIER = 4
 """Factor of the second material's exponent over the first's."""
 
-_RENDERER_BLOCKS = 16
+_RENDERER_BLOCKS = 19
 """Block RAMs, as placed, of the renderer's tables and buffers, of command lists and of motion."""
 
 

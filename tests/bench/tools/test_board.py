@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from amaranth.hdl import Fragment, Shape
+from amaranth.lib.memory import Memory
 
-from blysk.bench.tools.board import built_lines, missed
+from blysk.bench.tools.board import built_lines, missed, planned
 from blysk.bench.tools.board_build import Built, Clock, _stuck, build, refuse_too_large
 from blysk.bench.tools.board_design import BoardTop, gpu_of
 from blysk.bench.tools.boards import BOARDS
@@ -20,6 +22,8 @@ from blysk.golden.reference.light import Light
 from blysk.golden.video.band_buffer import BandBuffer
 from blysk.golden.video.clock_plan import clock_plan
 from blysk.golden.video.display_timing import VGA
+from blysk.golden.video.mesh_memory import block_rams
+from blysk.hdl.gpu import GpuUnit
 from blysk.sim.cli.main import main
 from blysk.sim.installation import install_extra
 
@@ -231,3 +235,20 @@ def test_bitstream_of_a_pattern():
     assert built.words == 30 * 2048
     with pytest.raises(ToolError, match="no clock asks for"):
         build(board, top, {**rates, "serial": 100.0})
+
+
+def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
+    """The memories of the whole drawing, each as the fewest block RAMs of one shape, fit the device."""
+    found, make = [], Memory.__init__
+
+    def counted(memory, *arguments, **options):
+        make(memory, *arguments, **options)
+        found.append((memory.depth, Shape.cast(memory.shape).width))
+
+    monkeypatch.setattr(Memory, "__init__", counted)
+    board = BOARDS["ulx3s-25f"]
+    Fragment.get(GpuUnit(planned(board, "teapot", {}, None, 52.5)[0]), None)
+    # Shorter memories are of look-up tables.
+    blocks = [block_rams(depth, width) for depth, width in found if depth >= 64]
+    assert len(blocks) > 10
+    assert sum(blocks) <= board.block_rams
