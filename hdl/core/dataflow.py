@@ -323,8 +323,8 @@ class Dataflow:
         word.make = make
         return self._add(word)
 
-    def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[[Word, int], Any]:
-        """Make the hardware; the returned function gives a word's value at a stage.
+    def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[..., Any]:
+        """Make the hardware; the returned function gives a word's value at a stage (`_Build.at`).
 
         Parameters
         ----------
@@ -444,8 +444,8 @@ class _Build:
         """When a register of a stage is written. It is always, if a beat may come on every cycle."""
         return self.unit.at(stage) if self.unit.initiation_interval > 1 else None
 
-    def at(self, word: Word, stage: int) -> Any:
-        """Value of a word at a stage, through copies after its lifetime."""
+    def at(self, word: Word, stage: int, cycles: int = 1) -> Any:
+        """Value of a word from a stage on, for so many cycles, through copies after its lifetime."""
         copies = self.values[word]
         first = max(start for start in copies if start <= stage)
         if self.graph.memories and stage - first >= _LONG and len(Value.cast(copies[first])) >= _WIDE:
@@ -453,9 +453,11 @@ class _Build:
             copies[stage] = delayed(self.m, name, copies[first], cycles, self._turn_of(cycles))
             return copies[stage]
         lifetime = word.lifetime if first == word.stage else self.unit.initiation_interval
-        while stage >= first + lifetime:
+        while stage + cycles > first + lifetime:
+            if first == stage:
+                raise ValueError(f"{word.name} does not stay for {cycles} cycles from stage {stage} on")
             value = copies[first]
-            first += lifetime
+            first = min(first + lifetime, stage)
             copies[first] = self.unit.register(
                 self.m, value, f"{word.name}_{first}", when=self.when(first - 1)
             )

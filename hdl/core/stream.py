@@ -112,7 +112,9 @@ def connect_fifo(
     return buffer
 
 
-def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
+def skid_buffer(
+    m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike, stands: bool = False
+) -> Value:
     """Skid buffer: drive a stream from registers, with a spare register for a beat that is not accepted.
 
     The result, *advance*, tells whether the registers of ``valid`` and ``payload`` take their next values on
@@ -124,6 +126,9 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     on the cycle on which ``valid`` rises. The payload is held while it waits. Reset empties the spare
     register.
 
+    A payload that *stands* is the same after the next ``advance``, and no payload follows it there. It needs
+    neither the spare register nor the multiplexer.
+
     Parameters
     ----------
     m : Module
@@ -134,6 +139,8 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
         Whether there is a payload. This is a register that changes only while ``advance`` is high.
     payload : ValueLike
         The payload, a register that changes only while ``advance`` is high.
+    stands : bool
+        Whether payloads stand.
 
     Returns
     -------
@@ -147,16 +154,17 @@ def skid_buffer(m: Module, output: stream.Interface, valid: ValueLike, payload: 
     """
     _require_payload(output, payload)
     held, moves = Signal(name="held"), Signal(name="moves", init=1)
-    spare = Signal(len(Value.cast(payload)), name="spare", reset_less=True)
-    m.d.comb += [
-        output.valid.eq(held | valid),
-        Value.cast(output.payload).eq(Mux(held, spare, Value.cast(payload))),
-    ]
+    shown = payload
+    if not stands:
+        spare = Signal(len(Value.cast(payload)), name="spare", reset_less=True)
+        shown = Mux(held, spare, Value.cast(payload))
+    m.d.comb += [output.valid.eq(held | valid), Value.cast(output.payload).eq(Value.cast(shown))]
     waits = output.valid & ~output.ready
     # Two registers: one drives all enables, the other one selects the payload.
     m.d.sync += [held.eq(waits), moves.eq(~waits)]
-    with m.If(moves):
-        m.d.sync += spare.eq(Value.cast(payload))
+    if not stands:
+        with m.If(moves):
+            m.d.sync += spare.eq(Value.cast(payload))
     return moves
 
 
@@ -313,6 +321,9 @@ class PipelinedUnit(wiring.Component):
         Whether a spare register holds a beat that is not accepted (`skid_buffer`). Without the spare register
         the unit is disabled while a beat is on the output, for one cycle at least (`stop_output`). So without
         stalls a beat comes every ``initiation_interval + 1`` cycles.
+    stands : bool
+        Whether the result of `datapath` stands for a cycle more, so that the skid buffer has no spare
+        register. This needs an ``initiation_interval`` over 1.
 
     Members
     -------
@@ -327,7 +338,7 @@ class PipelinedUnit(wiring.Component):
     ----------
     advance : Signal
         The common enable, from `elaborate` on, for logic of the unit outside its data path.
-    latency, initiation_interval, skid
+    latency, initiation_interval, skid, stands
         As given.
     """
 
@@ -342,14 +353,17 @@ class PipelinedUnit(wiring.Component):
         spaced: bool = False,
         ports: Mapping[str, Member] | None = None,
         skid: bool = True,
+        stands: bool = False,
     ):
         if latency < 1 or initiation_interval < 1:
             raise ValueError("latency and initiation_interval must be at least 1")
         self.latency = latency
         self.initiation_interval = initiation_interval
-        self._spaced, self.skid = spaced, skid
+        self._spaced, self.skid, self.stands = spaced, skid, stands
         if spaced and not skid:
             raise ValueError("a spaced unit needs its skid buffer")
+        if stands and not (skid and initiation_interval > 1):
+            raise ValueError("a result that stands needs a skid buffer and an interval over 1")
         members = {"i": In(stream.Signature(input_shape)), "o": Out(stream.Signature(output_shape))}
         if constants is not None:
             members["constants"] = In(constants)
@@ -401,7 +415,7 @@ class PipelinedUnit(wiring.Component):
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
         if self.skid:
-            m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result))
+            m.d.comb += advance.eq(skid_buffer(m, self.o, self._stages[-1], result, self.stands))
         else:
             before = self._stages[-2] if self.latency > 1 else accept
             m.d.comb += advance.eq(stop_output(m, self.o, before, result))

@@ -61,8 +61,8 @@ class EdgeSetupUnit(PipelinedUnit):
     For each edge a non-restoring division of the difference in x by the height gives quotient and remainder.
     Then the start is summed up from them, bit by bit. The division of the long edge goes on for the 32 bits
     of the fraction. Three dividers work on the edges of a triangle side by side. With one divider the edges
-    take turns. On a grid of 1/256 pixel `latency` is 32 cycles with three dividers of two bits. It is 50 with
-    one divider of two bits, and 80 with one divider of one bit. The unit has no multipliers.
+    take turns. On a grid of 1/256 pixel `latency` is 31 cycles with three dividers of two bits. It is 49 with
+    one divider of two bits, and 79 with one divider of one bit. The unit has no multipliers.
 
     Parameters
     ----------
@@ -124,9 +124,10 @@ class EdgeSetupUnit(PipelinedUnit):
         super().__init__(
             edge_corners_shape(grid),
             edges_shape(grid),
-            latency=last + 2,
+            latency=last + 1,
             initiation_interval=interval,
             skid=skid,
+            stands=skid,
         )
 
     def datapath(self, m, operands):
@@ -140,9 +141,9 @@ class EdgeSetupUnit(PipelinedUnit):
             register = value
             while True:
                 register = self.register(m, register, f"{name}_{age}", when=self.at(age))
-                if age + self.initiation_interval >= self.latency:
+                if age + self.initiation_interval >= self.latency + self.stands:
                     return register
-                age += self.initiation_interval
+                age = min(age + self.initiation_interval, self.latency - 1)
 
         edges = []
         for k, (top, bottom) in enumerate(EDGES):

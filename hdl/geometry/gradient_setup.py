@@ -76,6 +76,7 @@ class GradientSetupUnit(PipelinedUnit):
             gradient_shape(),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
+            stands=True,
         )
 
     def _describe(self) -> dict:
@@ -147,7 +148,7 @@ class GradientSetupUnit(PipelinedUnit):
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")
         for name, word in self._results.items():
-            m.d.comb += result[name].eq(value(word, self.latency))
+            m.d.comb += result[name].eq(value(word, self.latency, 1 + self.stands))
         return result
 
     def _shifter(self):

@@ -77,6 +77,7 @@ class PlaneSetupUnit(PipelinedUnit):
             # A triangle that has left shares nothing with the next.
             initiation_interval=min(initiation_interval, latency),
             skid=skid,
+            stands=skid,
         )
 
     def _describe(self) -> dict:
@@ -174,7 +175,7 @@ class PlaneSetupUnit(PipelinedUnit):
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")
         for name, word in self._results.items():
-            m.d.comb += result[name].eq(value(word, self.latency))
+            m.d.comb += result[name].eq(value(word, self.latency, 1 + self.stands))
         return result
 
 

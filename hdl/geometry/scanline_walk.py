@@ -203,10 +203,13 @@ class ScanlineWalk:
             m.d.sync += begin.eq(Mux(turns.loads, row.x, begin + self.pixels + 1))
         self.x = Mux(tag.right, begin + left - self.pixels, begin)[:PIXEL_BITS]
 
-    def values(self, m: Module, name: str, loads, base, inward, following_step) -> tuple[Value, Value]:
+    def values(
+        self, m: Module, name: str, loads, base, inward, following_step, cuts: bool
+    ) -> tuple[Value, Value]:
         """Values of an attribute at both ends of the piece.
 
-        Its step is ``inward`` when a span is loaded, and ``following_step`` later.
+        Its step is ``inward`` when a span is loaded, and ``following_step`` later. Without ``cuts`` no piece
+        follows another: once the span is found, its values are not read.
         """
         # Chosen behind registers: the sums take a whole cycle.
         nears, totals = (
@@ -215,18 +218,21 @@ class ScanlineWalk:
         steps = AttributeRing(m, f"{name}_step", self.turns)
         near, total, step = nears.value, totals.value, steps.value
         far = (total + sum(Mux(bit, step << k, 0) for k, bit in enumerate(self.digit)))[:_BITS]
-        whole = Mux(self.single, step, Mux(self.double, step << 2, step << 1))
-        following = (near + whole)[:_BITS]
         with m.If(loads):
             steps.becomes(m, inward)
         with m.Elif(self.moves):
             steps.becomes(m, Mux(self.ends, following_step, step << len(self.digit)))
-        controls = (loads, self.moves, self.ends, self.skipping, base, far, following)
-        names = ("loads", "moves", "ends", "skipping", "base", "far", "following")
-        loaded, moved, ended, skipped, base, end, following = (
-            self.turns.late(m, value, f"{name}_late_{word}")
-            for word, value in zip(names, controls, strict=True)
-        )
+
+        def late(value, word):
+            return self.turns.late(m, value, f"{name}_late_{word}")
+
+        loaded, moved, ended = late(loads, "loads"), late(self.moves, "moves"), late(self.ends, "ends")
+        base, end = late(base, "base"), late(far, "far")
+        following = end
+        if cuts:
+            whole = Mux(self.single, step, Mux(self.double, step << 2, step << 1))
+            after = late((near + whole)[:_BITS], "following")
+            following = Mux(late(self.skipping, "skipping"), end, after)
         with m.If(loaded):
             for word in (nears, totals):
                 word.becomes(m, base)
@@ -235,7 +241,7 @@ class ScanlineWalk:
                 totals.becomes(m, end)
             with m.Else():
                 for word in (nears, totals):
-                    word.becomes(m, Mux(skipped, end, following))
+                    word.becomes(m, following)
         return near, far
 
 

@@ -152,9 +152,8 @@ class SpanAttributesUnit(wiring.Component):
         for k in range(count):
             plane = {name: planes[name] if self.serial else planes[name][k] for name in _WORDS}
             base, inward = self._down(m, k, accept, first, row.carry, plane, turns)
-            near, far = walk.values(
-                m, f"attribute_{k}", loads, base, Mux(first, _code(plane["inward"]), inward), inward
-            )
+            begin = Mux(first, _code(plane["inward"]), inward)
+            near, far = walk.values(m, f"attribute_{k}", loads, base, begin, inward, not self.whole)
             with m.If(turns.advance):
                 m.d.sync += [walked.near[k].eq(near), walked.far[k].eq(far), walked.step[k].eq(inward)]
         with m.If(turns.goes):

@@ -96,9 +96,9 @@ def rounded(code: Value, flip: Value, point: int) -> Value:
     """A code with ``point`` fraction bits, negated by ``flip``, and rounded to `VectorAdapter.FORMAT`."""
     format = VectorAdapter.FORMAT
     cut = point - format.fraction_bits
-    # The 1 that completes the negation is added together with the half step of the rounding.
-    turned = (code[:] ^ flip.replicate(len(code))).as_signed() + flip + (1 << (cut - 1))
-    return (turned >> cut)[: format.width]
+    kept, half, rest = code[cut:], code[cut - 1], code[: cut - 1].any()
+    # Minus a code is its inverted bits and 1. The 1 reaches the kept bits unless over half a step is cut.
+    return ((kept ^ flip.replicate(len(kept))) + Mux(flip, ~(half & rest), half))[: format.width]
 
 
 def exponent_of(used: Value) -> Value:

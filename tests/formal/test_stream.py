@@ -20,12 +20,18 @@ TAG = unsigned(2)
 
 
 class Delay(PipelinedUnit):
-    """A tag through registers, one a clock of latency."""
+    """A tag through registers, one a clock of latency; of a result that stands one an interval."""
 
-    def __init__(self, latency, initiation_interval=1):
-        super().__init__(TAG, TAG, latency=latency, initiation_interval=initiation_interval)
+    def __init__(self, latency, initiation_interval=1, stands=False):
+        super().__init__(TAG, TAG, latency=latency, initiation_interval=initiation_interval, stands=stands)
 
     def datapath(self, m, operands):
+        if self.stands:
+            stage = 0
+            while stage + self.initiation_interval <= self.latency:
+                stage = min(stage + self.initiation_interval, self.latency - 1)
+                operands = self.register(m, operands, f"late_{stage}", when=self.at(stage))
+            return operands
         stages = self.latency
         if self.initiation_interval > 1:
             # Read as late as the operand stays.
@@ -93,9 +99,14 @@ def of_stream(unit, capacity, latency, distance):
 TIMINGS = [(1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (5, 2), (3, 4), (9, 4), (10, 7)]
 
 
-def of_delay(latency, interval):
+STANDING = [(2, 2, True), (3, 2, True), (3, 4, True), (9, 4, True), (10, 7, True)]
+"""Of results that stand for a cycle more, without a spare register."""
+
+
+def of_delay(*timing):
     """The claims of a stream, and those of the turns."""
-    unit = Delay(latency, interval)
+    unit = Delay(*timing)
+    latency, interval = unit.latency, unit.initiation_interval
     h = of_stream(unit, -(-latency // interval) + 1, latency - 1, interval)
     m, stages, came = h.m, Signal(latency), Signal()
     lifetime, turn = Signal(), Signal(range(interval))
@@ -116,8 +127,8 @@ def of_delay(latency, interval):
     return h
 
 
-@pytest.mark.parametrize(("latency", "interval"), TIMINGS)
-def test_pipelined_unit(prove, latency, interval):
+@pytest.mark.parametrize("timing", [*TIMINGS, *STANDING])
+def test_pipelined_unit(prove, timing):
     """Inductive: stable, in order, none lost or invented, capacity, no deadlock, turns.
 
     A unit holds a beat for each interval of its latency, and one that waits. While the output is ready, a
@@ -125,7 +136,13 @@ def test_pipelined_unit(prove, latency, interval):
     ``initiation_interval`` cycles at most. All ages move on every cycle but one after a clock on which a beat
     was not taken; while a beat is inside, the next comes a whole multiple of the interval of such cycles on.
     """
-    prove(of_delay(latency, interval))
+    prove(of_delay(*timing))
+
+
+def test_a_result_that_does_not_stand_is_found(refute, inject):
+    """A register whose last cycle is that of the output: the next beat replaces a beat that waits."""
+    inject(Delay, "datapath", "<= self.latency", "< self.latency")
+    refute(of_delay(4, 2, True))
 
 
 def of_registers(count):
@@ -227,6 +244,13 @@ def test_bugs_of_a_skid_buffer_are_found(refute, inject, make, bug):
     """Injected in `skid_buffer`, each refutes the claims of a stream."""
     inject(blysk.hdl.core.stream, "skid_buffer", *SKID_BUFFER_BUGS[bug])
     refute(make())
+
+
+@pytest.mark.parametrize("bug", ["moves while it holds", "forgets that it holds", "holds what was taken"])
+def test_bugs_without_a_spare_register_are_found(refute, inject, bug):
+    """The same where the result stands."""
+    inject(blysk.hdl.core.stream, "skid_buffer", *SKID_BUFFER_BUGS[bug])
+    refute(of_delay(3, 2, True))
 
 
 UNIT_BUGS = {

@@ -12,6 +12,7 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
+from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
 from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
@@ -79,14 +80,23 @@ def short_fifos(monkeypatch):
     monkeypatch.setattr("blysk.hdl.render.WAITING_SPANS", 5)
 
 
+def of_waiting(unit):
+    """A valid beat stays. A result stands because no beat follows too near: the turn tells how far."""
+    h = Harness(unit)
+    stays(h, unit.o)
+    if getattr(unit, "stands", False):
+        turn = h.register("turn")
+        h.claim(~h.register("ready") | ~turn.any())
+        for stage in range(1, unit.latency + 1):
+            h.claim(~unit.at(stage) | (turn == stage % unit.initiation_interval))
+    return h
+
+
 # By its whole beat the claim about `SpanHalverUnit` is not decided; it is proved by the unit's registers.
 @pytest.mark.parametrize("name", of_units(name for name in UNITS if name != "span_halver"))
 def test_beats_that_wait_stay(prove, name):
     """Inductive: a valid beat stays, with its payload, until it is accepted."""
-    unit = UNITS[name]()
-    harness = Harness(unit)
-    stays(harness, unit.o)
-    prove(harness)
+    prove(of_waiting(UNITS[name]()))
 
 
 def of_beats(unit):
@@ -153,6 +163,12 @@ def test_bug_of_a_skid_buffer_is_found(refute, inject):
     harness = Harness(unit := DotProductUnit())
     stays(harness, unit.o)
     refute(harness, 10)
+
+
+def test_bug_of_a_result_that_goes_is_found(refute, inject):
+    """A word that the next beat replaces while the result waits."""
+    inject(GradientSetupUnit, "datapath", "1 + self.stands", "1")
+    refute(of_waiting(GradientSetupUnit()), 50)
 
 
 def test_bug_of_a_counter_is_found(refute, inject):

@@ -27,7 +27,7 @@ INTERVALS = [3, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 4, 5, 
 class GraphUnit(PipelinedUnit):
     """A unit that is a graph: ``describe`` gives its results, by name, each with its shape."""
 
-    def __init__(self, interval, describe, spaced=False, memories=False):
+    def __init__(self, interval, describe, spaced=False, memories=False, stands=False):
         self.graph = Dataflow(interval, spaced=spaced, memories=memories)
         inputs = {
             name: self.graph.input(name, lambda operands, name=name: operands[name])
@@ -36,13 +36,19 @@ class GraphUnit(PipelinedUnit):
         self.results, shapes = describe(self.graph, **inputs)
         latency = max(1, *(word.stage for word in self.results.values()))
         super().__init__(
-            INPUTS, data.StructLayout(shapes), latency=latency, initiation_interval=interval, spaced=spaced
+            INPUTS,
+            data.StructLayout(shapes),
+            latency=latency,
+            initiation_interval=interval,
+            spaced=spaced,
+            stands=stands,
         )
 
     def datapath(self, m, operands):
         value = self.graph.build(m, self, operands)
         names = self.o.payload.shape().members
-        words = (Value.cast(value(self.results[name], self.latency)) for name in names)
+        cycles = 1 + self.stands
+        words = (Value.cast(value(self.results[name], self.latency, cycles)) for name in names)
         return self.o.payload.shape()(Cat(words))
 
 
@@ -185,6 +191,22 @@ def test_words_that_wait_in_memories(graph):
     registers, memories = (cost_of(GraphUnit(1, graph, memories=m)) for m in (False, True))
     assert memories.register_bits < registers.register_bits
     assert memories.ram_bits > registers.ram_bits == 0
+
+
+@pytest.mark.parametrize("interval", [2, 3])
+def test_results_that_stand_need_no_spare_register(interval):
+    """The same results on the same cycles, under stalls, and fewer registers."""
+    beats = beats_of(np.random.default_rng(interval))
+    verify(GraphUnit(interval, copies, stands=True), beats, functions_of(**beats)[copies])
+    bits = [cost_of(GraphUnit(interval, copies, stands=stands)).register_bits for stands in (False, True)]
+    assert bits[1] < bits[0]
+
+
+def test_refuses_a_result_that_does_not_stand():
+    """That of a shared unit is there for one cycle."""
+    unit = GraphUnit(3, shifts, stands=True)
+    with pytest.raises(ValueError, match=r"^\w+ does not stay for 2 cycles from stage \d+ on$"):
+        cost_of(unit)
 
 
 WORD = 18

@@ -123,6 +123,14 @@ def test_latency_and_interval_are_at_least_one(latency, interval):
         Delay(latency, interval)
 
 
+@pytest.mark.parametrize("options", [{"initiation_interval": 1}, {"initiation_interval": 3, "skid": False}])
+def test_a_result_stands_before_a_skid_buffer_and_an_interval(options):
+    with pytest.raises(
+        ValueError, match=r"^a result that stands needs a skid buffer and an interval over 1$"
+    ):
+        PipelinedUnit(unsigned(1), unsigned(1), latency=4, stands=True, **options)
+
+
 def test_datapath_is_the_subclass_s():
     with pytest.raises(NotImplementedError):
         PipelinedUnit(unsigned(1), unsigned(1), latency=1).datapath(Module(), None)
