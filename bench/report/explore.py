@@ -89,27 +89,28 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     best = cheapest(designs, "method", 1.0, "cells")
     out_of_range = sum(one.out_of_range_spans > 0 for one in designs)
     text = [
-        f"{len(designs)} pipelines draw {view['source']} at {view['width']}x{view['height']}, exponent "
-        f"{EXPONENT}: methods, reflection models, operands of the specular unit, degrees of the methods' "
-        "polynomials, words of the differences of `chord-local`, and styles, each with each where that is "
-        "possible. The frames are those of the bit-accurate model, which equals the simulation to the bit; "
-        "what a design takes is counted in its netlist before technology mapping. `blysk explore` does the "
-        "same for any mesh, and for more choices."
+        f"{len(designs)} pipelines draw {view['source']} at {view['width']}x{view['height']} with exponent "
+        f"{EXPONENT}. They have all possible combinations of method, reflection model, operand of the "
+        "specular unit, degree of the method's polynomial, word of the differences of `chord-local`, and "
+        "style. The bit-accurate model computes the frames, and equals the simulation to the bit. Costs are "
+        "counted in the netlist before technology mapping. `blysk explore` does the same for any mesh, with "
+        "more choices."
     ]
     if out_of_range:
         text.append(
-            f"{out_of_range} of them flag spans of this scene as too wide, and are on no front: their "
-            "polynomial is for narrower ones."
+            f"{out_of_range} of these pipelines flag spans of this scene as too wide, because their "
+            "polynomial serves only narrower spans. They are on no front."
         )
     for given, which in (
-        (False, "The cheapest with an error of 1 LSB or less against exact normals in this scene"),
-        (True, "The cheapest that is given values of each light with a span, and counts none of that work,"),
+        (False, "The cheapest design with an error of at most 1 LSB against exact normals in this scene"),
+        (True, "The cheapest design whose spans bring values of each light, at a cost that is not counted,"),
     ):
         those = [designs[k] for k in best if designs[k].candidate.design.interpolator.given_values == given]
         if those:
             text.append(
-                f"{which} takes {those[0].costs['cells']:,} cells; its largest error here is "
-                f"{those[0].errors['method']['max_lsb']:.2f} LSB: `{those[0].candidate.command}`."
+                f"{which} takes {those[0].costs['cells']:,} cells. Its largest error here is "
+                f"{those[0].errors['method']['max_lsb']:.2f} LSB. Its command is "
+                f"`{those[0].candidate.command}`."
             )
     rows = [
         (
@@ -129,13 +130,13 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         *(f"front of {error} error and {cost}" for error, cost in fronts),
     )
     note = (
-        "Errors: arithmetic, against the same method and model in float64; method, against exact "
-        "normals of every pixel with the same model; total, against exact normals with Blinn's power, for "
-        "a lobe with its own model. Cycles a pixel "
-        "are what the units state for these spans: a frame takes fewer where long spans pay for short ones "
-        "or pixels lack terms; bisection states none for spans that it divides. A cell is an operator of any "
-        "width, a multiplier, too: the compact style has fewer multipliers and, with what shares them, often "
-        "more cells."
+        "The arithmetic error is against the same method and model in float64. The method error is against "
+        "exact normals of every pixel with the same model. The total error is against exact normals with "
+        "Blinn's power, or for a lobe with its own model. Cycles a pixel follow from the figures of the "
+        "units for these spans. A frame takes fewer cycles if short spans are set up during long spans, or "
+        "if pixels lack terms. `bisection` states no cycles for spans that it divides. A cell is an operator "
+        "of any width, so a multiplier is a cell, too. The compact style has fewer multipliers. The logic "
+        "that shares them often makes its number of cells larger."
     )
     return Section(
         "explore",
@@ -146,13 +147,12 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 "design-space",
                 "Largest error against cells, and against multipliers",
                 svg(_drawing(designs, fronts)),
-                "Each mark is a pipeline; the line is the Pareto front of those that no other beats in both, "
-                "whose marks are edged in black. Those of chord-local are not on it: they are given values "
-                "of each light with a span, and what it takes to work these out is not counted. To turn "
-                "vectors into "
-                "the frame of a light, for quotient, is a part of the transformation of normals. Above: "
-                "against exact normals of every pixel with the same model. Below: against exact normals "
-                "with Blinn's power, of a lobe with its own model.",
+                "Each mark is a pipeline. The line is the Pareto front: no other pipeline is better in both "
+                "measures. Marks on the front have black edges. Pipelines of `chord-local` are not on the "
+                "front, because their spans bring values of each light, and the cost of these values is not "
+                "counted. For `quotient`, the transformation of normals also turns vectors into the frame of "
+                "a light. Above: errors against exact normals of every pixel with the same model. Below: "
+                "errors against exact normals with Blinn's power, or for a lobe with its own model.",
             ),
             Table("design-space", "Designs", columns, rows, note),
         ],
@@ -303,7 +303,7 @@ def explore(
     listed = best[:limit]
     print(_table([designs[index] for index in listed], on_front[listed]))
     if any(designs[index].candidate.design.interpolator.given_values for index in listed):
-        print("chord-local gets values of each light with each span; their computation is not in its cost")
+        print("chord-local gets values of each light with each span. Its cost leaves out their computation.")
     for number, index in enumerate(listed, 1):
         print(f"{number:>3}  {designs[index].candidate.command}")
 

@@ -100,7 +100,7 @@ TIMES = [
         ("multipliers", "multipliers of 18x18 bits", "", "less"),
         ("luts", "look-up tables after place and route", "LUT", "less"),
         ("simulated_pixels_per_second", "simulation of the hardware", "pixels a second", "more"),
-        ("golden_ns_per_pixel", "the same in float64 NumPy", "ns a pixel", "less"),
+        ("golden_ns_per_pixel", "method and model in float64 NumPy", "ns a pixel", "less"),
     )
 ]
 """Measures of run time and cost, in the same form."""

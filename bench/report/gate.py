@@ -262,13 +262,13 @@ def _clock_cells(row: GateRow) -> tuple[str, ...]:
 
 _TABLES: tuple[tuple[str, tuple[str, ...], Callable[[GateRow], tuple[str, ...]]], ...] = (
     (
-        "Share of the spans that are gated, and of the pixels: gated, in spans without a highlight, without "
-        "a highlight, with the light behind.",
-        ("spans", "pixels", "gated", "gated", "in dark spans", "dark", "behind"),
+        "Share of gated spans, then shares of pixels: in gated spans, in spans without a highlight, without "
+        "a highlight, with the light behind the surface.",
+        ("spans", "pixels", "gated spans", "gated", "in dark spans", "dark", "behind"),
         _share_cells,
     ),
     (
-        "Cycles of the frame, gate off and on: compact style, then one pixel a cycle.",
+        "Cycles of the frame with the gate off and on, first in the compact, then in the throughput style.",
         ("off", "on", "saved", "off", "on", "saved"),
         _clock_cells,
     ),
@@ -284,7 +284,7 @@ def _print(rows: Sequence[GateRow]) -> None:
             click.echo(f"| {' | '.join((row.mesh, row.model, str(row.exponent), *cells_of(row)))} |")
         click.echo()
     same = sum(row.identical for row in rows)
-    click.echo(f"{same} of {len(rows)} frames are the same to the bit with the gate off and on.")
+    click.echo(f"{same} of {len(rows)} frames are equal to the bit with the gate off and on.")
 
 
 @click.command()

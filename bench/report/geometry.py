@@ -119,11 +119,13 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             cases[task.settings["method"]] = result
     rates = {entry["design"]: entry["fmax_mhz"] for entry in read_store() if entry["device"] == DEVICE}
     text = [
-        f"The teapot at {size[0]}x{size[1]}, one light, every triangle sent, back faces shaded, with a "
-        "depth test. `quotient` gets the vector N/W at the first pixel of a span and its step: no "
-        "normaliser of edges, and cuts only where N/W grows short. `renormalise` gets the line between the "
-        "ends as it is: no normaliser of edges, no cuts, but about 14 products a pixel and light. "
-        "`quadratic` gets unit normals at the ends of every span, and wide spans are cut.",
+        f"All designs draw the teapot at {size[0]}x{size[1]} with one light and a depth test. Every triangle "
+        "is sent, and back faces are shaded.\n\n"
+        "- `quotient` gets the vector N/W at the first pixel of a span, and the step of the vector. It needs "
+        "no normaliser of edges. Spans are cut only where N/W grows short.\n"
+        "- `renormalise` gets the unchanged line between the ends. It needs no normaliser of edges and no "
+        "cuts, but about 14 products a pixel and light.\n"
+        "- `quadratic` gets unit normals at the ends of every span. Wide spans are cut.",
         *_verdict(designs, rates),
         _stability(cases),
     ]
@@ -151,14 +153,14 @@ def _beside(names: Sequence[str], pair: Sequence[Any], rates: Mapping[str, Seque
         words.append(f"{ratio:.2f} of the cycles{timed} with {own['triangles']:,} triangles")
     more = pair[1]["multipliers"] - pair[0]["multipliers"]
     rate = (
-        f" (clock rates of {clocks[0]:.0f} and {clocks[1]:.0f} MHz, medians of {len(seeds[0])} and "
-        f"{len(seeds[1])} placements)"
+        f" Their clock rates are {clocks[0]:.0f} and {clocks[1]:.0f} MHz, medians of {len(seeds[0])} and "
+        f"{len(seeds[1])} placements."
         if clocks
         else ""
     )
     return (
-        f"`{names[1]}` takes, of `{names[0]}`, {'; '.join(words)}{rate}, and {abs(more)} multipliers "
-        f"{'more' if more >= 0 else 'fewer'}."
+        f"Compared with `{names[0]}`, `{names[1]}` has {abs(more)} {'more' if more >= 0 else 'fewer'} "
+        f"multipliers. It takes {'; '.join(words)}.{rate}"
     )
 
 
@@ -166,7 +168,7 @@ def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> 
     counts = [frame["triangles"] for frame in next(iter(designs.values()))["frames"]]
     columns = ("design", "multipliers", "of geometry", "register bits", "memory bits", "clock rate, MHz")
     columns += tuple(f"cycles, {count:,} triangles" for count in counts)
-    columns += ("pixels of another triangle", "largest error, LSB")
+    columns += ("pixels that show another triangle", "largest error, LSB")
     rows: list[tuple[Cell, ...]] = []
     for name, of in designs.items():
         placed = rates.get(name_of(CANDIDATES[name]))
@@ -180,12 +182,13 @@ def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> 
             )
         )
     note = (
-        "Multipliers and bits before synthesis, without the memory of depths; clock rate: median of the "
-        f"placements on an {DEVICE}, where there are some. Cycles from the first triangle until the "
-        "hardware is empty, simulated. Error: over all frames and exponents "
-        f"{', '.join(map(str, _EXPONENTS))}, of the bit-accurate model against exact normals "
-        "at every pixel in float64 with the same reflection model, where the same triangle shows. "
-        "Where two triangles are folded flat at a common edge another one may show than in float64."
+        "Multipliers and bits are counted before synthesis, without the memory of depths. The clock rate is "
+        f"the median of the placements on an {DEVICE}, if there are any. Cycles are simulated, from the "
+        "first triangle until the hardware is empty. The error is that of the bit-accurate model against "
+        "exact normals at every pixel in float64, with the same reflection model. It is the largest over all "
+        f"frames, over the exponents {', '.join(map(str, _EXPONENTS))}, and over the pixels that show the "
+        "same triangle. At a common edge of two triangles that are folded flat, hardware and float64 may "
+        "show different triangles."
     )
     return Table("geometry-designs", "Designs from triangles to pixels", columns, rows, note)
 
@@ -213,7 +216,7 @@ def _drawing(designs: Mapping[str, Any]) -> Drawing:
     panel.set_yticks((), minor=True)
     panel.grid(True, color="#dddddd", linewidth=0.5)
     figure.legend(*panel.get_legend_handles_labels(), loc="outside right center", frameon=False)
-    note = "Small triangles are on the left: there the setup of a triangle counts, and not its shading."
+    note = "Small triangles are on the left. Their cycles come from the setup of triangles, not from shading."
     return Drawing("geometry-cycles", "Cycles a pixel against the size of triangles", svg(figure), note)
 
 
@@ -222,10 +225,10 @@ def _stability(cases: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     errors = [case["error"] for case in every if not case["sliver"] and case["error"] is not None]
     told = sorted({case["name"] for case in every if (case["error"] or 0) > 1})
     return (
-        f"{len(every) // len(cases)} stiff and extreme cases with each method: "
-        f"{sum(case['coverage'] for case in every)} pixels are covered in one of hardware and float64 alone, "
-        f"and the largest error is {max(errors):.2f} LSB where the hardware counts no sliver. "
-        f"More than 1 LSB off: {'; '.join(told) or 'none'}."
+        f"Each method has {len(every) // len(cases)} stiff and extreme cases. In all cases together "
+        f"{sum(case['coverage'] for case in every)} pixels are covered by only one of hardware and float64. "
+        f"In cases where the hardware counts no sliver the largest error is {max(errors):.2f} LSB. "
+        f"Cases with an error above 1 LSB: {'; '.join(told) or 'none'}."
     )
 
 
@@ -244,10 +247,10 @@ def _case_table(cases: Mapping[str, Sequence[Mapping[str, Any]]]) -> Table:
             mark: Mark = "" if not off else "stated" if case["sliver"] else "silent"
             marks.append(tuple(mark if column == "error, LSB" else "" for column in columns))
     note = (
-        "Bit-accurate models, which the simulated hardware equals to the bit, against exact coverage and "
-        f"normals in float64. No normal: pixels where opposite normals come to 0, so that any is right. "
-        f"Error: of the others whose |N.L| is over {TERMINATOR:g}; §: the hardware counts slivers, of 1/256 "
-        "pixel or less, which have the attributes of their longest edge. Triangles that cover no pixel's "
-        "centre are empty."
+        "Bit-accurate models against exact coverage and exact normals in float64. The simulated hardware "
+        "equals the models to the bit. No normal: pixels where opposite normals add up to 0, so that every "
+        f"normal is right. Error: the largest error of the other pixels whose |N.L| is over {TERMINATOR:g}. "
+        "§: the hardware counts slivers in this case. A sliver is at most 1/256 pixel wide, and has the "
+        "attributes of its longest edge. A triangle is empty if it covers no pixel centre."
     )
     return Table("geometry-cases", "Stiff and extreme triangles", columns, rows, note, marks=marks)

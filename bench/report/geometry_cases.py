@@ -102,8 +102,8 @@ def cases_of(quick: bool) -> Iterator[tuple[str, Scene]]:
     yield "area of a step of the grid, squared", _smallest(rng)
     yield "one triangle over the whole guard band", _scene(4095, 9, *_largest(np.full((3, 3), _UP)))
     yield "4095 columns, normals 60 degrees apart, exponent 1000", _scene(4095, 9, *_largest(_fan(60)), 1000)
-    yield "depths at both ends of the range, surfaces that cross", _crossing()
-    yield "two triangles on each other", _tied()
+    yield "crossing surfaces, depths at both ends of the range", _crossing()
+    yield "two triangles in the same place", _tied()
     for degrees in (90, 150, 179, 180):
         yield f"normals {degrees} degrees apart", _scene(200, 160, *_corner(_fan(degrees)))
     opposite = np.array([(0.3, 0.2, 1), (0.3, 0.2, 1), (-0.3, -0.2, -1)])

@@ -257,22 +257,25 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     }
     sharp = _serves(frames, "ggx"), _serves(frames, "beckmann")
     text = [
-        "A small table, addressed by octaves, with one multiplier gives Blinn's power at every exponent, and "
-        "any other curve of N·H: Beckmann's and GGX among them. With `quotient` it is addressed by sin² and "
-        "cos² of the angle and has 512 words, and by sin² of half the angle it gives true Phong, (R·V)^n; "
-        "with the other methods it is addressed by 1 - N·H and has 336.",
+        "A small table with one multiplier gives Blinn's power at every exponent. The table is addressed by "
+        "octaves. It also gives any other curve of N·H, for example Beckmann's and GGX. With `quotient` it "
+        "is addressed by sin² and cos² of the angle, and has 512 words. Addressed by sin² of half the "
+        "angle, it gives true Phong, (R·V)^n. With the other methods it is addressed by 1 - N·H, and has "
+        "336 words.",
         "Largest errors against exact shading with Blinn's power: "
         + ", ".join(
             f"`{method}`, `{model}` {worst[method, model]:.2f} LSB"
             for method, model in FRONT[:1] + FRONT[2:4]
         )
-        + f". True Phong, against itself: {worst['quotient', 'phong']:.2f}. The section *Error against run "
-        "time* has what these pipelines cost.",
+        + ". True Phong against exact shading with its own power: "
+        f"{worst['quotient', 'phong']:.2f} LSB. The section *Error against run time* has the costs of these "
+        "pipelines.",
         "The column *spans alone* has the error of the normals that the spans give in exact arithmetic. "
-        "Spans of both methods follow the true line of N/W, and have that of the words of their ends alone.",
-        f"Sharp lobes: frames of `quotient` are within 1 LSB with ggx from roughness {sharp[0]:g} on, with "
-        f"beckmann from {sharp[1]:g}, of those measured. Below 0.2 its words of 18 bits promise no such "
-        "error.",
+        "Spans of both methods follow the true line of N/W, so this error comes only from the words of "
+        "their ends.",
+        "Sharp lobes: of the measured roughnesses, frames of `quotient` are within 1 LSB from "
+        f"{sharp[0]:g} on with `ggx`, and from {sharp[1]:g} on with `beckmann`. Below roughness 0.2 the "
+        "words of 18 bits do not guarantee this error.",
     ]
     heads = [
         f"{case.reflection.name} {case.label} = {value:g}, LSB" for case in CASES for value in case.values
@@ -288,17 +291,17 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             "Largest error of the lobe unit, by the size of its table",
             ["octaves, steps", "words", *heads],
             sizes,
-            "Bit-accurate terms against the model in float64, in LSB of a channel of full brightness.",
+            "Bit-accurate terms against the model in float64, in LSB of a channel at full brightness.",
         ),
         Table(
             "lobe-units",
-            "Units that make a specular term of 1 - N·H",
+            "Units that turn 1 - N·H into a specular term",
             ["unit", *names, "initiation interval"],
             [
                 [given["name"], *(cost[name] for name in names), cost["initiation_interval"]]
                 for given, cost in made["unit_cost"]
             ],
-            "By Yosys, before mapping to an FPGA.",
+            "Counted by Yosys before mapping to an FPGA.",
         ),
         Table(
             "lobe-frames",
@@ -321,10 +324,10 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
                 ]
                 for mesh, design, row in frames
             ],
-            "White light, k_d 0.4 and k_s 0.55; pixels with |N·L| over 0.002, but for the last column. "
-            "*Units*: against the method and the model in float64, the rounding of a pixel included. *Total* "
-            "and *anywhere*: against exact normals of every pixel with Blinn's power, `phong`, `ggx` and "
-            "`beckmann` with their own model.",
+            "White light, k_d 0.4 and k_s 0.55. Only pixels with |N·L| over 0.002 count, except in the last "
+            "column. *Units*: against the method and the model in float64, with the rounding of a pixel. "
+            "*Total* and *anywhere*: against exact normals of every pixel with Blinn's power. For `phong`, "
+            "`ggx` and `beckmann` the reference has their own model.",
         ),
     ]
     return Section("lobe", "Exact highlights from one small table", text, parts)

@@ -77,7 +77,7 @@ def _lamp(width: int, height: int, triangles: int) -> Scene:
 
 
 _GATED = {"method": "quadratic", "model": "cosquad", "gate": True}
-"""A method whose spans stay the same without highlights, and can be proved to have none."""
+"""A method whose spans do not change without highlights. Its gate can prove that they have no highlight."""
 
 SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]] = {
     "copper teapot": (_teapot, None),
@@ -85,7 +85,7 @@ SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]
     "teapot in ambient light": (lambda *size: _teapot(*size, lights=()), None),
     "grey teapot": (_grey, None),
     "three materials alike": (_alike, None),
-    # Of the methods that cut spans by the error of every light, none goes without one.
+    # A method that cuts spans by the error of every light cannot leave out a light.
     "one of two lights is off": (_half_lit, {"method": "renormalise", "model": "cosquad"}),
     "floor lit from behind, exponent 500": (_floor, _GATED),
     "steel ring, two lights": (
@@ -181,7 +181,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """The section: reductions of each scene, their savings, and whether its frame stays the same."""
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
-        # Pixels that differ in either are worth telling.
+        # The larger count of different pixels, by the models or by simulation.
         of = found.setdefault(task.settings["name"], {"cycles": None, "full_cycles": None})
         different = of.get("different_pixels", 0)
         of |= result
@@ -191,15 +191,16 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     least = min(found, key=lambda name: _left(found[name], "cells"))
     most = max(found, key=lambda name: _left(found[name], "cells"))
     text = [
-        "`--specialise` builds only what a scene needs. It changes no word of the arithmetic, so the frame "
-        f"must be that of the full pipeline to the bit: {same} of {len(found)} are, by the bit-accurate "
-        f"models of both pipelines, {simulated} of them by simulation, too.",
-        f"What stays is from {_left(found[least], 'cells'):.0%} of the cells ({least}) to "
-        f"{_left(found[most], 'cells'):.0%} ({most}). Cells are operators, multiplexers, registers and "
+        "`--specialise` builds only the parts that a scene needs. It changes no word of the arithmetic, so "
+        "the frame must equal that of the full pipeline to the bit. The bit-accurate models of both "
+        f"pipelines have compared {len(found)} frames, simulation {simulated} of these. {same} of "
+        f"{len(found)} frames are equal.",
+        f"The specialised pipeline keeps {_left(found[least], 'cells'):.0%} of the cells (*{least}*) to "
+        f"{_left(found[most], 'cells'):.0%} (*{most}*). Cells are operators, multiplexers, registers and "
         "memories of any width, before technology mapping.",
     ]
     parts = [_totals(found), _alone(found)]
-    return Section("needs", "What a scene does not need", text, parts, conclusion=_conclusion(found))
+    return Section("needs", "Parts that a scene does not need", text, parts, conclusion=_conclusion(found))
 
 
 def _shares_alone(found: dict[str, dict]) -> dict[str, list[tuple[str, dict[str, float]]]]:
@@ -226,19 +227,18 @@ def _conclusion(found: dict[str, dict]) -> Conclusion:
 
     same = sum(of["different_pixels"] == 0 for of in found.values())
     sentence = (
-        f"Leaving out what a scene does not need saves from {says(most)} (*{most}*) to **{says(least)}** "
-        f"(*{least}*), and "
-        f"changes no pixel in {same} of {len(found)} scenes."
+        f"Specialisation saves least in the scene *{most}*: {says(most)}. It saves most in the scene "
+        f"*{least}*: **{says(least)}**. In {same} of {len(found)} scenes no pixel changes."
     )
     shares = _shares_alone(found)
     if shares:
         kind = max(shares, key=lambda kind: max(share["cells"] for _, share in shares[kind]))
         name, share = max(shares[kind], key=lambda one: one[1]["cells"])
         sentence += (
-            f" The single omission that saves most: {kind}, {share['cells']:.0%} of the cells and "
-            f"{share['multipliers']:.0%} of the multipliers (*{name}*)."
+            f" The single omission that saves most is *{kind}*. In the scene *{name}* it saves "
+            f"{share['cells']:.0%} of the cells and {share['multipliers']:.0%} of the multipliers."
         )
-    return Conclusion("What does a scene not need?", sentence, _saved_drawing(found))
+    return Conclusion("Which parts does a scene not need?", sentence, _saved_drawing(found))
 
 
 def _saved_drawing(found: dict[str, dict]) -> Drawing:
@@ -256,8 +256,8 @@ def _saved_drawing(found: dict[str, dict]) -> Drawing:
         yticklabels=list(found),
         xlim=(0, 1.35),
     )
-    axes[0].set_title("everything that is not needed, by scene", fontsize=9, loc="left")
-    axes[1].set_title("each omission alone, at its best", fontsize=9, loc="left")
+    axes[0].set_title("all omissions together, by scene", fontsize=9, loc="left")
+    axes[1].set_title("each omission alone, in its best scene", fontsize=9, loc="left")
     axes[0].invert_yaxis()
     labels = []
     for kind, each in _shares_alone(found).items():
@@ -274,12 +274,12 @@ def _saved_drawing(found: dict[str, dict]) -> Drawing:
     axes[0].set_xticks(np.arange(0, 1.01, 0.25))
     axes[1].set(xlim=(-0.04, 1.12), ylim=(-0.06, 1.12))
     place_labels(axes[1], labels, [(of.x, of.y) for of in labels])
-    note = "Counted in the netlist before technology mapping; the pixels are those of the full pipeline."
-    return Drawing("needs-saved", "What leaving out saves", svg(figure), note)
+    note = "Counted in the netlist before technology mapping. The pixels equal those of the full pipeline."
+    return Drawing("needs-saved", "Savings of specialisation", svg(figure), note)
 
 
 def _alone(found: dict[str, dict]) -> Table:
-    columns = ["scene", "left out, and why", *(f"saves {name.replace('_', ' ')}" for name in _RESOURCES)]
+    columns = ["scene", "omission and reason", *(f"saves {name.replace('_', ' ')}" for name in _RESOURCES)]
     columns += ["cells, share of the full", "multipliers, share of the full"]
     rows: list[list[Cell]] = [
         [
@@ -289,8 +289,8 @@ def _alone(found: dict[str, dict]) -> Table:
         for name, of in found.items()
         for reason, saves in zip(of["reasons"], of["alone"], strict=True)
     ]
-    note = "Each by itself, from the full pipeline, counted in the netlist."
-    return Table("needs-alone", "What each omission saves alone", columns, rows, note)
+    note = "Each omission alone, from the full pipeline, counted in the netlist."
+    return Table("needs-alone", "Savings of each omission alone", columns, rows, note)
 
 
 def _left(figures: dict, resource: str) -> float:
@@ -314,7 +314,8 @@ def _totals(found: dict[str, dict]) -> Table:
         rows.append([*row, of["full_cycles"], of["cycles"], of["different_pixels"]])
         grades.append([""] * (len(columns) - 1) + ["bad" if of["different_pixels"] else "good"])
     note = (
-        "The full pipeline has as many lights and materials as the scene, 12-bit coordinates and lengths, a "
-        "PROM of exponents, three channels and, where the method can have one, a highlight gate."
+        "The full pipeline has as many lights and materials as the scene. It has 12-bit coordinates and "
+        "lengths, a PROM of exponents and three channels. If the method can have a highlight gate, the "
+        "pipeline has a gate."
     )
-    return Table("needs", "The full pipeline and the specialised one", columns, rows, note, grades)
+    return Table("needs", "The full and the specialised pipeline", columns, rows, note, grades)

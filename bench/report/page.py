@@ -24,28 +24,30 @@ __all__ = [
 
 
 AXES = {
-    "total": "Against the exact frame: Phong shading as on a GPU, with Blinn's model.",
-    "method": "Against the exact frame, the normal of every pixel, with the same model.",
-    "arithmetic": "Against the same method and model in float64: what the words' widths cost.",
-    "model": "The reflection model against Blinn's, both exact, in float64: no arithmetic cures it.",
-    "max_lsb": "The largest over all pixels and channels; 1 LSB is a step of an 8-bit channel.",
-    "p999_lsb": "One value in a thousand has a larger error; 1 LSB is a step of an 8-bit channel.",
-    "rmse_lsb": "Root of the mean square over pixels and channels; 1 LSB is a step of an 8-bit channel.",
-    "psnr_db": "Peak signal to noise ratio: more is better, so the axis runs the other way.",
-    "flip_p99": "FLIP, a difference as seen by an eye, 0 to 1; one pixel in a hundred has more.",
-    "flip_max": "FLIP, a difference as seen by an eye, 0 to 1; the worst pixel.",
-    "ciede2000_p99": "CIEDE2000 colour difference, of which about 2.3 is just noticed; one pixel in a "
-    "hundred has more.",
-    "ciede2000_max": "CIEDE2000 colour difference, of which about 2.3 is just noticed; the worst pixel.",
+    "total": "Error against the exact frame: Phong shading as on a GPU, with Blinn's model.",
+    "method": "Error against exact normals of every pixel, with the same model.",
+    "arithmetic": "Error against the same method and model in float64, caused by the widths of words.",
+    "model": "Error of the reflection model against Blinn's, both exact in float64. Arithmetic does not "
+    "change this error.",
+    "max_lsb": "The largest error over all pixels and channels. 1 LSB is a step of an 8-bit channel.",
+    "p999_lsb": "One value in a thousand has a larger error. 1 LSB is a step of an 8-bit channel.",
+    "rmse_lsb": "Root of the mean square over pixels and channels. 1 LSB is a step of an 8-bit channel.",
+    "psnr_db": "Peak signal to noise ratio. More is better, so the axis is reversed.",
+    "flip_p99": "FLIP, the difference that an eye sees, 0 to 1. One pixel in a hundred has more.",
+    "flip_max": "FLIP, the difference that an eye sees, 0 to 1. The value of the worst pixel.",
+    "ciede2000_p99": "CIEDE2000 colour difference. An eye just notices about 2.3. One pixel in a hundred has "
+    "more.",
+    "ciede2000_max": "CIEDE2000 colour difference. An eye just notices about 2.3. The value of the worst "
+    "pixel.",
     "cycles_per_pixel": "Cycles of the simulated pipeline from the first write of a constant to the last "
-    "pixel, over its pixels.",
-    "ns_per_pixel": "Cycles a pixel at the clock rate that place and route achieves.",
-    "multipliers": "Multipliers of 18x18 bits in the netlist, none of them shared with anything else.",
+    "pixel, divided by its pixels.",
+    "ns_per_pixel": "Cycles a pixel at the clock rate after place and route.",
+    "multipliers": "Multipliers of 18x18 bits in the netlist. None is shared with other logic.",
     "luts": "Look-up tables of four inputs after place and route, one light, three channels.",
-    "simulated_pixels_per_second": "How fast this machine simulates the hardware: more is better, so the "
-    "axis runs the other way.",
-    "golden_ns_per_pixel": "Time of the same method and model in float64 NumPy on this machine, over the "
-    "pixels that show.",
+    "simulated_pixels_per_second": "Speed at which this machine simulates the hardware. More is better, so "
+    "the axis is reversed.",
+    "golden_ns_per_pixel": "Time of the same method and model in float64 NumPy on this machine, divided by "
+    "the shown pixels.",
 }
 """Explanations of a point's measures, a sentence each: by kind of error, by figure, and by run time."""
 

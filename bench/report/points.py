@@ -54,9 +54,9 @@ __all__ = [
 GROUPS = {
     "documents": "methods of the documents",
     "own": "methods of this project",
-    "baseline": "baselines: normals as they come, or each divided by its length",
-    "published": "as published",
-    "software": "golden renderer, software alone",
+    "baseline": "baselines: linear normals, unchanged or each divided by its length",
+    "published": "variants as published",
+    "software": "golden renderer, only software",
 }
 """Groups of points, with their titles."""
 

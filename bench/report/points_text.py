@@ -91,42 +91,49 @@ def fronts_of(points: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
 def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     """Paragraphs on the points: the trade of each mesh and exponent, and explanations of the measures."""
     of_error = (
-        "Errors are steps (LSB) of an 8-bit channel, over the pixels that show the surface. *Model*: the "
-        "reflection model against Blinn's, both in float64 with exact normals: no arithmetic cures it. "
-        "*Arithmetic*: the frame against the same method and model in float64; 0.5 is a correctly rounded "
-        "frame, and the coefficients of a published variant count as arithmetic. *Method*: against the exact "
-        "frame with the same model. *Total*: against the exact frame, Phong shading as on a GPU: normals "
-        "exact at every pixel, Blinn's model; of `phong`, which is no approximation of Blinn's, its own "
-        "model, (R·V)^n. Methods of the documents stand here with their operand N.H, "
-        "with the more exact 1 - N.H, and, where it differs, as published. FLIP and CIEDE2000 tell what an "
-        "eye sees of an error; *identical to the eye* is a largest error "
-        f"of {LARGEST_LSB:g} LSB, or FLIP to {FLIP_P99:g} in 99 % of the pixels and {FLIP_MAX:g} in all, and "
-        f"CIEDE2000 to {CIEDE2000_P99:g} and {CIEDE2000_MAX:g}."
+        "Errors are in steps (LSB) of an 8-bit channel, over the pixels that show the surface:\n\n"
+        "- *Model* error: the reflection model against Blinn's, both in float64 with exact normals. "
+        "Arithmetic does not change this error.\n"
+        "- *Arithmetic* error: the frame against the same method and model in float64. A correctly rounded "
+        "frame has 0.5. The coefficients of a published variant count as arithmetic.\n"
+        "- *Method* error: the frame against exact normals of every pixel with the same model.\n"
+        "- *Total* error: the frame against the exact frame, Phong shading as on a GPU. The exact frame has "
+        "exact normals at every pixel and Blinn's model. For `phong`, which does not approximate Blinn's "
+        "model, it has the model (R·V)^n.\n\n"
+        "Methods of the documents have points with their operand N.H, and with the more exact operand "
+        "1 - N.H. If the published variant differs, it has points, too. FLIP and CIEDE2000 measure the "
+        "difference that an eye sees. A frame is *identical to the eye* if its largest error is at most "
+        f"{LARGEST_LSB:g} LSB. It is also identical under two conditions: FLIP is at most {FLIP_P99:g} in "
+        f"99 % of the pixels and at most {FLIP_MAX:g} in all, and CIEDE2000 is at most {CIEDE2000_P99:g} in "
+        f"99 % and at most {CIEDE2000_MAX:g} in all."
     )
     dates = {point["hardware"]["placed"] for point in points if point["hardware"].get("placed")}
     placed = "this report" in dates
     of_time = (
-        "Run times: cycles a pixel from the simulation, first write of a constant to last pixel; nanoseconds "
+        "There are four run times:\n\n"
+        "- cycles a pixel, from the first write of a constant to the last pixel;\n"
+        "- nanoseconds a pixel, "
         + (
-            f"at the clock rate after place and route on an {DEVICE}, the median of some seeds, of one for "
-            "published methods and most models; "
+            f"at the clock rate after place and route on an {DEVICE}: the median of some seeds, and of a "
+            "single seed for published methods and most models;\n"
             if placed
-            else "at committed clock rates after place and route "
-            f"({'; '.join(sorted(dates))}), where there are any; "
+            else "at committed clock rates after place and route, if there are any "
+            f"({'; '.join(sorted(dates))});\n"
         )
-        + "pixels that the simulation of the hardware does in a second; and nanoseconds a shown pixel of the "
-        "same method and model in float64 NumPy, spans at hand, vectorised over the pixels. White light on a "
-        "grey, glossy surface. The golden renderer's own shadings have software times alone; their frames "
-        "are rounded to 8 bits."
+        + "- pixels that the simulation of the hardware computes in a second;\n"
+        "- nanoseconds a shown pixel of the same method and model in float64 NumPy, vectorised over the "
+        "pixels, without the preparation of spans.\n\n"
+        "The scene is white light on a grey, glossy surface. The golden renderer's own shadings have only "
+        "software times. Their frames are rounded to 8 bits."
     )
     simulated = [point for point in points if point["settings"]["engine"] == "cxxrtl"]
     modelled = [point for point in points if point["settings"]["engine"] == "model"]
-    engines = f"{len(simulated):,} frames went through the simulated RTL"
+    engines = f"The simulated RTL computed {len(simulated):,} frames"
     if modelled:
         engines += (
-            f", {len(modelled):,} through its bit-accurate model; these have the cycles of the simulated "
-            "pipeline of the same method, if its spans are the same, with the difference of latency, and "
-            "else those of the cycle model"
+            f". Its bit-accurate model computed {len(modelled):,} frames. The cycles of these frames are "
+            "those of a simulated pipeline of the same method with the same spans, plus the difference of "
+            "latency. If there is none, the cycle model gives the cycles"
         )
     return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
 
@@ -149,17 +156,19 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
         if measured:
             best = measured[int(np.argmin([point[kind][key] for point in measured]))]
             errors, cycles = best["errors"], best["times"]["cycles_per_pixel"]
-            speed = "not simulated here" if cycles is None else f"{cycles:.3f} cycles a pixel"
+            speed = "no simulated cycles" if cycles is None else f"{cycles:.3f} cycles a pixel"
             text += (
-                f" {title}: `{best['label']}`, {speed}, largest total error "
-                f"{errors['total_max_lsb']:.1f} LSB, method error {errors['method_max_lsb']:.2f}."
+                f" {title}: `{best['label']}` with {speed}, a largest total error of "
+                f"{errors['total_max_lsb']:.1f} LSB and a largest method error of "
+                f"{errors['method_max_lsb']:.2f} LSB."
             )
     border = max((point["border"] for point in hardware), key=itemgetter("pixels"), default=None)
     if border and border["pixels"]:
         most = max(point["border"]["lsb"] for point in hardware)
         text += (
-            f" All pixels count, also {border['pixels']:,} with |N·L| at most {BORDER:g}, where a light "
-            f"begins and rounding may switch it: the largest total error of a design there is {most:.1f} LSB."
+            f" All pixels count, also the {border['pixels']:,} pixels at the border of a light. There |N·L| "
+            f"is at most {BORDER:g}, and rounding may switch the light on or off. The largest total error of "
+            f"a design at the border is {most:.1f} LSB."
         )
     return text
 
@@ -201,7 +210,7 @@ def table(points: Sequence[Mapping[str, Any]]) -> Table:
         **{title: _getter("hardware", key) for key, title in hardware.items()},
         **{_heading(axis): _getter("errors", axis["key"]) for axis in others},
         "identical to exact interpolation": lambda point: point["verdicts"]["method"],
-        "identical to the same in float64": lambda point: point["verdicts"]["arithmetic"],
+        "identical to float64": lambda point: point["verdicts"]["arithmetic"],
         "model identical to Blinn's": lambda point: point["verdicts"]["model"],
         **{name: _getter("settings", name) for name in ("method", "model", "engine")},
     }
@@ -212,10 +221,11 @@ def table(points: Sequence[Mapping[str, Any]]) -> Table:
         title="Every point",
         columns=list(columns),
         rows=rows,
-        note="Engine cxxrtl: simulated RTL; model: its bit-accurate model; float64: the golden renderer, "
-        "rounded to 8 bits. Multipliers, cells, register and memory bits are counted before technology "
-        "mapping. Identical to the eye: to the exact frame, to exact interpolation with the same model, and "
-        "to the same method and model in float64; good: yes, bad: no.",
+        note="The engine `cxxrtl` is simulated RTL, `model` its bit-accurate model, and `float64` the golden "
+        "renderer, rounded to 8 bits. Multipliers, cells, register bits and memory bits are counted before "
+        "technology mapping. The columns *identical* compare a frame with the exact frame, with exact "
+        "interpolation with the same model, and with the same method and model in float64: ✓ for yes, ✗ for "
+        "no.",
         grades=[[graded[cell] if isinstance(cell, bool) else "" for cell in row] for row in rows],
     )
 
@@ -247,10 +257,18 @@ def front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Sequen
     return Table(
         name="fronts",
         title="Pareto fronts",
-        columns=["mesh", "exponent", "error", "run time", "design", "its error", "its run time"],
+        columns=[
+            "mesh",
+            "exponent",
+            "measure of error",
+            "measure of time",
+            "design",
+            "error",
+            "time or cost",
+        ],
         rows=rows,
-        note="Designs that no other beats: for each, all that err less take longer, and all that are faster "
-        "err more.",
+        note="Designs on the front. Every design with a smaller error takes more time, and every faster "
+        "design has a larger error.",
     )
 
 

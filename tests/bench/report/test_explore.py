@@ -170,7 +170,7 @@ def test_no_design_under_the_error_is_one_line(monkeypatch, tmp_path):
 
 def test_what_is_given_is_told(monkeypatch):
     made_up(monkeypatch)
-    told = "chord-local gets values of each light with each span; their computation is not in its cost\n"
+    told = "chord-local gets values of each light with each span. Its cost leaves out their computation.\n"
     assert told in run("--methods", "chord-local").output
     assert told not in run("--methods", "angular").output
 

@@ -158,7 +158,7 @@ def test_tables(counted, capsys):
         [*head, "100", "1,000", "40.0%", "50.0%", "60.0%", "70.0%", "10.0%"],
         [*head, "42,000", "21,000", "50.0%", "1,100", "1,100", "0.0%"],
     ]
-    assert lines[-1] == "1 of 1 frames are the same to the bit with the gate off and on."
+    assert lines[-1] == "1 of 1 frames are equal to the bit with the gate off and on."
 
 
 def test_json(counted, capsys, tmp_path):
@@ -177,7 +177,7 @@ def test_json(counted, capsys, tmp_path):
 def test_a_frame_that_differs_fails(counted, capsys):
     counted["identical"] = False
     assert main([]) == 1
-    assert capsys.readouterr().out.splitlines()[-1].startswith("0 of 1 frames are the same")
+    assert capsys.readouterr().out.splitlines()[-1].startswith("0 of 1 frames are equal")
 
 
 @pytest.mark.parametrize(

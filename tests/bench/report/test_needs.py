@@ -164,4 +164,4 @@ def test_section():
     several = counted | {"reasons": ["this", "that"], "alone": [half, half]}
     totals, alone = section(quick[:2], [several, several]).parts
     assert totals.records()[0]["cycles, full"] is None
-    assert [row["left out, and why"] for row in alone.records()] == ["this", "that"] * 2
+    assert [row["omission and reason"] for row in alone.records()] == ["this", "that"] * 2
