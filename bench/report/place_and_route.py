@@ -106,10 +106,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     if not tasks:
         return Section(name, title, *_committed())
     text = [
-        "The pipeline with cosquad, of quotient with blinn, one light, three channels, out of context. "
-        "Placement starts from a seed; clock rates are over some of them. At one pixel a cycle, 1920x1080 "
-        "pixels 60 times a second ask for "
-        f"{1920 * 1080 * 60 / 1e6:.0f} MHz."
+        "The pipelines have the model `cosquad`, but `blinn` for `quotient`, with one light and three "
+        "channels, out of context. Placement starts from a seed, and clock rates are over several seeds. At "
+        f"one pixel a cycle, 1920x1080 pixels 60 times a second need {1920 * 1080 * 60 / 1e6:.0f} MHz."
     ]
     tables = []
     for family in FAMILIES:
@@ -146,14 +145,12 @@ def _committed() -> tuple[list[str], list[Table]]:
     columns += [f"clock rate, {which}, MHz" for which in ("smallest", "median", "largest")]
     columns += ["seeds", "date", "command"]
     text = (
-        "Placing a design takes minutes, so a quick report measures none: these are the committed figures, "
-        "each with its "
-        "date and command. `blysk fpga --json FILE` measures more, and `python -m blysk.bench.report.placed "
-        "FILE` adds "
-        "them; a full report measures all of them anew."
+        "Placing a design takes minutes, so a quick report places no design. It shows the committed figures, "
+        "each with its date and command. Measure more with `blysk fpga --json FILE`, and add them with "
+        "`python -m blysk.bench.report.placed FILE`. A full report measures all figures anew."
     )
     table = Table(
-        "place-and-route-committed", "Committed figures", columns, rows, "Out of context, one light."
+        "place-and-route-committed", "Committed figures", columns, rows, "Out of context, with one light."
     )
     return [text], [table]
 
@@ -166,8 +163,8 @@ def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[
     missing = [package for package, version in versions.items() if version is None]
     if missing:
         return (
-            f"{device}: not measured, {' and '.join(missing)} not installed. `{install_extra('fpga')}` "
-            "brings what is needed; the next report then has the table."
+            f"{device}: not measured, because {' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} "
+            f"not installed. Run `{install_extra('fpga')}`. The next report then has the table."
         ), None
     rows: list[tuple[Cell, ...]] = [
         (settings["method"], *(result.get(key) for key in _FIGURES.values()), result.get("reason", ""))
@@ -175,11 +172,11 @@ def _table(family: str, results: Sequence[tuple[dict[str, Any], Any]]) -> tuple[
     ]
     tools = " and ".join(f"{package} {version}" for package, version in versions.items())
     note = (
-        "Look-up tables have four inputs; those that serve as carries, as memories and as wires count. "
-        f"Multipliers have 18x18 bits. {FAMILIES[family].registers} Ports have a register each, which is not "
-        "counted."
+        "Look-up tables have four inputs. Look-up tables that serve as carries, memories or wires count, "
+        f"too. Multipliers have 18x18 bits. {FAMILIES[family].registers} Each port has a register, which is "
+        "not counted."
     )
-    columns = ("method", *_FIGURES, "why there is no figure")
+    columns = ("method", *_FIGURES, "reason without figures")
     return (
         f"{device}: {settings['seeds']} seeds, by {tools}.",
         Table(f"place-and-route-{family}", f"Parts and clock rate, {device}", columns, rows, note),

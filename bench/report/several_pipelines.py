@@ -46,14 +46,22 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     settings = tasks[0].settings
     width, height = settings["size"]
     text = [
-        f"N pipelines of the method {settings['method']} at {width}x{height}; pipeline k takes the spans of "
-        "the scanlines y with y mod N = k, from a FIFO of its own. "
-        f"{same} of {len(rates)} pictures are those of the bit-accurate model of one pipeline.",
-        "One span is taken in a cycle. So a mesh gives at most as many pixels a cycle as its spans have on "
-        "average: small triangles leave pipelines idle. Where that number is about N, each cycle on which a "
-        "full FIFO stops the port is lost, too.",
+        f"N pipelines have the method `{settings['method']}` at {width}x{height}. Pipeline k takes the spans "
+        "of the scanlines y with y mod N = k, from its own FIFO. "
+        f"{same} of {len(rates)} pictures equal those of the bit-accurate model of a single pipeline.",
+        "The port takes a span in a cycle. So the pixels a cycle are at most the average number of pixels of "
+        "a span. Small triangles leave pipelines idle. If the average is about N, each cycle in which a full "
+        "FIFO stops the port is lost, too.",
     ]
-    columns = ("mesh", "triangles", "pipelines", "pixels a span", "cycles", "pixels a cycle", "times one")
+    columns = (
+        "mesh",
+        "triangles",
+        "pipelines",
+        "pixels a span",
+        "cycles",
+        "pixels a cycle",
+        "times a single pipeline",
+    )
     rows: list[tuple[Cell, ...]] = [
         (
             *(rate.mesh.split()[0], rate.triangles, rate.pipes, rate.pixels_a_span, rate.cycles),
@@ -61,6 +69,6 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         )
         for rate in sorted(rates, key=lambda rate: settings["meshes"].index(rate.mesh))
     ]
-    note = "Cycles from the first write of a constant to the last pixel, simulated, without stalls."
+    note = "Cycles are simulated without stalls, from the first write of a constant to the last pixel."
     table = Table("several-pipelines", "Pixels a cycle of several pipelines", columns, rows, note)
     return Section("several-pipelines", "More than one pixel a cycle", text, [table])

@@ -78,20 +78,19 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     tables = [
         _matrix(
             "stability",
-            "Largest error of a pixel, LSB: spans cut where need be, as `blysk` does",
+            "Largest error of a pixel, LSB, with spans cut as `blysk` cuts them",
             methods,
             worst["prepared"],
-            "Of normals that are not of unit length the preparation refuses all but those of a mesh, which "
-            "are mended when it is read.",
+            "The preparation refuses normals that are not of unit length. The loader of meshes mends the "
+            "normals of a mesh.",
         ),
         _matrix(
             "stability-as-given",
-            "Largest error of a pixel in spans without a flag, LSB: every span as it comes",
+            "Largest error of a pixel in spans without a flag, LSB, with uncut spans",
             methods,
             worst["given"],
-            "What somebody gets who sends spans to the pipeline without cutting them. Cells with ! are "
-            "outside "
-            "of the ranges below.",
+            "These are the errors if the user sends spans to the pipeline without cutting them. Cells with ! "
+            "are outside the ranges below.",
         ),
     ]
     bad = [grade for _, grade in worst["prepared"].values() if grade == "bad"]
@@ -101,32 +100,31 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     unsafe = sum(case["safe_grade"] == "bad" for case in safe)
     runs = [case for method in streams for case in streams[method]]
     text = [
-        f"{len(methods)} methods in {sum(map(len, cases[methods[0]].values()))} stiff and extreme cases of "
-        f"{len(GROUPS)} groups. The pixels are those of the bit-accurate model, which the simulated hardware "
-        f"equals to the bit, with the model `cosquad`, of `quotient` with `blinn`; group {STREAM_GROUP} is "
-        "simulated hardware. Each is held against exact normals of every pixel in float64 with the same "
-        "model; 0.5 LSB is a correctly rounded pixel. Where N.L is 0 but for the arithmetic, lit and dark "
-        "are both right.",
-        f"Colours follow the error: to {GOOD:g} LSB, to {_LIMITS['fair']:g}, to {_LIMITS['poor']:g}, and "
-        f"above. A larger "
-        f"error than {GOOD:g} LSB is marked § where the user is told of it: the pipeline flags the span, or "
-        f"the method "
-        "serves it and its documentation states such an error (its own curve in float64 is as far from exact "
-        "normals, and its units' error bounds, times the exponent in a highlight, come to the rest); and ! "
-        "where "
-        "nothing tells: silently wrong.",
-        "Where N.L changes its sign a highlight goes out at once, however bright it is. At exponent 1 it is "
-        "bright there, and a method whose N.L is off by a part of an LSB puts it out a pixel early or late: "
-        "the error of group 5 can be as large as the highlight.",
-        f"Silently wrong cells with spans cut: {len(bad)} of {len(worst['prepared'])}. With spans as they "
-        f"come: "
-        f"{len(silent)}"
+        f"This section tests {len(methods)} methods in {sum(map(len, cases[methods[0]].values()))} stiff and "
+        f"extreme cases of {len(GROUPS)} groups. The bit-accurate model computes the pixels, and the "
+        "simulated hardware equals it to the bit. The reflection model is `cosquad`, but `blinn` for "
+        f"`quotient`. Group {STREAM_GROUP} is simulated hardware. Each pixel is compared with exact normals "
+        "in float64 with the same model. A correctly rounded pixel has 0.5 LSB. Where N.L is 0 within the "
+        "error of the arithmetic, lit and dark are both right.",
+        f"The colour of a cell shows its error: up to {GOOD:g} LSB, up to {_LIMITS['fair']:g}, up to "
+        f"{_LIMITS['poor']:g}, or more. The mark of a cell shows whether the user is told of an error above "
+        f"{GOOD:g} LSB:\n\n"
+        "- §: the pipeline flags the span, or the method serves the span and its documentation states an "
+        "error of this size. The stated error is that of the method's own curve in float64, plus the error "
+        "bounds of its units. In a highlight the bounds are multiplied by the exponent.\n"
+        "- !: nothing tells the user. The pixel is silently wrong.",
+        "Where N.L changes its sign, a highlight ends at once, also a bright highlight. At exponent 1 the "
+        "highlight is bright there. If the N.L of a method is wrong by a part of an LSB, the highlight ends "
+        "a pixel early or late. So the error of group 5 can be as large as the highlight.",
+        f"With cut spans {len(bad)} of {len(worst['prepared'])} cells are silently wrong. With uncut spans "
+        f"{len(silent)} cells are silently wrong"
         + (f", of {_listed(sorted(set(silent), key=methods.index))}" if silent else "")
-        + f"; of the {len(safe)} cases with spans that the method serves, {unsafe} are silently wrong there.",
-        f"In simulation {sum(case['runs'] for case in runs)} runs with stalls, empty spans and resets gave "
-        f"{sum(case['runs'] * case['pixels'] for case in runs):,} pixels, "
-        f"{sum(case['wrong'] or 0 for case in runs):,} of them wrong"
-        + (f"; {halted} came to a halt." if (halted := sum(case["wrong"] is None for case in runs)) else "."),
+        + f". {len(safe)} cases have spans that the method serves. In {unsafe} of these cases a served span "
+        "is silently wrong.",
+        f"{sum(case['runs'] for case in runs)} simulated runs with stalls, empty spans and resets gave "
+        f"{sum(case['runs'] * case['pixels'] for case in runs):,} pixels. "
+        f"{sum(case['wrong'] or 0 for case in runs):,} of these pixels are wrong."
+        + (f" {halted} cases halted." if (halted := sum(case["wrong"] is None for case in runs)) else ""),
     ]
     parts = [*tables, _range_table(ranges), _drawing(ranges), _case_table(cases), _stream_table(streams)]
     title = "Numerical stability on stiff and extreme cases"
@@ -155,7 +153,7 @@ def _stream_cell(cases: Sequence[dict] | None) -> tuple[float | None, Grade]:
 def _matrix(name, title, methods, worst, note) -> Table:
     def colored(group, method) -> Grade:
         error, grade = worst[group, method]
-        # Pixels that differ are no small error.
+        # A pixel that differs from the model's is always a bad error.
         return grade if group == STREAM_GROUP else _magnitude(error)
 
     def marked(group, method) -> Mark:
@@ -164,10 +162,11 @@ def _matrix(name, title, methods, worst, note) -> Table:
     return Table(
         name,
         title,
-        ["group", "what is extreme", *methods],
+        ["group", "extreme quantity", *methods],
         [[group, text, *(worst[group, method][0] for method in methods)] for group, text in GROUPS.items()],
-        f"Worst case of each group; colours follow the error; §: stated or flagged, !: nothing tells. Group "
-        f"{STREAM_GROUP}: simulated pixels that are not the model's; none where it was not simulated. {note}",
+        "Worst case of each group. The colour shows the error. §: stated or flagged. !: nothing tells. "
+        f"Group {STREAM_GROUP} has the number of simulated pixels that differ from the model's. There is no "
+        f"figure if the method was not simulated. {note}",
         [["", "", *(colored(group, method) for method in methods)] for group in GROUPS],
         [["", "", *(marked(group, method) for method in methods)] for group in GROUPS],
     )
@@ -209,32 +208,35 @@ def _range_table(ranges: dict[str, dict]) -> Table:
                 silent = given["silent"] if given["flagged"] < of["spans"] else None
                 cells = [silent, given["flagged"] / of["spans"], prepared["error"]]
                 own = [given["grade"], "", prepared["grade"]]
-            # What is not too wide is not cut.
+            # A span that is not too wide is not cut.
             row += cells if factor > 1 else cells[:2]
             grade += own if factor > 1 else own[:2]
         row += [f"1 to {(1 << LENGTH_BITS) - 1}", f"1 to {MAX_EXPONENT}"]
         rows.append(row)
         grades.append([*grade, "", ""])
     columns = ["method", *(f"widest span at n = {exponent}, degrees" for exponent in RANGE_EXPONENTS)]
-    columns += [f"error to {GOOD:g} LSB up to, degrees"]
-    columns += ["no span flagged to, degrees", "every span flagged from, degrees"]
+    columns += [f"angle up to which the error is at most {GOOD:g} LSB, degrees"]
+    columns += ["angle up to which no span is flagged, degrees"]
+    columns += ["angle from which every span is flagged, degrees"]
     for factor in FACTORS:
-        at = f"at {factor:g} of the widest" if factor != 1 else "at the widest"
+        at = f"at {factor:g} times the widest" if factor != 1 else "at the widest"
         columns += [f"error without a flag {at}, LSB", f"spans flagged {at}, share"]
         columns += [f"error {at}, cut, LSB"] * (factor > 1)
     note = (
-        "`blysk` cuts wider spans before the pipeline, and counts them; the pipeline counts those that it "
-        f"gets and can tell, some or all. Errors at exponent {SWEEP_EXPONENT}, spans of 16 pixels with the "
-        "highlight in them; no figure where every span is flagged. Of `chord-local`, where the widest span "
-        "depends on the light, and of `quotient` it is measured: that of which none of a sample is cut."
+        "`blysk` cuts wider spans before the pipeline, and counts them. The pipeline counts the wide spans "
+        "that it gets and can recognise: some or all. "
+        f"Errors are at exponent {SWEEP_EXPONENT}, with spans of 16 pixels that hold the highlight. "
+        "There is no figure where every span is flagged. For `chord-local` the widest span depends on the "
+        "light. For `chord-local` and `quotient` the widest span is measured: the widest angle at which no "
+        "span of a sample is cut."
     )
-    title = "Range of each method: served whole, exact to a step, flagged; and what it does outside"
+    title = "Range of each method, and its errors and flags outside the range"
     columns += ["pixels of a span", "exponents"]
     return Table("safe-ranges", title, columns, rows, note, **_shown(rows, grades))
 
 
 def _case_table(cases: dict[str, dict]) -> Table:
-    columns = ["method", "group", "case", "spans", "served", "cut", "flagged", "error as given, LSB"]
+    columns = ["method", "group", "case", "spans", "served", "cut", "flagged", "error uncut, LSB"]
     columns += [
         "error without a flag, LSB",
         "error in served spans, LSB",
@@ -253,7 +255,7 @@ def _case_table(cases: dict[str, dict]) -> Table:
                 rows.append([*row, prepared.get("error"), prepared.get("flagged")])
                 shown = [given["grade"], given["safe_grade"], prepared.get("grade", ""), ""]
                 grades.append([""] * 8 + shown)
-    note = "A case without figures for cut spans is refused when they are prepared."
+    note = "The preparation refuses a case that has no figures for cut spans."
     return Table("stability-cases", "Every case", columns, rows, note, **_shown(rows, grades))
 
 
@@ -263,7 +265,7 @@ def _stream_table(streams: dict[str, list]) -> Table:
         for method, found in streams.items()
         for of in found
     ]
-    note = "Simulated hardware against the model: coordinates, colour and end of the span of each pixel."
+    note = "Simulated hardware is compared with the model: each pixel's coordinates, colour and end of span."
     columns = ["method", "case", "runs", "pixels", "pixels that differ"]
     grades = [["", "", "", "", "good" if row[4] == 0 else "bad"] for row in rows]
     title = f"Group {STREAM_GROUP}: {GROUPS[STREAM_GROUP]}"
@@ -275,7 +277,7 @@ def _drawing(ranges: dict[str, dict]) -> Drawing:
 
     figure = Figure(figsize=(8.4, 4.0), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    titles = ("as they come, spans without a flag", "out of range ones cut")
+    titles = ("uncut spans without a flag", "spans cut if out of range")
     ways = ("given", "silent"), ("prepared", "error")
     for panel, (way, key), title in zip(panels, ways, titles, strict=True):
         for method, found in ranges.items():
@@ -295,8 +297,8 @@ def _drawing(ranges: dict[str, dict]) -> Drawing:
     panels[0].set_ylabel("largest error, LSB")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center", frameon=False)
     note = (
-        f"Exponent {SWEEP_EXPONENT}, 16 pixels a span. A line ends where every span is flagged. Dotted: "
-        "half a step, a correctly rounded pixel. A span that is cut is cut until the angle grows evenly in "
-        "each part, which leaves parts that are narrower than a span that is left whole."
+        f"Exponent {SWEEP_EXPONENT}, 16 pixels a span. A line ends where every span is flagged. The dotted "
+        "line is half a step, the error of a correctly rounded pixel. A span is cut until the angle grows "
+        "evenly in each part. So its parts are narrower than the widest uncut span."
     )
     return Drawing("stability-angles", "Error against the angle of a span", svg(figure), note)

@@ -38,9 +38,9 @@ GROUPS = {
     4: "the highlight's peak",
     5: "light at the terminator, behind, at the viewer",
     6: "normals that are not of unit length",
-    7: "4095 pixels, sums at their largest",
-    8: "stalls, back to back, empty spans, reset",
-    9: "triangles without area, slivers, at the edges",
+    7: "4095 pixels, largest sums",
+    8: "stalls, spans without a pause, empty spans, reset",
+    9: "triangles without area, slivers, triangles at the edges",
     10: "intensities over 1, many lights",
 }
 """Groups of cases by number: the quantity that is extreme."""
@@ -195,7 +195,7 @@ def cases_of(group: int) -> Iterator[Case]:
                 yield single_spans(1, f"exponent {exponent}", ends, rng.integers(2, 41, 100), exponent)
         case 2:
             for degrees in ANGLES:
-                # Of an even number of pixels none is in the middle, where opposite normals have no normal.
+                # The number of pixels is even, because opposite normals have no normal in the middle.
                 yield single_spans(2, f"{degrees:g} degrees", about(np.full(60, degrees), 30), 16, 50)
         case 3:
             for length in LENGTHS:
@@ -206,8 +206,8 @@ def cases_of(group: int) -> Iterator[Case]:
                 ("on a pixel", 17, 0.5, 20),
                 ("between two pixels", 16, 0.5, 20),
                 ("on the last pixel", 17, 1.0, 20),
-                ("narrower than a pixel, on one", 3, 0.5, 40),
-                ("narrower than a pixel, between two", 4, 0.5, 40),
+                ("narrower than a pixel, on a pixel", 3, 0.5, 40),
+                ("narrower than a pixel, between two pixels", 4, 0.5, 40),
                 ("highlight inside one span", 65, 0.4, 30),
             ):
                 ends = arcs(rng, HALFWAY, np.full(40, degrees), at)
@@ -278,7 +278,7 @@ def _length_cases(rng) -> Iterator[Case]:
     axes = np.vstack([COMPONENT.max_code * np.eye(3, dtype=int), COMPONENT.min_code * np.eye(3, dtype=int)])
     yield of_codes("largest and smallest code of a component", axes, axes)
     pairs = [axes[k] for k in np.nonzero(~np.eye(6, dtype=bool))]
-    yield of_codes("the same, 90 and 180 degrees apart", *pairs)
+    yield of_codes("largest and smallest codes, 90 and 180 degrees apart", *pairs)
     full = COMPONENT.max_code * np.array([[1, 1, 1], [0, 1, 1], [1, 0, 1]])
     yield of_codes("length sqrt 2 and sqrt 3", full, full[[1, 2, 0]])
     yield _mended_mesh()
@@ -313,13 +313,13 @@ def _triangle_cases(rng) -> Iterator[Case]:
     plate = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
     yield _scene_case(9, "two triangles that share an edge", bent(plate, [(0, 1, 2), (0, 2, 3)]))
     flat = bent([*plate, (0, 0, 0)], [(0, 1, 2), (0, 4, 2), (0, 0, 3), (1, 1, 1)])
-    yield _scene_case(9, "triangles without area beside one", flat)
+    yield _scene_case(9, "triangles without area beside a triangle with area", flat)
     slivers = [(-1, y / 10, 0) for y in range(-9, 10)], [(1, y / 10 + 0.011, 0) for y in range(-9, 10)]
     tips = [(1, y / 10 + 0.012, 0) for y in range(-9, 10)]
     faces = [(k, 19 + k, 38 + k) for k in range(19)]
-    yield _scene_case(9, "slivers of under a pixel", bent([*slivers[0], *slivers[1], *tips], faces))
+    yield _scene_case(9, "slivers narrower than a pixel", bent([*slivers[0], *slivers[1], *tips], faces))
     tall = [(x + dx, y, 0) for x in (-0.8, 0.1, 0.7) for dx, y in ((0, -1), (0.03, -1), (0.3, 1))]
-    yield _scene_case(9, "spans of a pixel", bent(tall, np.arange(9).reshape(3, 3)))
+    yield _scene_case(9, "spans of one pixel", bent(tall, np.arange(9).reshape(3, 3)))
     dots = np.add(rng.uniform(-1, 1, (60, 1, 2)), [(0, 0), (0.04, 0), (0, 0.04)])
     dots = np.dstack([dots, np.zeros((60, 3))]).reshape(-1, 3)
     yield _scene_case(9, "triangles of one pixel", bent(dots, np.arange(180).reshape(60, 3)))

@@ -67,29 +67,26 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
     sentence = f"Inside its range {which} silently wrong in {count} stiff and extreme cases. "
     if within:
         said = ", ".join(f"**`{method}`** ({worst[method][0]:.2f})" for method in within)
-        sentence += f"Within {GOOD:g} LSB in all of them: {said}"
+        sentence += f"These methods stay within {GOOD:g} LSB in all cases: {said}"
     else:
         sentence += (
-            f"None stays within {GOOD:g} LSB in all of them; the nearest is `{least}`, "
+            f"No method stays within {GOOD:g} LSB in all cases. `{least}` has the smallest largest error, "
             f"{worst[least][0]:.2f} LSB"
         )
     if elsewhere:
         said = ", ".join(f"`{method}` ({lit[method][0]:.2f})" for method in elsewhere)
-        sentence += f"; but for pixels where the light sets, also {said}"
+        sentence += f". These methods do so in all cases without a terminator: {said}"
     sentence += (
-        f". The largest error inside a range is {worst[most][0]:.0f} LSB (`{most}`, {worst[most][1]}), as "
-        f"its "
-        "documentation states."
+        f". The largest error inside a range is {worst[most][0]:.0f} LSB (`{most}`, {worst[most][1]}). The "
+        "documentation of this method states an error of this size."
     )
     if "quotient" in ranges:
         end = min(ranges["quotient"]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS)
         sentence += (
-            f" The range of `quotient` ends at spans that turn by {end:.3g} degrees, at "
-            "every exponent, or whose ends have lengths of more than 2:1; others are halved before it."
+            f" `quotient` serves spans of up to {end:.3g} degrees at every exponent, if the lengths at their "
+            "ends differ by at most 2:1. Other spans are halved before the pipeline."
         )
-    return Conclusion(
-        "Where is it exact, and where does that end?", sentence, _drawing(cases, ranges, worst, lit)
-    )
+    return Conclusion("In which range is a method exact?", sentence, _drawing(cases, ranges, worst, lit))
 
 
 def _listed(methods: Sequence[str]) -> str:
@@ -127,7 +124,7 @@ def _drawing(
     left.set(xscale="log", xlabel="largest error, LSB of 8 bits")
     left.set_title("worst case", fontsize=9, loc="left")
     right.set(xscale="log", xlabel="widest span that is served whole, degrees")
-    right.set_title("where the range ends", fontsize=9, loc="left")
+    right.set_title("end of the range", fontsize=9, loc="left")
     for panel, ticks in ((left, (0.5, 1, 2, 5, 10, 50, 200)), (right, (0.5, 1, 2, 5, 10, 20, 45, 90, 180))):
         panel.margins(x=0.12)
         low, high = panel.get_xlim()
@@ -138,14 +135,12 @@ def _drawing(
     left.set_yticklabels(methods)
     right.set_yticklabels([""] * len(methods))
     note = (
-        "Left, filled: the worst of all cases inside the range, spans cut where need be or served whole, "
-        "but for those "
-        "where the light sets; bar: with those, in which a bright highlight of a small exponent ends within "
-        "a pixel; "
-        f"open: spans as they come, outside the range, of which no flag tells. Dashed: {GOOD:g} LSB. Right: "
-        f"from the "
-        "smallest exponent to the largest."
+        "Left: largest errors of each method. A filled mark is the worst case inside the range, with spans "
+        "cut or served whole, without the cases of the terminator. A bar is the worst case with them: there "
+        "a bright highlight of a small exponent ends within a pixel. An open mark is the worst uncut span "
+        f"without a flag, also outside the range. The dashed line is {GOOD:g} LSB. Right: the widest span, "
+        "from the smallest exponent to the largest."
     )
     return Drawing(
-        "stability-worst", "Worst case of each method, and where its range ends", svg(figure), note
+        "stability-worst", "Worst case of each method, and the end of its range", svg(figure), note
     )

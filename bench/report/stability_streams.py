@@ -84,7 +84,7 @@ def stream_patterns(unit: ShadingPipelineUnit) -> Iterator[tuple[str, dict[str, 
         A pipeline.
     """
     rng = np.random.default_rng(STREAM_GROUP)
-    yield "back to back, empty spans between", {}
+    yield "no stalls, with empty spans", {}
     for name, shares in (
         ("random stalls on both sides", (0.4, 0.4)),
         ("input mostly stalled", (0.9, 0.1)),
@@ -147,7 +147,7 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
     loaded = len(before["write"])
     for cycles in (unit.latency + 40,) if quick else (3, unit.latency // 2, unit.latency, unit.latency + 40):
         interrupted = _Interrupted(unit, before, loaded + cycles)
-        found.setdefault("reset in mid span", []).append(wrong(interrupted, engine="pysim")[0])
+        found.setdefault("reset within a span", []).append(wrong(interrupted, engine="pysim")[0])
     return [
         {
             "case": name,

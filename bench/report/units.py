@@ -82,24 +82,28 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         for line in results
     ]
     text = [
-        "Every unit by itself: what it errs by, how long it takes and what it is made of. Errors are the "
-        "largest found: of the *model*, the formula of the unit in float64 against the exact function; of "
-        "the *arithmetic*, the unit against that formula; and in *total*, against the exact function. They "
-        "come from the bit-accurate models, which tests hold equal to the RTL to the bit; times from the "
-        "units or a simulation of them, parts from their netlists. `blysk blocks` prints the same table.",
+        "The table has the errors, cycles and parts of every unit alone. Each error is the largest error "
+        "found:\n\n"
+        "- the *model* error, of the unit's formula in float64 against the exact function;\n"
+        "- the *arithmetic* error, of the unit against its formula in float64;\n"
+        "- the *total* error, of the unit against the exact function.\n\n"
+        "Errors come from the bit-accurate models. Tests check that the models equal the RTL to the bit. "
+        "Cycles come from the units or their simulation, parts from their netlists. `blysk blocks` prints "
+        "the same table.",
     ]
     if len(results) < len(ENTRIES):
         text.append(f"A quick report has {len(results)} of the {len(ENTRIES)} lines.")
     note = (
-        "An error of 1 is a full term or the length of a unit vector, unless the unit says otherwise: *LSB* "
-        "a step of an 8-bit channel, *rad* and *turn* angles, *rate* shares of a gate's decisions (let "
-        "through for nothing, stopped by mistake, both). Latency: cycles from an input to its first result; "
-        "interval: cycles from a result to the next. *As published*: with the constants or the structure of "
-        "the document, which the others mend."
+        "An error of 1 is a full term or the length of a unit vector, if the column *unit of the errors* "
+        "names no other unit. *LSB* is a step of an 8-bit channel, *rad* and *turn* are angles. *Rate* is a "
+        "share of a gate's decisions: spans let through in vain, spans stopped by mistake, and both. "
+        "Latency is the number of cycles from an input to its first result. Interval is the number of "
+        "cycles from a result to the next. A variant *as published* has the constants or the structure of "
+        "the document. The other variants correct these."
     )
     return Section(
         "units",
         "Units, one by one",
         text,
-        [Table("units", "Errors, times and parts of every unit", _COLUMNS, lines, note)],
+        [Table("units", "Errors, cycles and parts of every unit", _COLUMNS, lines, note)],
     )

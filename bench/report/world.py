@@ -27,15 +27,15 @@ OTHERS: dict[str, dict[str, str]] = {
     "rate": {
         "Lai02": "117.5 million pixels a second",
         "RasterI": "about 30 frames a second of 1024x768, 3,000 faces, at 100 MHz",
-        "PicoGS": "colour combiner: a pixel a cycle at 100 MHz; 640 to 960 triangles a frame at 60 Hz "
-        "through its SPI port",
+        "PicoGS": "colour combiner: a pixel a cycle at 100 MHz; SPI port: 640 to 960 triangles a frame at 60 "
+        "Hz",
         "RasterIX": "100 million pixels and 200 million texels a second at 100 MHz",
         "PixelForge": _NOT_STATED,
         "SpinalVoodoo": _NOT_STATED,
         "PICA200": "400 million pixels a second at 100 MHz, theoretical",
     },
     "device": {
-        "Lai02": "standard cells, simulated; process not repeated here",
+        "Lai02": "standard cells, simulated; we leave out the process",
         "RasterI": "Artix-7 100T (Arty A7-100T)",
         "PicoGS": "ECP5-25K (ICEpi Zero)",
         "RasterIX": "Xilinx 7 series (Artix-7 200T, Zynq 7020, Artix-7 35T)",
@@ -62,12 +62,12 @@ OTHERS: dict[str, dict[str, str]] = {
         "colour per pixel",
         "SpinalVoodoo": "none: colours of vertices interpolated in 12.12 (Gouraud); textures, fog, depth and "
         "blending per pixel",
-        "PICA200": "fragment lighting: a quaternion is interpolated, its dot products address tables of the "
+        "PICA200": "fragment lighting: interpolates a quaternion, whose dot products address tables of the "
         "highlight",
     },
     "verification": {
         "Lai02": _NOT_STATED,
-        "RasterI": "on the board; no error against exact arithmetic stated",
+        "RasterI": "on the board; states no error against exact arithmetic",
         "PicoGS": "Verilator frames equal to those of a bit-accurate Rust model",
         "RasterIX": "unit tests in Verilator, games on boards",
         "PixelForge": "unit and integration tests in simulation, demos on the board",
@@ -98,7 +98,9 @@ def own(method: str, model: str, date: str) -> dict[str, str]:
         Date of its figures. Empty: there are no figures.
     """
     light = _OWN.get((method, model), "")
-    verified = "bit-accurate model within a stated bound of float64; RTL equal to it bit for bit, simulated"
+    verified = (
+        "bit-accurate model within a stated bound of float64; simulated RTL equal to the model to the bit"
+    )
     found = {"light per pixel": light, "verification": verified}
     if not date:
         return {"rate": "not placed yet", "device": DEVICE, "resources": "not placed yet", **found}
@@ -127,19 +129,19 @@ def claims(quick: bool) -> list[Claim]:
 
 _DOCUMENT = Document(
     "world",
-    "Beside the world",
+    "Compared with other cores",
     [
-        "Figures of others are theirs, as their sources print them; none was measured here. What a source "
-        "does not say, or we did not find, is *not found in its source*. References: "
-        "docs/theory/references.md, other hardware.",
-        "**Not comparable as they stand.** blysk is a shading core: triangles become spans before it, and "
-        "its pixels leave it for a frame buffer outside. The open graphics processors bring vertices, "
-        "textures, depth and memory, which take most of their logic, and no light per pixel, Raster I "
-        "apart. Rates are peaks of a clock for some, frames with all of memory for others. Gates of a "
-        "standard cell, LUT of four inputs and LUT of six are different units. Only blysk states an error "
-        "against exact arithmetic.",
+        "The figures of other cores are printed in their sources. We measured none of these figures. *Not "
+        "found in its source* marks a figure that a source does not state, or that we did not find. For "
+        "references see docs/theory/references.md, *Other hardware*.",
+        "**The figures are not directly comparable.** blysk is a shading core: triangles become spans before "
+        "the core, and pixels go to a frame buffer outside. The open graphics processors also have vertices, "
+        "textures, depth and memory, which take most of their logic. Only Raster I among them has light per "
+        "pixel. Some rates are peaks at a clock rate, other rates are frames with all memory accesses. Gates "
+        "of a standard cell, LUT of four inputs and LUT of six inputs are different units. Only blysk states "
+        "an error against exact arithmetic.",
     ],
-    [ClaimTable("world", "This core and others", claims)],
+    [ClaimTable("world", "This core and other cores", claims)],
     appendix=False,
 )
 

@@ -127,8 +127,9 @@ synth_lattice -family ecp5 -top top -abc9""",
     distributed_ram="TRELLIS_DPR16X4",
     logic="LUT4|CCU2C|PFUMX|L6MUX21",
     untimed="ALU54B|MULT18X18D\\.REG_.*_CLK=(?!NONE).*",
-    registers="Registers next to a multiplier are inside it and not counted. The tool does not time between "
-    "those on both sides of a multiplier: with one such, no clock rate above 250 MHz is quoted.",
+    registers="Registers next to a multiplier are inside it and not counted. The tool does not time paths "
+    "between registers on both sides of a multiplier. If a design has such a path, no clock rate above "
+    "250 MHz is quoted.",
     limit=250.0,
 )
 
@@ -160,7 +161,7 @@ synth_lattice -family lifcl -top top -noiopad -run map_cells:""",
     distributed_ram="DPR16X4",
     logic="LUT4|CCU2|WIDEFN9|INV",
     untimed="MULTADDSUB.*",
-    registers="Registers next to a multiplier are inside it, where the tool times them, and not counted.",
+    registers="Registers next to a multiplier are inside it and not counted. The tool times them there.",
 )
 
 FAMILIES = {"ecp5": ECP5, "nexus": NEXUS}

@@ -276,7 +276,7 @@
     const svg = drawn("svg", {
       viewBox: `0 0 ${width} ${height}`,
       role: "group",
-      "aria-label": `${headingOf(error)} against ${headingOf(time)}; arrow keys go from design to design, Enter opens one`,
+      "aria-label": `${headingOf(error)} against ${headingOf(time)}; arrow keys move between designs, Enter opens a design`,
     });
     places = [];
     let corners = [];
@@ -367,8 +367,8 @@
       hidden = measured.length - visible.length;
     byId("count").textContent =
       `${visible.length} of ${scene.length} designs are drawn.` +
-      (none ? ` ${none} ${none === 1 ? "has" : "have"} no figure on one of these axes.` : "") +
-      (hidden ? ` ${hidden} ${hidden === 1 ? "is" : "are"} of groups not ticked.` : "");
+      (none ? ` ${none} ${none === 1 ? "has" : "have"} no figure for an axis of the drawing.` : "") +
+      (hidden ? ` ${hidden} ${hidden === 1 ? "is" : "are"} in groups that are not ticked.` : "");
     const kind = Object.keys(axes).find((key) => error.key.startsWith(`${key}_`));
     const figure = Object.keys(axes).find((key) => error.key.endsWith(`_${key}`));
     byId("meaning").replaceChildren(
@@ -540,15 +540,15 @@
     );
   }
 
-  const verdict = (identical) => (identical ? "is identical to" : "can be told from");
+  const verdict = (identical) => (identical ? "equals" : "differs from");
   const named = (values) => Object.entries(values).map(([key, value]) => [key.replaceAll("_", " "), value]);
 
   function open(point) {
     byId("panel-title").textContent = `${point.label}, exponent ${point.settings.exponent}`;
     byId("panel-verdict").textContent =
-      `${capital(groups.find(({ key }) => key === point.group).title)}. To the eye it ` +
-      `${verdict(point.verdicts.total)} the exact frame, and it ` +
-      `${verdict(point.verdicts.method)} the exactly interpolated frame of the same model.`;
+      `${capital(groups.find(({ key }) => key === point.group).title)}. To the eye the frame ` +
+      `${verdict(point.verdicts.total)} the exact frame, and ` +
+      `${verdict(point.verdicts.method)} the frame with exact interpolation and the same model.`;
     const pictures = shotOf.get(point.id).querySelectorAll("span");
     byId("panel-pictures").replaceChildren(...[...pictures].map((picture) => picture.cloneNode(true)));
     byId("panel-command").textContent = point.command;
@@ -586,7 +586,7 @@
                 value = point.errors[key];
               return make(
                 "td",
-                { class: "number", "data-key": key, title: value ?? "no such figure" },
+                { class: "number", "data-key": key, title: value ?? "no figure" },
                 shown(value),
               );
             }),
@@ -666,7 +666,7 @@
       table.parentNode.parentNode.insertBefore(make("div", { class: "tools" }), table.parentNode);
     tools.append(
       make("label", {}, all, " all columns"),
-      "Mesh, exponent and groups are those of the drawing.",
+      "The table shows the mesh, exponent and groups of the drawing.",
     );
     all.addEventListener("change", showColumns);
     for (const row of table.tBodies[0].rows) {

