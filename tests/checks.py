@@ -11,7 +11,7 @@ from amaranth.sim import Simulator
 
 from blysk.bench.quality.mutation import Wrapped, flags_of
 from blysk.bench.units.record import Case
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.simulate import simulate
 

@@ -16,7 +16,7 @@ from amaranth.back import rtlil
 
 from blysk.bench.units.record import first
 from blysk.bench.units.registry import RECORDS
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.sim.engines.simulate import simulate
 
 from .checks import assert_equals_model, assert_keeps_rate, known, resets

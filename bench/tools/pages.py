@@ -31,7 +31,7 @@ from blysk.bench.tools.timing import draw_timing, waves_of
 from blysk.bench.units.names import ROOMS
 from blysk.bench.units.record import Record, Sample
 from blysk.bench.units.registry import RECORDS
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.sim.output import write_text
 
 __all__ = [

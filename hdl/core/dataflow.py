@@ -13,8 +13,8 @@ from blysk.golden.number.fixed import Format
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.formula import SYMBOLS, Formula, component, formula_of
 from blysk.hdl.core.memory import delayed, turn_of
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.schedule import Schedule, place
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.word import Word, traced
 
 __all__ = [

@@ -13,9 +13,9 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.reciprocal import reciprocal_words
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.views import choose
 from blysk.hdl.core.word import Word
 from blysk.hdl.cosines.arccos import ArccosUnit

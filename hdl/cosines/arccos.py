@@ -8,7 +8,7 @@ from amaranth.lib import data
 
 from blysk.golden.cosines.arccos import Arccos
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 
 __all__ = ["ArccosUnit"]
 

@@ -8,8 +8,8 @@ from blysk.golden.number.fixed import SQ, Format
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.word import Word
 
 __all__ = [

@@ -8,7 +8,7 @@ from blysk.golden.number.fixed import UQ
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow, checked_interval
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.word import Word
 
 __all__ = ["HalfChordUnit", "half_chord_words", "normalised_words"]

@@ -10,7 +10,8 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.cosines.highlight_cosine import HighlightCosine
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit, count_down, skid_buffer
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
+from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.core.views import choose
 
 __all__ = ["HighlightCosineUnit", "highlight_shape"]

@@ -9,7 +9,7 @@ from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.bits import leading_zeros, select
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.word import Word
 
 _FRACTION, _NUMERATOR = UQ(0, 12), UQ(0, 17)

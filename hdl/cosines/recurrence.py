@@ -9,7 +9,8 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
+from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.core.views import choose, copy
 
 __all__ = ["RecurrenceUnit"]

@@ -8,8 +8,8 @@ from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.word import Word
 from blysk.hdl.cosines.chord import chord, dot
 

@@ -8,7 +8,7 @@ from amaranth.lib import data
 from blysk.golden.geometry.edge_setup import EDGES, FRACTION_BITS, X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.geometry.edge_walk import walk_shape
 from blysk.hdl.geometry.triangles import first_centre, tag_shape
 

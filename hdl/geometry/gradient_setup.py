@@ -9,7 +9,7 @@ from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.views import choose
 from blysk.hdl.geometry.plane_setup import scales_shape
 from blysk.hdl.geometry.wide_product import three_products, wide_product

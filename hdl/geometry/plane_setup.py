@@ -8,7 +8,7 @@ from blysk.golden.geometry.reciprocal import Reciprocal
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.geometry.edge_setup import plane_corners_shape
 from blysk.hdl.geometry.reciprocal import reciprocal_word, shared_table
 from blysk.hdl.geometry.wide_product import wide_product

@@ -6,7 +6,7 @@ from amaranth.lib import data
 from blysk.golden.geometry.span_adapter import LineAdapter
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.geometry.span_attributes import pieces_shape, span_words_shape
 
 __all__ = ["LineAdapterUnit", "connect_shading_span", "line_spans_shape"]

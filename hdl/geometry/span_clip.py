@@ -4,7 +4,7 @@ from amaranth.hdl import Mux, Signal, unsigned
 from amaranth.lib import data
 
 from blysk.golden.geometry.triangles import PIXEL_BITS
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.geometry.edge_walk import rows_shape
 from blysk.hdl.geometry.triangles import frame_shape, tag_shape
 

@@ -6,7 +6,7 @@ from amaranth.lib import data
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.geometry.span_halver import halved_spans_shape
 
 __all__ = ["VectorAdapterUnit", "exponent_of", "rounded", "shift_of", "used_bits", "vector_spans_shape"]

@@ -11,8 +11,8 @@ from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.word import Word
 from blysk.hdl.geometry.booth import booth_term
 from blysk.hdl.normals.dot_product import DotProductUnit

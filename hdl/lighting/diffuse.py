@@ -3,7 +3,7 @@
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 
 __all__ = ["DiffuseUnit"]
 

@@ -12,7 +12,8 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
+from blysk.hdl.core.stream import skid_buffer
 
 __all__ = ["CompactIntensityUnit", "IntensityUnit", "color_shape", "pixel_color_shape"]
 

@@ -16,7 +16,8 @@ from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.lighting.specular import Specular
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.memory import pass_beside
-from blysk.hdl.core.stream import PipelinedUnit, connect, connect_fifo
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
+from blysk.hdl.core.stream import connect, connect_fifo
 from blysk.hdl.core.views import copy
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.factor import FactorUnit

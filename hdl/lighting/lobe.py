@@ -13,7 +13,7 @@ from blysk.hdl.core.bits import leading_zeros
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.memory import registered_read
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.word import Word
 from blysk.hdl.lighting.specular import highlight_shape, one_minus
 

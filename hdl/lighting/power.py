@@ -10,7 +10,7 @@ from amaranth.lib import data
 from blysk.golden.lighting.power import Power
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.lighting.specular import highlight_shape, one_minus
 
 __all__ = ["PowerUnit"]

@@ -14,7 +14,7 @@ from blysk.golden.number.fixed import UQ, Format
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.word import Word
 
 __all__ = ["SlopeUnit", "SpecularUnit", "highlight_shape", "one_minus", "slope_shape"]

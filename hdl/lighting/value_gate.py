@@ -8,7 +8,7 @@ from amaranth.lib.wiring import Member
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.lighting.value_gate import ValueGate
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 
 __all__ = ["ValueGateUnit"]
 

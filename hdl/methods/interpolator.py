@@ -13,8 +13,9 @@ from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
-from blysk.hdl.core.stream import PipelinedUnit, connect
+from blysk.hdl.core.stream import connect
 from blysk.hdl.core.views import copy
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
 from blysk.hdl.lighting.value_gate import ValueGateUnit

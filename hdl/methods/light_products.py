@@ -9,8 +9,8 @@ from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.hdl.core.dataflow import Dataflow, dot
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import light_vectors_shape, normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.cosines.chord import chord
 
 __all__ = ["LightProductsUnit", "operands_shape"]

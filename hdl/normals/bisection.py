@@ -7,8 +7,8 @@ from blysk.golden.normals.bisection import Bisection
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.views import copy_fields
 
 __all__ = ["BisectionUnit", "coefficient"]

@@ -13,9 +13,9 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import MULTIPLIER_LATENCY, Dataflow, checked_interval, registered_product
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words, square_words
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.word import Word
 from blysk.hdl.normals.gpq import curve_shapes
 

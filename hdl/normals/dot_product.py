@@ -6,7 +6,7 @@ from amaranth.lib import data
 
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 
 __all__ = ["DotProductUnit"]
 

@@ -9,8 +9,8 @@ from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MiddleNormal
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 
 __all__ = ["GPQUnit", "curve_shapes"]
 

@@ -9,8 +9,8 @@ from blysk.golden.number.reciprocal import reciprocal_table
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.reciprocal import checked_length_bits, reciprocal_words
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.views import copy
 from blysk.hdl.normals.renormaliser import vector_shape
 

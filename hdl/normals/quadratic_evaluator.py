@@ -11,9 +11,10 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.reciprocal import reciprocal_words
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit, connect
+from blysk.hdl.core.stream import connect
 from blysk.hdl.core.views import choose, copy, copy_fields
 from blysk.hdl.normals.gpq import curve_shapes
 

@@ -9,8 +9,8 @@ from amaranth.lib.memory import Memory
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
 
 __all__ = ["RenormaliserUnit", "vector_shape"]

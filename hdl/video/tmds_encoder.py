@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Const, Mux, Signal, signed, unsigned
 from amaranth.lib import data
 
 from blysk.golden.video.tmds_encoder import BITS, CONTROL_WORDS, TmdsEncoder
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 
 __all__ = ["SYMBOL", "TmdsEncoderUnit"]
 

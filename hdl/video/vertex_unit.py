@@ -9,8 +9,8 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET, VertexTransform
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import PipelinedUnit
 from blysk.hdl.core.views import copy
 from blysk.hdl.core.word import Word
 from blysk.hdl.geometry.reciprocal import reciprocal_word, shared_table

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 
 from amaranth.hdl import Signal, Value
 
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 
 __all__ = ["short", "short_wave"]
 

@@ -33,7 +33,8 @@ from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.methods.recurrence_interpolator import RecurrenceInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
-from blysk.hdl.core.stream import PipelinedUnit, skid_buffer
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
+from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.methods.angular_interpolator import AngularInterpolatorUnit
 from blysk.hdl.methods.bisection_interpolator import BisectionInterpolatorUnit
 from blysk.hdl.methods.chord_spans import ChordSpansUnit

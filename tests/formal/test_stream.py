@@ -8,8 +8,10 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 import blysk.hdl.core.memory
+import blysk.hdl.core.pipelined_unit
 import blysk.hdl.core.stream
-from blysk.hdl.core.stream import PipelinedUnit, connect_slice
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
+from blysk.hdl.core.stream import connect_slice
 
 from .prover import Harness
 from .rules import answers, follows, stays, taken
@@ -242,14 +244,15 @@ SKID_BUFFER_BUGS = {
 @pytest.mark.parametrize("make", [lambda: of_delay(2, 1), lambda: of_registers(2)])
 def test_bugs_of_a_skid_buffer_are_found(refute, inject, make, bug):
     """Injected in `skid_buffer`, each refutes the claims of a stream."""
-    inject(blysk.hdl.core.stream, "skid_buffer", *SKID_BUFFER_BUGS[bug])
+    for user in (blysk.hdl.core.stream, blysk.hdl.core.pipelined_unit):
+        inject(user, "skid_buffer", *SKID_BUFFER_BUGS[bug])
     refute(make())
 
 
 @pytest.mark.parametrize("bug", ["moves while it holds", "forgets that it holds", "holds what was taken"])
 def test_bugs_without_a_spare_register_are_found(refute, inject, bug):
     """The same where the result stands."""
-    inject(blysk.hdl.core.stream, "skid_buffer", *SKID_BUFFER_BUGS[bug])
+    inject(blysk.hdl.core.pipelined_unit, "skid_buffer", *SKID_BUFFER_BUGS[bug])
     refute(of_delay(3, 2, True))
 
 

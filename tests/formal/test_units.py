@@ -6,11 +6,11 @@ from functools import partial
 import pytest
 from amaranth.hdl import Cat, Mux, Signal
 
-import blysk.hdl.core.stream
+import blysk.hdl.core.pipelined_unit
 from blysk.bench.units.registry import RECORDS
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
-from blysk.hdl.core.stream import PipelinedUnit
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
 from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
 from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
@@ -159,7 +159,7 @@ def test_bugs_of_pipelined_units_are_found(refute, inject, name, bug):
 
 def test_bug_of_a_skid_buffer_is_found(refute, inject):
     """A payload that is dropped while it waits, injected in `skid_buffer`: of a pipelined unit."""
-    inject(blysk.hdl.core.stream, "skid_buffer", "Mux(held, spare, Value.cast(payload))", "payload")
+    inject(blysk.hdl.core.pipelined_unit, "skid_buffer", "Mux(held, spare, Value.cast(payload))", "payload")
     harness = Harness(unit := DotProductUnit())
     stays(harness, unit.o)
     refute(harness, 10)

@@ -12,8 +12,9 @@ from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
 from blysk.hdl.core.fixed import SQ, FixedShape
+from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.single_register import hold_output
-from blysk.hdl.core.stream import PipelinedUnit, connect, connect_slice, skid_buffer, stop_output
+from blysk.hdl.core.stream import connect, connect_slice, skid_buffer, stop_output
 from blysk.sim.engines.simulate import simulate
 
 
