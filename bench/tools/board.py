@@ -181,7 +181,7 @@ def simulated(
         k + 1 for k, pair in enumerate(zip(shown.frames, expected, strict=True)) if (pair[0] != pair[1]).any()
     ]
     if differing:
-        raise SimulationError(f"frame {differing[0]} is not the bit-accurate model's")
+        raise SimulationError(f"frame {differing[0]} differs from the bit-accurate model's")
     return {
         "frames": count,
         "clock": float(plan.rates["sync"]) / 1e6,
@@ -229,10 +229,10 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
     """
     count = len(shown.frames)
     equal = sum((found == wanted).all() for found, wanted in zip(shown.frames, expected, strict=True))
-    yield f"{'lanes':<12}{count} frames decoded; words, sync, balance right; {equal} equal to the model's"
+    yield f"{'lanes':<12}{count} frames decoded; words, sync, balance right; {equal} equal the model's"
     busy, most = _busy(gpu, shown), _frame_cycles(gpu, plan)
     yield (
-        f"{'cycles':<12}{busy:,.0f} a frame of {most:,.0f} at 60 Hz; drawing alone "
+        f"{'cycles':<12}{busy:,.0f} a frame of {most:,.0f} at 60 Hz; without the display "
         f"{float(plan.rates['sync']) / busy:.0f} frames a second"
     )
     yield f"{'late bands':<12}{shown.status['late_bands']}"
@@ -244,8 +244,8 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
             f"{'error':<12}{kind:<7} largest {error.max_lsb:.2f} LSB, {error.p999_lsb:.2f} at 99.9 %, "
             f"{error.psnr_db:.1f} dB, against {reference_of(kind, figures.target)}"
         )
-    at_border = f"{figures.border_pixels:,} of them with {figures.border} at most {BORDER:g}"
-    yield f"{'':<12}of the first frame, {figures.visible_pixels:,} pixels, {at_border}"
+    at_border = f"{figures.border_pixels:,} pixels have {figures.border} at most {BORDER:g}"
+    yield f"{'':<12}errors are of the first frame, {figures.visible_pixels:,} pixels; {at_border}"
 
 
 def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
@@ -256,7 +256,7 @@ def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
     factor = _busy(gpu, shown) / _frame_cycles(gpu, plan)
     slot = f"a band takes longer than its slot {late} times" if factor <= 1 else ""
     by = f"a frame takes {factor:.2f} times the cycles that 60 Hz leaves" if factor > 1 else slot
-    return f"too heavy for 60 Hz: {by}; in {late} bands of {len(shown.frames)} frames the background is shown"
+    return f"too heavy for 60 Hz: {by}; {late} bands of {len(shown.frames)} frames show the background"
 
 
 def built_lines(built: Built) -> Iterator[str]:
@@ -268,7 +268,7 @@ def built_lines(built: Built) -> Iterator[str]:
         rates = f"{clock.reached:7.1f} MHz of {clock.needed:.1f} needed"
         yield f"{clock.name:<16}{rates}, {verdict}; {clock.path}"
     if built.closed:
-        yield f"{built.closed} multipliers have registers on both sides, between which nothing is timed"
+        yield f"{built.closed} multipliers have registers on both sides. Paths between these are not timed."
 
 
 def missed(built: Built) -> str:

@@ -90,9 +90,9 @@ BOARDS = {
             lines=8,
             loader="ulx3s",
             compact=True,
-            known="none with quotient so far. On commit 142fa70 the mapped design took 19,888 of 24,288 "
-            "look-up tables; one placement had 1,423 wires used twice when 15 minutes of routing ended. An "
-            "ulx3s-85f has room, and --simulate routes nothing",
+            known="none made with quotient so far. On commit 142fa70 the mapped design took 19,888 of "
+            "24,288 look-up tables. A placement had 1,423 wires used twice after 15 minutes of routing. An "
+            "ulx3s-85f has room, and --simulate needs no routing",
         ),
         Board(
             *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
@@ -105,7 +105,7 @@ BOARDS = {
             lines=16,
             loader="ulx3s",
             compact=False,
-            known="not tried with quotient so far. On commit c815b08 one was made with an earlier method, at "
+            known="not tried with quotient so far. On commit c815b08 an earlier method gave a bitstream at "
             "the first placement, on a third of the device",
         ),
         Board(
@@ -119,8 +119,8 @@ BOARDS = {
             lines=8,
             loader="icepi-zero",
             compact=True,
-            known="not tried with quotient so far. On commit c815b08 one was made with an earlier method. "
-            "The same device on an ulx3s-25f gave none on commit 142fa70",
+            known="not tried with quotient so far. On commit c815b08 an earlier method gave a bitstream. On "
+            "commit 142fa70 the same device on an ulx3s-25f gave none",
         ),
     )
 }

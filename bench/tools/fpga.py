@@ -103,8 +103,8 @@ def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
         if layout.closed:
             closed = f"{layout.closed} of {layout.parts.multipliers} multipliers"
             yield (
-                f"{layout.name}: {closed} have registers inside on both sides, between which the tool does "
-                f"not time; no clock rate above {family.limit:g} MHz is quoted"
+                f"{layout.name}: {closed} have registers inside on both sides. The tool does not time the "
+                f"paths between these registers. No clock rate above {family.limit:g} MHz is quoted."
             )
 
 
@@ -113,8 +113,8 @@ def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
     for layout in layouts:
         if seeds := [str(place.seed) for place in layout.places if place.rerouted]:
             yield (
-                f"{layout.name}: from seed {', '.join(seeds)} the target was out of reach, "
-                "and slow paths were not routed again"
+                f"{layout.name}: from seed {', '.join(seeds)} the target was out of reach. Slow paths were "
+                "not routed again."
             )
 
 

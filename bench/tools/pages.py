@@ -53,8 +53,8 @@ _TITLES = {
     "methods": "Whole methods",
     "lighting": "Light",
     "video": "From a mesh in memory to a monitor",
-    "bus": "In somebody else's design",
-    "": "All of it",
+    "bus": "Buses of other designs",
+    "": "Whole cores",
 }
 """Titles of the folders of units."""
 
@@ -202,20 +202,26 @@ def _suffixed(groups: Iterable[list]) -> list[tuple[str, list]]:
 
 
 _STRUCTURE_NOTE = (
-    "Generated from the netlist. A box with the clock's mark is a register, with the operations in front of "
-    "it; orange: a multiplier, yellow: an adder or a product by a constant, green: a memory, blue: a unit of "
-    "its own, white: a port. A dashed arrow chooses, a red one leads back. A wide drawing is in bands: an "
-    "arrow that ends at a numbered tag goes on at the tags of that number. Left out: the control by valid "
-    "and ready, enables, saturation, constants; in a large unit comparisons and choices too, then plain "
-    "registers. A formula in bold is what a register holds, several are what a shared one holds in turns; "
-    "its name is below. Variants that differ in words and constants alone share a drawing, of the first."
+    "The drawing is generated from the netlist. A box with the clock's mark is a register, with the "
+    "operations in front of the register.\n\n"
+    "- Orange: a multiplier. Yellow: an adder, or a product by a constant. Green: a memory. Blue: a unit "
+    "inside. White: a port.\n"
+    "- A dashed arrow carries a choice. A red arrow leads back.\n"
+    "- A wide drawing is in bands. An arrow that ends at a numbered tag continues at the tags of the same "
+    "number.\n"
+    "- A formula in bold is the value of a register. A shared register has several formulas, and holds "
+    "their values in turn. The name of the register is below the formulas.\n"
+    "- The drawing leaves out control by valid and ready, enables, saturation and constants. For a large "
+    "unit it also leaves out comparisons and choices, then plain registers.\n\n"
+    "Variants that differ only in words and constants share the drawing of the first variant."
 )
 
 _TIMING_NOTE = (
-    "From a simulation, cycle by cycle as read just before the rising edge. A, B, C are the input beats, A0, "
-    "A1 the results of A where it has several, 1, 2, 3 those of all where their numbers differ; the source "
-    "pauses before the last beat, the sink stalls at a first result. Dots stand for cycles without a change. "
-    "A drawing for each interval; the latencies of all variants are in the table above."
+    "The drawing shows a simulation, cycle by cycle, with the levels just before the rising edge. A, B and C "
+    "are the input beats. If a beat has several results, the results of A are A0, A1 and so on. If the beats "
+    "have different numbers of results, all results are 1, 2, 3 and so on. The source pauses before the last "
+    "beat. The sink stalls at a first result. Dots stand for cycles without a change. Each interval has a "
+    "drawing. The table above has the latencies of all variants."
 )
 
 
@@ -239,12 +245,12 @@ def _opening(unit: str, folder: Path) -> list[str]:
 def _variants(unit: str, rows: Sequence[Row]) -> list[str]:
     lines = ["## Variants", "", *variants_table(rows), ""]
     lines += [
-        f"Made by `blysk pages` of {SAMPLES:,} random operands; the columns are those of `blysk blocks`.",
+        f"Made by `blysk pages` with {SAMPLES:,} random operands. The columns are those of `blysk blocks`.",
         "",
     ]
     others = [name for name in RECORDS[unit].variants if name not in [row.entry.name for row in rows]]
     if others:
-        lines += [f"Tested as well: {inline('; '.join(others))}.", ""]
+        lines += [f"Also tested: {inline('; '.join(others))}.", ""]
     return lines
 
 
@@ -262,7 +268,7 @@ def _drawings(unit: str, rows: Sequence[Row]) -> list[str]:
     for suffix, (row, *others) in _timings(rows):
         named = f"{row.entry.name or 'default'}: " if len(rows) > 1 else ""
         times = f"latency {row.latency}, interval {row.interval}"
-        more = f"; {len(others)} more of this interval" if others else ""
+        more = f"; {len(others)} more with this interval" if others else ""
         lines += [f"{inline(named)}{times}{more}.", ""]
         lines += [f"![Timing of the {title}, {named}{times}]({unit}-timing{suffix}.svg)", ""]
     return lines
@@ -273,14 +279,14 @@ def _errors(unit: str, rows: Sequence[Row]) -> list[str]:
     if rows[0].entry.variant.measure is None:
         return []
     if not any(row.errors[2] for row in rows):
-        return ["## Errors", "", "None were found: the unit is exact.", ""]
+        return ["## Errors", "", "No errors were found. The unit is exact.", ""]
     record, scale = rows[0].entry.record, rows[0].entry.variant.scale
-    words = f"In {scale}." if scale else "1 is a full term, or the length of a unit vector."
+    words = f"Errors are in {scale}." if scale else "1 is a full term, or the length of a unit vector."
     text = f"Largest errors found, against: {inline(record.axis)}. {words}"
     if scale == "rate":
         text = (
-            "Shares of the decisions that are yes by mistake (the first error column) and no by mistake (the "
-            f"second), against: {inline(record.axis)}."
+            "Shares of decisions that are yes by mistake (first error column), and no by mistake (second "
+            f"error column), against: {inline(record.axis)}."
         )
     return ["## Errors", "", text, "", f"![Errors of the {_title(unit).lower()}]({unit}-errors.svg)", ""]
 
@@ -303,10 +309,10 @@ def _tests(record: Record) -> list[str]:
         for name, given in record.stimuli.items()
     ]
     lines = ["## Stimuli and corner cases", ""]
-    lines += ["The RTL is held against the bit-accurate model under each, beat by beat.", ""]
-    lines += ["In a clone, after `make test`, this command runs them:", ""]
+    lines += ["With each stimulus, a test compares the RTL with the bit-accurate model, beat by beat.", ""]
+    lines += ["Run the tests in a clone, after `make test`:", ""]
     lines += [f"    {test_command(record.name)}", ""]
-    lines += [*markdown_table(("stimulus", "what it covers", "beats or pixels", "stalls", "run"), rows), ""]
+    lines += [*markdown_table(("stimulus", "cases covered", "beats or pixels", "stalls", "run"), rows), ""]
     if record.waivers:
         lines += ["Signals at which a fault may stay unseen:", ""]
         lines += [
@@ -367,9 +373,9 @@ def index_page(folder: Path) -> str:
     lines = [
         "# The units",
         "",
-        f"One page a unit, {MADE} from the code itself: text from the docstrings, figures as "
-        "`blysk blocks` measures them, drawings from netlists and simulations. The units are in the order in "
-        "which a span passes them; of those that do the same a pipeline has one.",
+        f"Each unit has a page, {MADE} from the code. Text comes from the docstrings, figures are those of "
+        "`blysk blocks`, and drawings come from netlists and simulations. The units are in the order in "
+        "which a span passes through them. Of units with the same function a pipeline has a single unit.",
     ]
     if "pipeline" in RECORDS:
         lines += ["", "[![Structure of the pipeline](pipeline-structure.svg)](pipeline.md)"]
@@ -386,7 +392,7 @@ def index_page(folder: Path) -> str:
             rows.append(f"| [{_title(unit)}]({unit}.md) | {text} | {source} | {picture} |")
         if rows:
             lines += ["", f"## {_TITLES[room]}", ""]
-            lines += ["| unit | what it does | source | structure |", "| --- | --- | --- | --- |", *rows]
+            lines += ["| unit | function | source | structure |", "| --- | --- | --- | --- |", *rows]
     return "\n".join([*lines, ""])
 
 
@@ -419,7 +425,7 @@ def write_pages(
         If the folder or a file cannot be written, or if a file that is no page would be replaced.
     """
     check_folder(folder, units)
-    # First: it tells that the folder is ours, whatever comes between.
+    # The first page marks the folder as ours, also if an interrupt follows.
     write_text(folder / "README.md", index_page(folder))
     for unit in units:
         if progress:

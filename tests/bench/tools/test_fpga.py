@@ -84,7 +84,7 @@ def test_designs_with_an_untimed_interior_are_named():
     layouts = [Layout(f"closed {place.closed}", Parts(1, 2, 4, 0, 0), (place,)) for place in places]
     (line,) = untimed(layouts, ECP5)
     assert line.startswith("closed 3: 3 of 4 multipliers have registers inside on both sides")
-    assert line.endswith("no clock rate above 250 MHz is quoted")
+    assert line.endswith("No clock rate above 250 MHz is quoted.")
     assert [layout.as_dict()["closed_multipliers"] for layout in layouts] == [0, 3]
 
 
