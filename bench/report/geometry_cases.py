@@ -8,9 +8,10 @@ import numpy as np
 from blysk.golden.frames.triangle_frame import TriangleFrame, triangle_frame
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.fragments import fragment_barycentrics, fragment_normals
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.raster import fragment_barycentrics, fragment_normals, rasterise
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer

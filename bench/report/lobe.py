@@ -18,9 +18,9 @@ from blysk.golden.lighting.power import Power
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.presets import preset
+from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lobes import BECKMANN, GGX
-from blysk.golden.reference.raster import fragment_normals
 from blysk.golden.reference.reflection import BLINN, COSQUAD, REFLECTION_MODELS, ReflectionModel
 from blysk.golden.reference.renderer import render
 from blysk.hdl.emit.cost import cost_of

@@ -25,9 +25,10 @@ from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import METHODS, preset
+from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector, intensity_of_cosines, saturate
-from blysk.golden.reference.raster import Raster, fragment_normals
+from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.renderer import shade_operands, shade_spans
 
 __all__ = [

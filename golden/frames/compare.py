@@ -13,10 +13,11 @@ from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.lighting import distant_cosine, halfway_vector
 from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
-from blysk.golden.reference.raster import Raster, fragment_normals, rasterise
+from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.renderer import (
     fragment_positions,

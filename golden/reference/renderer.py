@@ -8,6 +8,7 @@ import numpy as np
 
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.faces import face_normals
+from blysk.golden.reference.fragments import fragment_barycentrics, fragment_normals
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import (
     Material,
@@ -16,7 +17,7 @@ from blysk.golden.reference.lighting import (
     intensity_of_cosines,
     saturate,
 )
-from blysk.golden.reference.raster import Raster, fragment_barycentrics, fragment_normals, rasterise
+from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.scene import Scene
 

@@ -11,9 +11,10 @@ from blysk.golden.frames.prepare import sort_by_material
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light
-from blysk.golden.reference.raster import fragment_normals, rasterise
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import fragment_positions, shade_spans
 from blysk.golden.reference.scene import Scene

@@ -11,9 +11,10 @@ from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles, triangle_frame
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.raster import fragment_normals, rasterise
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer

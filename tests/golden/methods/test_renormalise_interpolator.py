@@ -14,9 +14,9 @@ from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.raster import fragment_normals
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 

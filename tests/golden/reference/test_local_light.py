@@ -7,9 +7,10 @@ import pytest
 
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.faces import face_normals
+from blysk.golden.reference.fragments import fragment_barycentrics
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import Light, intensity
-from blysk.golden.reference.raster import fragment_barycentrics, rasterise
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import BLINN, COSQUAD
 from blysk.golden.reference.renderer import SHADINGS, Thresholds, fragment_positions, render, shade_spans
 

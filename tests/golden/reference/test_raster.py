@@ -6,9 +6,10 @@ import pytest
 from scipy.spatial import Delaunay
 
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.fragments import fragment_barycentrics, fragment_normals
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.raster import fragment_barycentrics, fragment_normals, rasterise
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.scene import Scene
 
 GREY = (0.5, 0.5, 0.5)

@@ -8,9 +8,10 @@ import pytest
 
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.curves import CURVES, interpolate
+from blysk.golden.reference.fragments import fragment_barycentrics, fragment_normals
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.raster import fragment_barycentrics, fragment_normals, rasterise
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import BLINN, COSQUAD, REFLECTION_MODELS
 from blysk.golden.reference.renderer import SHADINGS, Thresholds, render, shade_operands, shade_spans
 from blysk.golden.reference.scene import Scene

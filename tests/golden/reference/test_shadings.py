@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.fragments import fragment_barycentrics
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
-from blysk.golden.reference.raster import fragment_barycentrics, rasterise
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import BLINN, PHONG
 from blysk.golden.reference.renderer import Thresholds, gouraud_triangles, render
 from blysk.golden.reference.scene import Scene
