@@ -315,7 +315,7 @@ def test_back_faces():
         ((both, scene.material), {0}),
         ((scene.material, both), {0, 1}),
     ):
-        mesh = replace(scene.mesh, material=np.array([0, 1]) if isinstance(material, tuple) else None)
+        mesh = replace(scene.mesh, material=np.array([0, 1] if isinstance(material, tuple) else [0, 0]))
         given = replace(scene, mesh=mesh, back_faces="cull", material=material)
         raster = rasterise(given)
         assert (raster.culled, set(raster.triangle.tolist())) == (2 - len(triangles), triangles)
