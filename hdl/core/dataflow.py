@@ -10,8 +10,8 @@ from amaranth.hdl import Module, Mux, ShapeLike, Signal, Value, signed
 from amaranth.lib.memory import Memory
 
 from blysk.golden.number.fixed import Format
-from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.formula import SYMBOLS, Formula, component, formula_of
+from blysk.hdl.core.fixed import FixedValue
+from blysk.hdl.core.formula import SYMBOLS, formula_of
 from blysk.hdl.core.memory import delayed, turn_of
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.schedule import Schedule, place
@@ -23,9 +23,7 @@ __all__ = [
     "Dataflow",
     "FunctionalUnit",
     "checked_interval",
-    "dot",
     "registered_product",
-    "shared_sums",
 ]
 
 MULTIPLIER_BITS = 18
@@ -357,60 +355,6 @@ def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> A
     """
     a, b = register(a, "a"), register(b, "b")
     return register(a * b, "product")
-
-
-def shared_sums(graph: Dataflow, product: Format) -> FunctionalUnit:
-    """Adders of the three products of a dot product, in the format ``product``: two cycles; see `dot`."""
-    shapes = FixedShape(product + product), FixedShape(product)
-    return graph.share("sum", shapes, 1, lambda register, x, y: register(x + y, "total"))
-
-
-def dot(
-    graph: Dataflow,
-    name: str,
-    a: Word,
-    b: Word | Callable[[Any], Any],
-    sums: FunctionalUnit | None = None,
-    symbol: str | None = None,
-) -> Word:
-    """Exact dot product of two vectors: three multiplications of the graph, and two sums.
-
-    Parameters
-    ----------
-    graph : Dataflow
-        Graph that gets the words.
-    name : str
-        Of the result.
-    a : Word
-        A vector.
-    b : Word or callable
-        The other vector, or a function that makes it from the value of ``a``.
-    sums : FunctionalUnit or None
-        From `shared_sums`. ``None``: the sums have registers of their own.
-    symbol : str or None
-        Symbol of the other vector in formulas. ``None``: the symbol of its word, or of ``a``.
-    """
-    left = a.symbol
-    right = Formula(symbol) if symbol else b.symbol if isinstance(b, Word) else left
-
-    def factors(c):
-        if isinstance(b, Word):
-            return a, b, lambda v: v[c], lambda v: v[c]
-        return a, a, lambda v: v[c], lambda v: b(v)[c]
-
-    def product(c, since=0):
-        formula = (component(left, c) * component(right, c)).text
-        return graph.multiply(f"{name}_{c}", *factors(c), since=since, formula=formula)
-
-    total = f"{left.within(2)}·{right.within(2)}" if left is not right else f"|{left.text}|²"
-    products = [product(c) for c in range(2)]
-    if sums is not None:
-        products.append(product(2))
-        return graph.use(sums, f"{name}_total", products, lambda x, y, z: (x + y, z), formula=total)
-    partial = graph.register(f"{name}_partial", lambda x, y: x + y, *products)
-    # An operand that waits takes fewer registers than a product.
-    last = product(2, since=partial)
-    return graph.register(f"{name}_total", lambda x, y: x + y, partial, last, formula=total)
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:

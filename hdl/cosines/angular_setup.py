@@ -11,7 +11,8 @@ from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.number.fixed import SQ, UQ
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot, shared_sums
+from blysk.hdl.core.dataflow import Dataflow, checked_interval
+from blysk.hdl.core.dot import dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.reciprocal import reciprocal_words

@@ -8,7 +8,8 @@ from amaranth.lib import data
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT
-from blysk.hdl.core.dataflow import Dataflow, dot
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.dot import dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import normal_shape

@@ -7,7 +7,8 @@ from amaranth.lib.memory import Memory
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.number.fixed import UQ
-from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, checked_interval, dot, shared_sums
+from blysk.hdl.core.dataflow import Dataflow, FunctionalUnit, checked_interval
+from blysk.hdl.core.dot import dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.word import Word

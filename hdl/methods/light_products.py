@@ -7,7 +7,8 @@ from blysk.golden.lighting.factor import Factor
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
-from blysk.hdl.core.dataflow import Dataflow, dot
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.dot import dot
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import light_vectors_shape, normal_shape

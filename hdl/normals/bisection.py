@@ -5,7 +5,8 @@ from amaranth.lib import data
 
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.number.unit_vector import ONE_SQUARED
-from blysk.hdl.core.dataflow import Dataflow, checked_interval, dot
+from blysk.hdl.core.dataflow import Dataflow, checked_interval
+from blysk.hdl.core.dot import dot
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.shapes import normal_shape

@@ -10,7 +10,8 @@ from amaranth.lib import data
 
 from blysk.bench.units.record import STALLS, Case, UnitRun
 from blysk.golden.number.fixed import SQ, UQ, Fixed
-from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow, checked_interval, dot, shared_sums
+from blysk.hdl.core.dataflow import MULTIPLIER_BITS, Dataflow, checked_interval
+from blysk.hdl.core.dot import dot, shared_sums
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.emit.cost import cost_of

@@ -4,7 +4,8 @@ import pytest
 from amaranth.hdl import Cat, Value
 
 from blysk.golden.number.fixed import SQ, UQ
-from blysk.hdl.core.dataflow import Dataflow, dot
+from blysk.hdl.core.dataflow import Dataflow
+from blysk.hdl.core.dot import dot
 from blysk.hdl.core.fixed import FixedValue
 from blysk.hdl.core.formula import Formula, component, formula_of
 
