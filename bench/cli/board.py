@@ -33,7 +33,7 @@ _MOST_FRAMES = 60
 @click.option(
     "--simulate",
     type=Whole(1, _MOST_FRAMES),
-    help="Simulate this many frames, down to the bits of the lanes.",
+    help="Simulate this many frames, down to the bits of the monitor connector's lanes.",
 )
 @click.option(
     "--colours",
@@ -45,7 +45,7 @@ _MOST_FRAMES = 60
     type=Number(1, 126, "MHz"),
     default=52.5,
     show_default=True,
-    help="Drawing clock in MHz: the nearest possible rate that is not higher.",
+    help="Wanted drawing clock in MHz. The highest possible rate up to this value is used.",
 )
 @click.option(
     "--toggles",
@@ -62,12 +62,13 @@ _MOST_FRAMES = 60
 def command(context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **_):
     """Show a turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
-    Without --simulate the command makes a bitstream. It first prints what is known of this board's bitstream,
-    then used and available parts, and reached and needed clock rates. The exit status is 1 if a clock is not
-    met.
+    Without --simulate the command makes a bitstream. It first prints how earlier bitstreams for this board
+    came out. Then it prints used and available FPGA resources, and reached and needed clock rates. The exit
+    status is 1 if a clock is not met.
 
-    With --simulate it decodes frames from the simulated lanes, and compares them with the bit-accurate model.
-    The exit status is 1 if a frame differs, or if the frames are too heavy for 60 Hz.
+    With --simulate it decodes frames from the simulated lanes of the monitor connector. It compares the
+    frames with the bit-accurate model. The exit status is 1 if a frame differs, or if the frames are too
+    heavy for 60 Hz.
 
     The buttons of the board stop the motion, reverse it, and change the material and the light.
 
@@ -98,7 +99,7 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
     gpu, scenes, plan = work.planned(board, mesh, given, colours, clock)
     click.echo("\n".join(work.design_lines(board, mesh, gpu, plan)))
     if not simulate:
-        click.echo(f"{'known':<12}of a bitstream: {board.known}")
+        click.echo(f"{'bitstream':<12}known: {board.known}")
     figures = recorded.setdefault(f"{board.name}, {mesh}, {gpu.drawing.mesh.triangles:,} triangles", {})
     if simulate:
         figures["simulated"] = work.simulated(board, gpu, scenes, plan, simulate, Path(output))

@@ -20,12 +20,13 @@ __all__ = ["Miter", "yosys"]
 _SECONDS = 20
 """Time limit of a proof of equivalence, in seconds.
 
-A first attempt before it may take a quarter of this time. Most proofs that succeed take at most 3 seconds.
+A first attempt comes before this proof. Its limit is a quarter of this time. Most proofs that succeed take at
+most 3 seconds.
 """
 
 
 YOSYS_SECONDS = 1800
-"""Time limit of a run of Yosys, in seconds, longer than every run that ends."""
+"""Time limit of a run of Yosys, in seconds, longer than any run that we have seen finish."""
 
 
 def yosys(script: str, folder: Path) -> None:
@@ -84,13 +85,14 @@ def _coded(number: int) -> bytes:
 
 
 class Miter:
-    """Equivalence check of a unit and one of its mutants, both as AND gates and one-bit registers.
+    """Equivalence check of a unit and one of its mutants, each given as AND gates and one-bit registers.
 
-    A proof through products would take too long. Therefore unit and mutant share their registers, and the
-    proof shows that both compute the same next values. Then the registers stay equal by induction. Shared
-    registers of at most 12 bits, and registers named ``valid`` or ``ages``, control the unit. They take the
-    next values that the unit computes. The other shared registers are free inputs, or 0 if they are always 0
-    in the unit. The register that the fault reaches first, and bits that differ in a proof, are not shared.
+    A proof that goes through multipliers would take too long. Therefore unit and mutant share their
+    registers, and the proof shows that both compute the same next values. Then the registers stay equal by
+    induction. Shared registers of at most 12 bits, and registers named ``valid`` or ``ages``, control the
+    unit. They take the next values that the unit computes. The other shared registers are free inputs, or 0
+    if they are always 0 in the unit. The register that the fault reaches first, and bits that differ in a
+    proof, are not shared.
 
     Parameters
     ----------
@@ -146,13 +148,17 @@ class Miter:
             zero -= changed
 
     def is_equivalent(self, mutant: int, register: str = "") -> bool:
-        """Whether a mutant is proved equivalent to the unit. Its fault reaches ``register`` first."""
+        """Whether a mutant is proved equivalent to the unit.
+
+        ``register`` is the register that the mutant's fault reaches first.
+        """
         shared = set(range(len(self._next)))
-        # A fault that the simplification of gates removes. With fewer registers shared it would hardly do so.
+        # Here simplification of the gates removed the fault. If fewer registers were shared, it would rarely
+        # remove the fault.
         if not self._write(mutant, shared):
             return True
-        # A fault without effect whatever the registers contain, such as one that changes a register's input
-        # only while the register holds.
+        # The fault has no effect for any register contents. An example is a fault that changes a register's
+        # input only while the register keeps its value.
         if self._prove(mutant, shared, _SECONDS / 4)[0]:
             return True
         if register:
@@ -190,7 +196,11 @@ class Miter:
         return found[1] == found[2], {compared[k] for k in asserted} - {-1}
 
     def _write(self, mutant: int, shared: Set[int]) -> list[int]:
-        """Write ``mutant.aig``; the register that each of its outputs compares, -1 for one of the unit's."""
+        """Write ``mutant.aig``.
+
+        Returns, for each output of the file, the register that it compares, or -1 if it compares an output of
+        the unit.
+        """
         known, gates = {}, []
         places = itertools.count(1 + self._inputs)
         units = [[0, *range(2, 2 * self._inputs + 2, 2)] for _ in range(2)]
@@ -225,7 +235,7 @@ class Miter:
             if a != b and (latch < 0 or latch in shared):
                 outputs.append(both(both(a, b) ^ 1, both(a ^ 1, b ^ 1) ^ 1))
                 compared.append(latch)
-        # Nodes that the outputs depend on, through registers, too.
+        # Nodes on which the outputs depend, directly or through registers.
         needed, open_ = {0}, [end >> 1 for end in outputs]
         while open_:
             node = open_.pop()

@@ -30,10 +30,11 @@ class RenormaliseInterpolator(NormalInterpolator):
     Line setup, accumulator and renormaliser follow. The specular operand is half the squared chord. An error
     of the normal's length counts there only at second order.
 
-    The words of a vector of length m, the larger end being 1, turn it by up to ``(LineSetup.ERROR + sqrt(3)
-    2^-23)/m``. At `LARGEST_RATIO`, m = 1/64, this is 2.7e-5 radians, 0.17 LSB on the steepest flank of n =
-    1000. Cut spans with shorter vectors. Ends at very different W have them, and nearly opposite ends. If
-          every component of a pixel's vector is under 1/256, the span is flagged, and the pixel is wrong.
+    The longer end has length 1. Rounding to words turns a vector of length m by up to
+    ``(LineSetup.ERROR + sqrt(3) 2^-23)/m``. At `LARGEST_RATIO`, m = 1/64, this is 2.7e-5 radians, 0.17 LSB on
+    the steepest flank of n = 1000. Spans with shorter vectors must be cut. Such vectors occur if W differs
+    much between the ends, or if the ends are nearly opposite. If every component of a pixel's vector is under
+    1/256, the span is flagged, and the pixel is wrong.
 
     Parameters
     ----------
@@ -80,8 +81,8 @@ class RenormaliseInterpolator(NormalInterpolator):
         """Ends of the true line, see `Interpolator.input_lines`."""
         return [
             "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
-            f"in {self.END_FORMAT}; pixels under 1/256 of it are wrong, and their spans are "
-            "counted in status_out_of_range_spans"
+            f"in {self.END_FORMAT}; pixels whose vector has every component under 1/256 are wrong, and "
+            "their spans are counted in status_out_of_range_spans"
         ]
 
     def geometry(self, lights: int) -> Geometry:
@@ -101,7 +102,7 @@ class RenormaliseInterpolator(NormalInterpolator):
         return shading.by_lines()
 
     def bound(self, bounds: ErrorBounds) -> float | None:
-        """Bound from the tolerances of spans, which its curve keeps."""
+        """Bound from the tolerances of spans; the method's curve keeps these tolerances."""
         return bounds.by_tolerance()
 
     @property
@@ -111,7 +112,10 @@ class RenormaliseInterpolator(NormalInterpolator):
         return DifferenceAccumulator(self.END_FORMAT, format, format, self.END_FORMAT)
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """For ends of unit length: error of the line over its length, plus error of the renormaliser."""
+        """Bound for ends of unit length.
+
+        It is the error of the line divided by the line's shortest length, plus the error of the renormaliser.
+        """
         shortest = np.cos(np.radians(min(degrees, 170.0)) / 2)
         line = LineSetup.ERROR + np.sqrt(3) * self.END_FORMAT.step
         own = Renormaliser.DIRECTION_ERROR + Renormaliser.LENGTH_ERROR

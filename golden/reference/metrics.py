@@ -31,7 +31,7 @@ class ErrorFigures:
     psnr_db: float
 
 
-# Values looked at at once; bounds the memory.
+# Number of values processed together; it limits the memory.
 _CHUNK = 1 << 20
 
 
@@ -173,9 +173,9 @@ def mnse_published(image: np.ndarray, reference: np.ndarray) -> tuple[float, flo
     Returns
     -------
     value : float
-        The mean over the N values of the reference that differ from its mean; NaN when there is none.
+        The mean of the N terms whose reference value differs from the mean of the reference; NaN if N is 0.
     share : float
-        Share of such values, 0 to 1.
+        Share of these values among all values, 0 to 1.
 
     Raises
     ------

@@ -29,7 +29,7 @@ class FixedShape(ShapeCastable):
     def __init__(self, format: Format):
         if not isinstance(format, Format):
             raise TypeError(f"format must be a Format, not {format!r}")
-        # `format` is taken: `ShapeCastable.format` prints a value.
+        # The attribute cannot be called `format`: `ShapeCastable.format` prints a value.
         self.number_format = format
 
     def as_shape(self) -> Shape:
@@ -37,7 +37,7 @@ class FixedShape(ShapeCastable):
         return Shape(self.number_format.width, self.number_format.signed)
 
     def __call__(self, value) -> "FixedValue":
-        """The bits ``value`` read in this format."""
+        """The bits of ``value``, interpreted in this format."""
         return FixedValue(self.number_format, value)
 
     def const(self, init: int | float | Fraction | None) -> Const:
@@ -69,12 +69,12 @@ class FixedShape(ShapeCastable):
 
 
 def SQ(integer_bits: int, fraction_bits: int) -> FixedShape:
-    """Shape of a signed fixed-point signal; see `SQ`."""
+    """Shape of a signed fixed-point signal; see `golden.number.fixed.SQ`."""
     return FixedShape(golden_fixed.SQ(integer_bits, fraction_bits))
 
 
 def UQ(integer_bits: int, fraction_bits: int) -> FixedShape:
-    """Shape of an unsigned fixed-point signal; see `UQ`."""
+    """Shape of an unsigned fixed-point signal; see `golden.number.fixed.UQ`."""
     return FixedShape(golden_fixed.UQ(integer_bits, fraction_bits))
 
 
@@ -225,7 +225,9 @@ class FixedValue(ValueCastable):
         return FixedValue(format, (kept + self._code[dropped - 1])[: format.width])
 
     def saturate(self, format: Format) -> "FixedValue":
-        """Clamp to the range of ``format``, which has the same fraction bits, by a test of the bits above it.
+        """Clamp to the range of ``format``, by a test of the bits above those that ``format`` keeps.
+
+        Both formats must have the same fraction bits.
 
         Raises
         ------
@@ -238,7 +240,8 @@ class FixedValue(ValueCastable):
         low = self._code[: format.width]
         negative = self._code[-1] if self.format.signed else Const(0)
         if format.signed:
-            # In range: every bit from the target's sign bit up is the sign.
+            # The value is in range if all bits from the target's sign bit upwards are equal. If the value is
+            # unsigned, they must be 0.
             above = self._code[format.width - 1 :]
             fits = ~above.any() | (above.all() if self.format.signed else 0)
             end = Cat((~negative).replicate(format.width - 1), negative)
@@ -249,7 +252,9 @@ class FixedValue(ValueCastable):
         return FixedValue(format, Mux(fits, low, end))
 
     def wrap(self, format: Format) -> "FixedValue":
-        """Keep the low bits: the value modulo ``2**integer_bits`` of ``format``, of equal fraction bits.
+        """Keep the low bits: the value modulo ``2**i``, where i is the integer bits of ``format``.
+
+        Both formats must have the same fraction bits.
 
         Raises
         ------

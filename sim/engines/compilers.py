@@ -56,7 +56,8 @@ def _system_compiler(command: list[str]) -> Compiler | None:
     version = _ask([path, *command[1:], "--version"]) if path else None
     if version is None:
         return None
-    path = os.path.abspath(path)  # The build runs elsewhere.
+    # The build runs in another folder, so the path must be absolute.
+    path = os.path.abspath(path)
     flags = _GCC_FLAGS if "Free Software Foundation" in version else ()
     own = shlex.split(os.environ.get("CXXFLAGS", ""))
     return Compiler(
@@ -85,7 +86,8 @@ def _zig() -> Compiler | None:
     if version is None:
         return None
     # Zig takes 40 s to compile its own C++ library on first use; a model needs no C++ library. Zig's default
-    # target is the processor of this machine; a cache may be shared with machines that have another.
+    # target is this machine's processor. Machines with other processors may share the cache, so we build for
+    # the baseline.
     shared = (
         ("-shared", "-nostdlib") if sys.platform != "darwin" else ("-shared", "-undefined", "dynamic_lookup")
     )
@@ -107,10 +109,10 @@ def _zig() -> Compiler | None:
 
 
 def find_compilers() -> Iterator[Compiler]:
-    """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang. Only ``$CXX`` if it is
-    set.
+    """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang.
 
-    The flags in ``$CXXFLAGS`` are added after the optimisation flags, except for ziglang.
+    If ``$CXX`` is set, it is the only one tried. The flags in ``$CXXFLAGS`` follow the optimisation flags.
+    ziglang does not get them.
 
     Yields
     ------
