@@ -35,12 +35,14 @@ __all__ = [
 
 
 def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.ndarray:
-    """Whether points are on the Pareto front. No other point is better in one measure and as good in both.
+    """Whether points are on the Pareto front.
+
+    A point is on the front if no other point is better in one measure and at least as good in the other.
 
     Parameters
     ----------
     error, time : sequences of float
-        Measures of each point. Less is better. A point without one of them (``None`` or NaN) is not on the
+        Measures of each point. Less is better. A point that lacks a measure (``None`` or NaN) is not on the
         front, and beats no point.
 
     Returns
@@ -56,7 +58,7 @@ def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.nda
 
 
 def _by_scene(points: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], list[Mapping[str, Any]]]:
-    """Points by mesh and exponent. Only points of one mesh and exponent can be compared."""
+    """Points by mesh and exponent. Only points of the same mesh and exponent can be compared."""
     found: dict[tuple[str, int], list] = {}
     for point in points:
         found.setdefault((point["settings"]["source"], point["settings"]["exponent"]), []).append(point)
@@ -95,7 +97,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "- *Model* error: the reflection model against Blinn's, both in float64 with exact normals. "
         "Arithmetic does not change this error.\n"
         "- *Arithmetic* error: the frame against the same method and model in float64. A correctly rounded "
-        "frame has 0.5. The coefficients of a published variant count as arithmetic.\n"
+        "frame has 0.5. Errors from the coefficients of a published variant count as arithmetic error.\n"
         "- *Method* error: the frame against exact normals of every pixel with the same model.\n"
         "- *Total* error: the frame against the exact frame, Phong shading as on a GPU. The exact frame has "
         "exact normals at every pixel and Blinn's model. For `phong`, which does not approximate Blinn's "
@@ -139,7 +141,10 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
-    """The trade between error and time at a mesh and exponent, in a few sentences. See `_is_comparable`."""
+    """The trade between error and time at a mesh and exponent, in a few sentences.
+
+    The named designs are those that `_is_comparable` accepts.
+    """
     settings = scene[0]["settings"]
     hardware = [point for point in scene if point["group"] != "software"]
     alike = sum(point["verdicts"]["total"] for point in hardware)
@@ -174,7 +179,10 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _is_comparable(point: Mapping[str, Any]) -> bool:
-    """Whether a design does all of the work, for Blinn's picture, as in `front.conclusion`."""
+    """Whether a design computes its dot products itself and draws Blinn's highlight.
+
+    `front.conclusion` compares the same designs.
+    """
     method, model = (point["settings"][name] for name in ("method", "model"))
     return not ((method in METHODS and METHODS[method].given_values) or model in MIRROR_LOBES)
 

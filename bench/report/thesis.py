@@ -120,7 +120,7 @@ UNITS = {
     "recurrence interpolator": ("recurrence_interpolator", "recurrence"),
 }
 """Units of the claims: unit and variant in the table of ``blysk blocks``. An interpolator includes its setup,
-and gives N·L and N·H. The other entries are only the unit of a pixel.
+and gives N·L and N·H. The other entries are only the unit that works at every pixel, without the setup.
 """
 
 _SHADINGS = ("gouraud", "phong")
@@ -128,14 +128,14 @@ _SHADINGS = ("gouraud", "phong")
 
 @cache
 def counted(way: str, pixels: int) -> dict[str, float]:
-    """Operations of a way's result by kind (see `Counted`), counted during the run, setup included."""
+    """Operations for each result of a way, by kind (see `Counted`). The run counts them, setup included."""
     counts: Counter[str] = Counter()
     found = sum(1 for _ in WAYS[way](*(Counted.of(x, counts) for x in random_operands()), pixels))
     return {kind: count / (found * SPANS) for kind, count in counts.items()}
 
 
 def price(printed: float, own: dict[str, float], other: dict[str, float]) -> float | None:
-    """Cost of a dear operation, in cheap operations, at which counted operations give the printed ratio."""
+    """Cheap operations that a costly operation must be worth, so that the counts give the printed ratio."""
     dear = [sum(counts.get(kind, 0.0) for kind in DEAR) for counts in (own, other)]
     cheap = [sum(counts.values()) - of for counts, of in zip((own, other), dear, strict=True)]
     gain = dear[1] - printed * dear[0]
@@ -147,7 +147,7 @@ def _shown(counts: dict[str, float]) -> str:
 
 
 def software(way: str, baseline: str, pixels: int, printed: float, repeats: int) -> dict[str, Any]:
-    """Two ways in software on the same spans: ratio of times, operations a result, and largest difference.
+    """Two ways in software on the same spans: ratio of times, operations for each result, largest difference.
 
     Both are NumPy in float64, vectorised over `SPANS` random spans of up to 45 degrees, their setup included.
 
@@ -156,7 +156,7 @@ def software(way: str, baseline: str, pixels: int, printed: float, repeats: int)
     way, baseline : str
         Two of `WAYS`.
     pixels : int
-        Pixels of each span. For a bisection a power of two, one more than its results.
+        Pixels of each span. For a bisection p, a power of two: p - 1 results, in a span of p + 1 pixels.
     printed : float
         Claimed ratio of speeds.
     repeats : int
@@ -165,8 +165,9 @@ def software(way: str, baseline: str, pixels: int, printed: float, repeats: int)
     Returns
     -------
     dict
-        ``ratio``: time of the baseline over time of the way. ``own``, ``other``: `counted` of both, in words;
-        ``price`` of them. ``difference``: largest difference of a component of a normal, or of a cosine.
+        ``ratio``: time of the baseline, divided by the way's. ``own``, ``other``: `counted` of both, in
+        words. ``price``: the result of `price` for both counts. ``difference``: largest difference of a
+        component of a normal, or of a cosine.
     """
     operands = random_operands()
     pair = WAYS[way], WAYS[baseline]
@@ -216,13 +217,12 @@ def _parts(name: str) -> dict[str, int]:
 
 
 def hardware(unit: str, baseline: str) -> dict[str, float | None]:
-    """Cycles a result and parts of a baseline over those of a unit, both of `UNITS`.
+    """The baseline's cycles for each result, and its parts, divided by those of the unit; both of `UNITS`.
 
     Returns
     -------
     dict
-        Ratios of ``interval``, ``multipliers``, ``cells`` and ``register_bits``. ``None`` if the unit has
-        none.
+        Ratios of ``interval``, ``multipliers``, ``cells``, ``register_bits``; ``None`` if the unit has none.
     """
     own, other = _parts(unit), _parts(baseline)
     kinds = ("interval", "multipliers", "cells", "register_bits")
@@ -244,7 +244,7 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
     Returns
     -------
     dict
-        ``gouraud`` and ``phong``: shading over rasterising and shading.
+        ``gouraud`` and ``phong``: shading time, divided by the time of rasterising plus shading.
     """
     scene = scene_for(teapot(triangles), 50, width, height)
     raster = rasterise(scene)
@@ -276,9 +276,9 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     -------
     dict
         ``nmse``, ``published``, ``defined`` (share of values for which the published form is defined),
-        ``max_lsb`` and ``p999_lsb``; ``nearest``: share of the published form that comes from the 1 % of the
-        values nearest the mean; ``step``: of the published form and of NMSE, the error of the reference
-        itself with 1 LSB more in the value nearest the mean, over that with 1 LSB more in the farthest.
+        ``max_lsb`` and ``p999_lsb``; ``nearest``: share of MNSE that comes from the 1 % of values nearest the
+        mean; ``step``, for MNSE and for NMSE: error of the reference with 1 LSB more in its value nearest the
+        mean, divided by its error with 1 LSB more in its farthest value.
     """
     scene = scene_for(teapot(triangles), 50, width, height)
     design = preset(method, model_of(method))
@@ -364,7 +364,7 @@ def _units(quick: bool) -> list[Claim]:
                     Claim(
                         speed.source,
                         f"{speed.name}: {speed.printed} times as fast, in software",
-                        f"cycles a result of the {baseline}, divided by those of the {unit}",
+                        f"cycles for each result of the {baseline}, divided by those of the {unit}",
                         hardware,
                         {"unit": unit, "baseline": baseline},
                         "interval",
@@ -410,7 +410,7 @@ def _squares(quick: bool) -> list[Claim]:
 def _steps(quick: bool) -> list[Claim]:
     first = _squares(quick)[0].settings
     step = "error of 1 LSB in the value nearest the mean, divided by that of 1 LSB in the farthest value"
-    share = "share of the 1 % of the values that are nearest the mean, %"
+    share = "share of MNSE that comes from the 1 % of values nearest the mean, %"
     return [
         Claim("[T] 4.1", _MNSE, step, square_errors, first, "step", ours="NMSE: a sum divided by a sum"),
         Claim("[T] 4.1", _MNSE, share, square_errors, first, "nearest"),
@@ -418,7 +418,7 @@ def _steps(quick: bool) -> list[Claim]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """All claims. If quick, for two lengths of spans, small frames and the units of a pixel."""
+    """All claims. If quick, for two lengths of spans, small frames, and only the units without setup."""
     return [claim for table in _DOCUMENT.tables for claim in table.claims(quick)]
 
 
@@ -433,26 +433,26 @@ _DOCUMENT = Document(
         "A hardware unit that takes new operands in every cycle gives a normal in every cycle, whatever its "
         "structure is. So in hardware the methods save multipliers, cells and registers, and no cycles.",
         "Table 1.1 of [T] has the share of shading in the time of a frame. We did not have its published "
-        "values. MNSE, as published, divides an error by its own pixel's distance from the mean. For a "
-        "value at the mean it is undefined. Values near the mean count most.",
+        "values. MNSE as published divides each pixel's error by the distance of the pixel's value from the "
+        "mean. It is undefined for a value at the mean. Values near the mean count most.",
     ],
     [
         ClaimTable(
             "thesis-software",
             "Speed in software",
             _speeds,
-            f"NumPy in float64, {SPANS} spans of up to {WIDEST:g} degrees at once, setup included. Both "
-            "ways run in turn in the same run, and the least processor time of several counts. A bisection "
-            "has one pixel more. [T] says only 'classical normalisation' of its baseline. We compare with "
-            "both usual forms, and the recurrence also with the direct evaluation of the cosines. Price: "
-            "cost of a root, division or cosine, in multiplications or additions, at which the counted "
-            "operations alone give the published ratio. Difference: between the results of both ways, as "
-            "components of a unit normal or as cosines. The normals of a line lie on another curve than "
-            "the great circle. The difference includes the distance of both curves.",
+            f"NumPy in float64, {SPANS} spans of up to {WIDEST:g} degrees at once, setup included. The two "
+            "ways run alternately, several times. We use the shortest processor time of each. For a "
+            "bisection, p pixels mean p - 1 normals between two ends, so its span has p + 1 pixels. [T] says "
+            "only 'classical normalisation' of its baseline. We compare with both usual forms, and the "
+            "recurrence also with the direct evaluation of the cosines. Price: cost of a root, division or "
+            "cosine, in multiplications or additions, at which the counted operations alone give the "
+            "published ratio. Difference: between the results of both ways, as components of a unit normal "
+            "or as cosines. It includes the distance of a line's normals from the great circle.",
             {
                 "price of a root": "price",
                 "largest difference": "difference",
-                "operations of a result": "own",
+                "operations for each result": "own",
                 "operations of the baseline": "other",
             },
         ),
