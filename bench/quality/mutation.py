@@ -392,7 +392,7 @@ def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iter
         model.choose(0)
         found = model.trace(stimulus)
         if difference := found.differs(trace if trace.status.size else replace(trace, status=found.status)):
-            raise ToolError(f"the unit among its mutants is not the unit: {difference} differs")
+            raise ToolError(f"the unit without a fault differs from the original unit in {difference}")
         for word in np.flatnonzero(found.status):
             if word not in counting or trace.clock < vectors[counting[word]][1].clock:
                 counting[word] = number

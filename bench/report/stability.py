@@ -113,8 +113,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "error of this size. The stated error is that of the method's own curve in float64, plus the error "
         "bounds of its units. In a highlight the bounds are multiplied by the exponent.\n"
         "- !: nothing tells the user. The pixel is silently wrong.",
-        "Where N.L changes its sign, a highlight ends at once, also a bright highlight. At exponent 1 the "
-        "highlight is bright there. If the N.L of a method is wrong by a part of an LSB, the highlight ends "
+        "Where N.L changes its sign, even a bright highlight ends at once. At exponent 1 the highlight is "
+        "bright there. If the N.L of a method is wrong by a part of an LSB, the highlight ends "
         "a pixel early or late. So the error of group 5 can be as large as the highlight.",
         f"With cut spans {len(bad)} of {len(worst['prepared'])} cells are silently wrong. With uncut spans "
         f"{len(silent)} cells are silently wrong"

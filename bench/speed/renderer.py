@@ -105,7 +105,7 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     name : str
         Name of the driver, as OpenGL gives it.
     """
-    # Mesa reads these when it is loaded. 0 threads: llvmpipe draws in the calling one.
+    # Mesa reads these when it is loaded. With 0 threads llvmpipe draws in the calling thread.
     os.environ["LP_NUM_THREADS"] = "0"
     os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
     import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (chooses the window's class)
@@ -120,7 +120,7 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
         vtkRenderWindow,
     )
 
-    # Without a display VTK warns that it must do without one.
+    # VTK would warn that there is no display.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     points = vtkPoints()
     points.SetData(numpy_to_vtk(np.ascontiguousarray(scene.mesh.vertices), deep=True))
@@ -162,8 +162,8 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     lamp.SetColor(light.color)
     renderer.AddLight(lamp)
     camera = renderer.GetActiveCamera()
-    # VTK takes the direction to the viewer from every point to the camera, in a parallel projection too; from
-    # afar it is constant, and the picture is the same.
+    # Also in a parallel projection VTK takes the direction to the viewer from every point to the camera. If
+    # the camera is far away the direction is constant, and the picture is the same.
     camera.SetPosition(scene.camera.target + 1000 * scene.camera.height * scene.camera.viewer)
     camera.SetFocalPoint(scene.camera.target)
     camera.SetViewUp(scene.camera.up)
@@ -213,7 +213,7 @@ def _peak_memory() -> int:
     """Peak memory of this process in bytes."""
     status = Path("/proc/self/status")
     if status.exists():
-        # Of a process that another began, `ru_maxrss` on Linux counts what that one had.
+        # On Linux `ru_maxrss` of a child process includes the memory of its parent.
         fields = dict(line.split(":", 1) for line in status.read_text().splitlines())
         return int(fields["VmHWM"].split()[0]) * 1024
     # macOS counts in bytes, others in KiB.
@@ -240,19 +240,19 @@ def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeat
     print(
         f"teapot, {len(scene.mesh.faces):,} triangles, {width}x{height}, Phong shading: "
         f"{raster.visible.sum():,} visible pixels, {len(raster.x):,} spans, "
-        f"{raster.hidden_spans:,} more hidden"
+        f"{raster.hidden_spans:,} hidden spans"
     )
     del raster
     with local_executor(1) as pool:
         golden, frame, memory = pool.submit(_golden, triangles, width, height, repeats).result()
     for model, timing in golden.items():
         print(f"golden, {model:5}: {timing.wall:.3f} s, {timing.cpu:.3f} s of processor time")
-    print(f"golden: {memory / 2**20:.0f} MiB, its process at the largest, mesh and imports included")
+    print(f"golden: {memory / 2**20:.0f} MiB, largest memory of its process, with mesh and imports")
 
     try:
         draw, name = vtk_image(scene)
     except ModuleNotFoundError as error:
-        print(f"{error.name} is not installed; {install_extra('bench')} to compare with VTK")
+        print(f"{error.name} is not installed; to compare with VTK, run {install_extra('bench')}")
         return 1
     peer, drawn = timed(draw, repeats)
     print(f"VTK ({name}): {peer.wall:.3f} s, {peer.cpu:.3f} s of processor time, mesh already loaded")

@@ -292,11 +292,13 @@ def test_section():
     assert len(tables["stability-cases"].rows) == sum(len(cases(group)) for group in FROM_SPANS)
     [row] = tables["safe-ranges"].records()
     assert row["method"] == "quotient"
-    assert row["widest span at n = 1, degrees"] == 15
+    # It halves spans from 90 degrees on; the search stops within 0.05 degrees.
+    assert 89.95 <= row["widest span at n = 1, degrees"] <= 90
     errors = dict(zip(SWEEP, (of["given"]["error"] for of in results[1]["sweep"]), strict=True))
     up_to = row["angle up to which the error is at most 1 LSB, degrees"]
     assert max(error for angle, error in errors.items() if angle <= up_to) <= 1
-    assert errors[min(angle for angle in SWEEP if angle > up_to)] > 1
+    wider = [angle for angle in SWEEP if angle > up_to]
+    assert not wider or errors[wider[0]] > 1
 
 
 def test_tasks():
