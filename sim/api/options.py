@@ -419,7 +419,7 @@ RENDERING: dict[str, Option] = {
     "short_words": Option(
         Truth(),
         False,
-        "With --specialise: also shorten words where the error bound stays. Pixels may change by one step.",
+        "With --specialise: also shorten words where the error bound stays. Pixels may change by one LSB.",
         "pipeline.short_words",
     ),
 }
