@@ -425,7 +425,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         )
         read = g.look_up(f"{name}_tables", words, width * len(tables), address)
         entry = g.register(f"{name}_entry", lambda word: word, read)
-        found = []
+        looked_up = []
         for k in range(len(tables)):
 
             def change(entry, start=width * k):
@@ -437,8 +437,8 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
             product = g.multiply(f"{name}_{k}_product", entry, fraction, change)
             value = g.register(f"{name}_{k}_sum", total, entry, product)
-            found.append(self._word(f"{name}_{k}", value))
-        return found
+            looked_up.append(self._word(f"{name}_{k}", value))
+        return looked_up
 
     def _coefficient(self, name, q_square, one_minus_k) -> Word:
         """Word of K = ``Q k(Q)``."""

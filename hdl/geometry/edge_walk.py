@@ -176,7 +176,9 @@ class EdgeWalkUnit(wiring.Component):
                 loads()
             if turns is not None:
                 with m.Elif(turns):
-                    m.d.sync += [mine.eq(its) for mine, its in zip(edge.words, lower.words, strict=True)]
+                    m.d.sync += [
+                        word.eq(of_lower) for word, of_lower in zip(edge.words, lower.words, strict=True)
+                    ]
             with m.Else():
                 walk()
         return edge

@@ -184,8 +184,10 @@ class SpanHalverUnit(wiring.Component):
 
         sizes, signs = [], []
         for k in range(_COMPONENTS):
-            for end, (mine, other) in enumerate(zip(ends[k][:2], (given.near[k], given.far[k]), strict=True)):
-                code = wire(Mux(again, mine, Value.cast(other).as_unsigned()), f"end_{end}_{k}")
+            for end, (held, incoming) in enumerate(
+                zip(ends[k][:2], (given.near[k], given.far[k]), strict=True)
+            ):
+                code = wire(Mux(again, held, Value.cast(incoming).as_unsigned()), f"end_{end}_{k}")
                 sizes.append(wire(size_of(code), f"whole_size_{end}_{k}"))
                 signs.append(code[-1])
         used = sizes[0][bits:]

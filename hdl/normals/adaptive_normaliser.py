@@ -96,8 +96,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
     def counting(self, levels: int) -> int:
         """Cycles of a span in the first part, which counts its levels."""
         latency, interval = self._bisection.latency, self._bisection.initiation_interval
-        further = sum(latency + 4 + interval * ((1 << level) - 1) for level in range(1, levels))
-        return latency + 6 + further
+        bisected = sum(latency + 4 + interval * ((1 << level) - 1) for level in range(1, levels))
+        return latency + 6 + bisected
 
     def elaborate(self, platform):
         """Levels, segments, FIFO, normals."""
@@ -391,15 +391,15 @@ class AdaptiveNormaliserUnit(wiring.Component):
         inside, out_of_range = Signal(name="inside"), Signal(name="span_out_of_range")
         valid = Signal(name="pixel_valid")
         advance, load = Signal(name="back_advance"), Signal(name="load")
-        given = fifo.r_rdy & (inside | (ready_spans != 0))
-        active, ends = count_down(m, given, segment.count, advance)
+        may_take = fifo.r_rdy & (inside | (ready_spans != 0))
+        active, ends = count_down(m, may_take, segment.count, advance)
         pixel = Signal(self.o.payload.shape())
         last, wide = Signal(name="pixel_last"), Signal(name="pixel_out_of_range")
         m.d.comb += [
             pixel.last.eq(last),
             pixel.out_of_range.eq(wide),
             advance.eq(skid_buffer(m, self.o, valid, pixel)),
-            load.eq(advance & ends & given),
+            load.eq(advance & ends & may_take),
             begun.eq(load & ~inside),
             fifo.r_en.eq(load),
         ]

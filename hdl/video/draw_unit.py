@@ -248,9 +248,9 @@ class DrawUnit(wiring.Component):
 
     def _count(self, m: Module, **events) -> None:
         """Counters of this unit and of those inside."""
-        own = self.status
-        count_events(m, own, **events)
+        status = self.status
+        count_events(m, status, **events)
         m.d.comb += [
-            *copy_fields(own, self.assembly.status, COUNTERS),
-            *copy_fields(own, self.render.status, RENDERED),
+            *copy_fields(status, self.assembly.status, COUNTERS),
+            *copy_fields(status, self.render.status, RENDERED),
         ]

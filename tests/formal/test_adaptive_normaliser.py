@@ -162,7 +162,7 @@ BUGS = {
     "a segment that finds no room is lost": (of_segments, "_end_segment", "m.If(fifo.w_rdy)", "m.If(1)"),
     "segments are not given": (of_progress, "_end_segment", "fifo.w_en.eq(1)", "fifo.w_en.eq(0)"),
     "a pixel that waits is lost": (of_pixels, "_back", "skid_buffer(m, self.o, valid, pixel)", "1"),
-    "segments are taken while pixels wait": (of_pixels, "_back", "r_en.eq(load)", "r_en.eq(ends & given)"),
+    "segments are taken while pixels wait": (of_pixels, "_back", "r_en.eq(load)", "r_en.eq(ends & may_take)"),
     "the last of every segment is marked": (of_pixels, "_back", "active & ends & ~inside", "active & ends"),
     "a span begins before it is complete": (of_pixels, "_back", "(inside | (ready_spans != 0))", "1"),
     "a span is begun with every segment": (of_pixels, "_back", "begun.eq(load & ~inside)", "begun.eq(load)"),
