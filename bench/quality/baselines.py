@@ -211,7 +211,9 @@ def _command(words: Sequence[str], update: bool, jobs: int) -> int:
     """
     chosen = [name for name in ENTRIES if not words or any(word in name for word in words)]
     if not chosen:
-        raise InputError(" ".join(words), "no entry has this in its name", "name a unit, method or model")
+        raise InputError(
+            " ".join(words), "no entry has this word in its name", "name a unit, method or model"
+        )
     if update:
         check_writable(FILE)
     old = {} if update and not FILE.exists() else read(FILE)

@@ -118,10 +118,10 @@ class Wrapped(Component):
 class _Observed(Wrapped):
     """A unit with an input that selects a mutant, and outputs that are 0 while their value does not matter.
 
-    ``ready`` and payload matter only while ``valid`` is high. ``status`` has a counter of 32 bits for each of
-    `flags_of` the unit, of the cycles in which the flag is high, as in a pipeline. For each further output
-    ``status`` has a checksum of 32 bits over the cycles. If the output has a member ``valid``, the checksum
-    is over cycles with ``valid`` high.
+    ``ready`` and payload matter only while ``valid`` is high. For each of `flags_of` the unit
+    ``status`` has a counter of 32 bits, as in a pipeline. It counts the cycles in which the flag is high. For
+    each further output ``status`` has a checksum of 32 bits over the cycles. If the output has a member
+    ``valid``, the checksum is over cycles with ``valid`` high.
 
     Parameters
     ----------

@@ -90,11 +90,11 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     out_of_range = sum(one.out_of_range_spans > 0 for one in designs)
     text = [
         f"{len(designs)} pipelines draw {view['source']} at {view['width']}x{view['height']} with exponent "
-        f"{EXPONENT}. They have all possible combinations of method, reflection model, operand of the "
-        "specular unit, degree of the method's polynomial, word of the differences of `chord-local`, and "
-        "style. The bit-accurate model computes the frames, and equals the simulation to the bit. Costs are "
-        "counted in the netlist before technology mapping. `blysk explore` does the same for any mesh, with "
-        "more choices."
+        f"{EXPONENT}. They are all possible combinations of method, reflection model, style, operand of "
+        "the specular unit and degree of the method's polynomial. `chord-local` also has several words of "
+        "its differences. The bit-accurate model computes the frames, and equals the simulation to the bit. "
+        "Costs are counted in the netlist before technology mapping. `blysk explore` does the same for any "
+        "mesh, with more choices."
     ]
     if out_of_range:
         text.append(

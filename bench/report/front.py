@@ -143,7 +143,9 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
             f". For true Phong highlights, (R·V)^n, `{of['label']}` takes {of['cycles'][1]:.2f} cycles and "
             f"{_costs(of)}. Its largest error against exact Phong shading is {of['total_error'][1]:.2f} LSB"
         )
-    return Conclusion("What does a pixel cost, and how exact is it?", f"{sentence}.", _drawing(timed, best))
+    return Conclusion(
+        "What is the cost of a pixel, and how exact is it?", f"{sentence}.", _drawing(timed, best)
+    )
 
 
 def _is_compared(of: Mapping[str, Any]) -> bool:

@@ -32,10 +32,10 @@ def frame_figures(scene: Scene, renderer: Renderer, frame: TriangleFrame) -> dic
     Returns
     -------
     dict
-        ``pixels``, pixels that show a triangle in either frame; ``coverage``, those in one frame only;
-        ``other``, those that show another triangle; ``terminator``, those with a light at `TERMINATOR` or
-        less; ``zero``, those where opposite normals come to 0, so that any is right; ``error``, the largest
-        error of the others in LSB, ``None`` if there is none.
+        Numbers of pixels: ``pixels`` show a triangle in either frame, ``coverage`` in only one frame;
+        ``other`` show another triangle; ``terminator`` have a light at `TERMINATOR` or less; in ``zero``
+        opposite normals add up to 0, so every normal is right. ``error`` is the largest error of the other
+        pixels in LSB, or ``None`` without such pixels.
     """
     raster = rasterise(scene)
     which = np.flatnonzero(raster.visible)
@@ -111,7 +111,7 @@ def cases_of(quick: bool) -> Iterator[tuple[str, Scene]]:
     yield "a normal and its opposite", _scene(200, 160, *_corner(opposite))
     yield "corners with the same normal, W 1 to 1000", _deep()
     side = 100 if quick else 1000
-    yield f"{side * side // 2 * 2:,} triangles of half a pixel to one", _grid(side)
+    yield f"{side * side // 2 * 2:,} triangles of half a pixel to a pixel", _grid(side)
 
 
 def _scene(

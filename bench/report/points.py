@@ -299,7 +299,7 @@ def _keys(task: Task) -> list[tuple]:
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """The section "Error against run time".
 
-    `Section.figures` is what the page's script reads:
+    The page's script reads `Section.figures`:
 
     - ``points``: a dictionary each, with
 

@@ -105,9 +105,9 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "Methods of the documents have points with their operand N.H, and with the more exact operand "
         "1 - N.H. If the published variant differs, it has points, too. FLIP and CIEDE2000 measure the "
         "difference that an eye sees. A frame is *identical to the eye* if its largest error is at most "
-        f"{LARGEST_LSB:g} LSB. It is also identical under two conditions: FLIP is at most {FLIP_P99:g} in "
-        f"99 % of the pixels and at most {FLIP_MAX:g} in all, and CIEDE2000 is at most {CIEDE2000_P99:g} in "
-        f"99 % and at most {CIEDE2000_MAX:g} in all."
+        f"{LARGEST_LSB:g} LSB. With a larger error it is identical under two conditions. FLIP is at most "
+        f"{FLIP_P99:g} in 99 % of the pixels, and at most {FLIP_MAX:g} in all. CIEDE2000 is at most "
+        f"{CIEDE2000_P99:g} in 99 % of the pixels, and at most {CIEDE2000_MAX:g} in all."
     )
     dates = {point["hardware"]["placed"] for point in points if point["hardware"].get("placed")}
     placed = "this report" in dates
@@ -231,9 +231,9 @@ def table(points: Sequence[Mapping[str, Any]]) -> Table:
         rows=rows,
         note="The engine `cxxrtl` is simulated RTL, `model` its bit-accurate model, and `float64` the golden "
         "renderer, rounded to 8 bits. Multipliers, cells, register bits and memory bits are counted before "
-        "technology mapping. The columns *identical* compare a frame with the exact frame, with exact "
-        "interpolation with the same model, and with the same method and model in float64: ✓ for yes, ✗ for "
-        "no.",
+        "technology mapping. The columns *identical* compare a frame with three references: the exact "
+        "frame, exact interpolation with the same model, and the same method and model in float64. ✓ is yes, "
+        "✗ is no.",
         grades=[[graded[cell] if isinstance(cell, bool) else "" for cell in row] for row in rows],
     )
 

@@ -430,8 +430,8 @@ _DOCUMENT = Document(
         "normalisation. We know neither its programs nor its machine. Our measurements are in NumPy on "
         "this machine, and do not refute [T]. NumPy does each operation on whole arrays, so a root costs "
         "only the time of the processor's root unit.",
-        "A hardware unit that takes new operands in every cycle gives a normal in every cycle, whatever its "
-        "structure is. So in hardware the methods save multipliers, cells and registers, and no cycles.",
+        "A hardware unit that takes new operands in every cycle gives a normal in every cycle, with any "
+        "structure. So in hardware the methods save multipliers, cells and registers, and no cycles.",
         "Table 1.1 of [T] has the share of shading in the time of a frame. We did not have its published "
         "values. MNSE as published divides each pixel's error by the distance of the pixel's value from the "
         "mean. It is undefined for a value at the mean. Values near the mean count most.",

@@ -26,10 +26,15 @@ _CHUNK = 1 << 16
 def span_cycles(length: np.ndarray, interval: np.ndarray, waiting: int = WAITING) -> int:
     """Cycles from the first pixel of a sequence of spans to the last pixel.
 
-    At most two prepared spans wait before the accumulators. Let r_k be the cycle in which span k is prepared,
-    s_k the cycle of its first pixel, I_k its interval, l_k the cycles of its pixels, and w ``waiting``:
+    At most two prepared spans wait before the accumulators. Span k is prepared in cycle
 
-    ``r_k = max(r_{k-1} + I_k, s_{k-2} + w)``, ``s_k = max(s_{k-1} + l_{k-1}, r_k)``.
+    ``r_k = max(r_{k-1} + I_k, s_{k-2} + w)``,
+
+    and its first pixel is in cycle
+
+    ``s_k = max(s_{k-1} + l_{k-1}, r_k)``.
+
+    I_k is its interval, l_k the cycles of its pixels, and w is ``waiting``.
 
     This is a product of matrices in the max-plus algebra, computed in pairs.
 

@@ -1,9 +1,12 @@
 """Speed of the engines and of Verilator, on the same pipeline and beats, in one run.
 
-``python -m blysk.bench.speed.engines`` sends the longer spans of a teapot at 4000x3000 through the quotient
-pipeline of one light in both engines and in Verilator's model of the emitted Verilog. It prints the pixels a
-second of each. The exit status is 1 if the compiled engine makes less than 5 million pixels a second on one
-core, is less than 200 times as fast as pysim, or is slower than Verilator.
+``python -m blysk.bench.speed.engines`` measures both engines and Verilator's model of the emitted Verilog.
+Each shades the longer spans of a teapot at 4000x3000 by the quotient pipeline of one light. The command
+prints the pixels a second of each. The exit status is 1 if the compiled engine
+
+- makes less than 5 million pixels a second on one core,
+- is less than 200 times as fast as pysim, or
+- is slower than Verilator.
 
 Seconds are processor time of this process, which has one thread. So other work on the machine does not count.
 A run of an engine is the whole call, with packing and unpacking of beats. A run of Verilator is only the loop

@@ -3,7 +3,7 @@
 An ECP5 multiplier, MULT18X18D, has registers for each operand and for the product. A block RAM, DP16KD, has a
 register for the word that it reads. Yosys uses none of these registers. `absorb_registers` takes Yosys's JSON
 netlist and moves flip-flops that are directly before or behind a multiplier, or behind a block RAM, into it.
-It also disconnects the last carry of a chain if the carry has no reader, because nextpnr would add a pair of
+It also disconnects the last carry of a chain if the carry has no reader. Else nextpnr would add a pair of
 look-up tables for it. Nothing else of the netlist changes, and its function stays the same in every cycle
 from power-up on.
 """
@@ -332,8 +332,8 @@ class _Netlist:
 def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict[str, Any], Absorbed]:
     """Move flip-flops that stand directly beside a multiplier, or behind a block RAM, into its registers.
 
-    All bits of an operand, or of a product, must be flip-flops of one clock and one enable that have no
-    reset, are 0 at power-up, and are not at a port of the module. Bits of an operand may also be constant 0.
+    All bits of an operand, or of a product, must be flip-flops of the same clock and enable. They must have
+    no reset, be 0 at power-up, and not be at a port of the module. Bits of an operand may also be constant 0.
     Each bit of a product must have one reader, its flip-flop. A flip-flop of an operand with another reader
     also stays for that reader. The flip-flops of only one operand move if there are flip-flops before them
     and the product has a register, too. An enable that flip-flops use inverted gets one look-up table for

@@ -341,7 +341,7 @@ def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
         compress = ["--compress"] if tool == "ecppack" else []
         runner.run(tool, _nextpnr(tool), files + compress, folder)
     if (folder / "top.bit").read_bytes() != (folder / "again.bit").read_bytes():
-        raise ToolError("the bitstream that is read back and packed again is another one")
+        raise ToolError("the bitstream differs after it is read back and packed again")
     sent, back = (_memories((folder / name).read_text()) for name in (configuration, "back.config"))
     if sent != back:
         raise ToolError("the bitstream reads back with other contents of memories")

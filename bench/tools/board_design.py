@@ -145,7 +145,7 @@ def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer) -> 
         raise InputError(
             f"--mesh {name}",
             f"its {len(mesh.faces):,} triangles do not fit the memory of the {board.name} beside the bands",
-            f"use one of at most about {least:,}",
+            f"use a mesh of at most about {least:,} triangles",
         )
 
 

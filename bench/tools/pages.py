@@ -1,8 +1,8 @@
 """Pages of units: function, ports and variants of each, and drawings of structure, timing and errors.
 
 ``blysk pages`` writes them, from the records of `blysk.bench.units`. Text comes from the docstrings of the
-unit and its bit-accurate model, figures from the table of the units, drawings from the netlist, from a
-simulation and from the measured errors, and the list of tests from the stimuli of the record.
+unit and its bit-accurate model. Figures come from the table of the units. Drawings come from the netlist, a
+simulation and the measured errors. The list of tests comes from the stimuli of the record.
 """
 
 import inspect

@@ -3,8 +3,8 @@
 These components have no record:
 
 - the frame constants, the pixel assembler and the pixel merger, because their ports are not a stream ``i`` to
-  a stream ``o``, and the accumulator of ``chord-local``. The records of the pipelines and of the interpolator
-  cover them as their parts;
+  a stream ``o``. The records of the pipelines cover them as parts of the pipelines;
+- the accumulator of ``chord-local``. The record of the interpolator covers it as a part of the interpolator;
 - the pixel lanes, because their beats depend on the cycles. They have tests of their own;
 - units with other ports: band depths, controls, the draw unit, and units of the display that have two clocks
   or never wait. They have tests of their own, too.

@@ -209,7 +209,7 @@ def test_words_choose_entries(small, capsys):
     assert json.loads(path.read_text()) == {"one": figures["one"]}
     assert main(["ne", "--jobs", "1"]) == 0
     assert main(["nothing"]) == 2
-    assert "nothing: no entry has this in its name; " in capsys.readouterr().err
+    assert "nothing: no entry has this word in its name; " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1"])

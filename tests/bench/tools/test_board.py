@@ -51,7 +51,7 @@ def pattern_on(board):
         (
             ["ulx3s-25f", "--triangles", "3000", "--simulate", "1", "-o", "x"],
             "--mesh teapot: its 3,080 triangles do not fit the memory of the ulx3s-25f beside the bands; use "
-            "one of at most about 1,706",
+            "a mesh of at most about 1,706 triangles",
         ),
         (
             ["ulx3s-85f", "--triangles", "3000", "--clock", "5", "--simulate", "1", "-o", "x"],
