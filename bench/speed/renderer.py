@@ -239,8 +239,8 @@ def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeat
     raster = rasterise(scene)
     print(
         f"teapot, {len(scene.mesh.faces):,} triangles, {width}x{height}, Phong shading: "
-        f"{raster.visible.sum():,} visible pixels, {len(raster.x):,} spans, "
-        f"{raster.hidden_spans:,} hidden spans"
+        f"{raster.visible.sum():,} visible pixels, {len(raster.x):,} spans "
+        f"and {raster.hidden_spans:,} hidden spans"
     )
     del raster
     with local_executor(1) as pool:
