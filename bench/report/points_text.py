@@ -105,7 +105,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "Methods of the documents have points with their operand N.H, and with the more exact operand "
         "1 - N.H. If the published variant differs, it has points, too. FLIP and CIEDE2000 measure the "
         "difference that an eye sees. A frame is *identical to the eye* if its largest error is at most "
-        f"{LARGEST_LSB:g} LSB. With a larger error it is identical under two conditions. FLIP is at most "
+        f"{LARGEST_LSB:g} LSB. With a larger error two conditions must hold. FLIP is at most "
         f"{FLIP_P99:g} in 99 % of the pixels, and at most {FLIP_MAX:g} in all. CIEDE2000 is at most "
         f"{CIEDE2000_P99:g} in 99 % of the pixels, and at most {CIEDE2000_MAX:g} in all."
     )
