@@ -12,7 +12,8 @@ __all__ = ["MARGIN", "PixelWords", "QuotientSpans", "QuotientWords", "SpanVector
 
 
 MARGIN = 4
-"""Steps from a component to 1. At the last pixel it is off by 2.5 steps at most, and at 1 it would wrap."""
+"""Least distance of a component from 1, in units of 2^-17. A component of 1 would wrap, and at the last pixel
+rounding may add up to 2.5 units."""
 
 
 class SpanVectors(NamedTuple):

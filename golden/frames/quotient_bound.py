@@ -56,7 +56,7 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
       step for cuts.
     - Slivers have the attributes of their longest edge. So they are also off by the distance of their middle
       corner's attributes from this edge.
-    - `MirrorAdapter` turns psi by 2^-15 at most.
+    - `MirrorAdapter` turns gamma by 2^-15 at most.
     - Components of further lights have the error of the vector that `LightAdapter` turns, the error of its
       axes, and a rounding of their own.
 

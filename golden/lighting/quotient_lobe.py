@@ -19,7 +19,7 @@ class QuotientLobe(Lobe):
 
     The integer of a place is the address of a word, its fraction the position within the step. The table of a
     lobe of N·H has a part for ``s = sin^2 gamma`` and a part for ``1 - s``. The table of a lobe of R·V has
-    one part, for ``s = sin^2 (psi/2)``. A part has `OCTAVES` octaves of `STEPS` steps and a row for all
+    one part, for ``s = sin^2 (gamma/2)``. A part has `OCTAVES` octaves of `STEPS` steps and a row for all
     smaller numbers. A place past the end gives 0. Words, entries, writes and banks are those of `Lobe`.
 
     *Error of the lines*, with rounding, at the possible places (s or 1 - s up to 1/2), in LSB:

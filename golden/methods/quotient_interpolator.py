@@ -35,8 +35,8 @@ class QuotientInterpolator(Interpolator):
 
     A source of spans has to halve a span of three pixels or more, and to split a span of two pixels, if
 
-    - the lengths of v at its ends differ by a factor over `LARGEST_RATIO`;
-    - or the angle between them is over 90 degrees.
+    - the lengths of v at its ends differ by more than a factor of `LARGEST_RATIO`;
+    - or the angle between the ends is over 90 degrees.
 
     Then ``|v|`` is at least ``1/(2 sqrt(5))`` at every pixel, in the scale of the words. `SpanHalver` cuts by
     another rule, with the same promise.
@@ -44,7 +44,7 @@ class QuotientInterpolator(Interpolator):
     Parameters
     ----------
     mirror : bool
-        Whether the highlight is of R·V, as Phong's, in place of N·H.
+        Whether the highlight is Phong's, of R·V, in place of N·H.
 
     Source: docs/theory/quotient.md.
     """
@@ -237,13 +237,13 @@ class QuotientInterpolator(Interpolator):
 class QuotientErrors:
     """Bounds of the errors of the quotient method, for spans of exact vectors at their ends.
 
-    With K pixels, D the largest component of the difference of the ends, in steps of 2^-17, and i the pixel:
+    i is the pixel. D is the largest component of the difference of the ends. D and eps are in units of 2^-17:
 
-    - A component of v is off by ``eps <= 1/2 + max(1/16, D 2^-17)`` steps.
-    - So the direction of v is off by ``asin(sqrt(3) eps / |v|)``.
-    - The accumulators are off by ``(i + i^2/2) 2^-47``. So s is off by twice as much over q.
-    - Words of a further light are rounded by themselves, and q comes from the first light. Beside ``|v|^2``
-      of the further light's words, q is off by the sum of both errors.
+    - A component of v is off by at most ``eps = 1/2 + max(1/16, D 2^-17)``.
+    - So the direction of v is off by at most ``asin(sqrt(3) eps / |v|)``.
+    - The accumulators are off by at most ``(i + i^2/2) 2^-47``, and s by twice this, divided by q.
+    - Words of a further light are rounded by themselves, and q comes from the first light. So q differs from
+      ``|v|^2`` of the further light's words by the sum of both errors.
 
     docs/theory/quotient.md#bound proves these bounds.
 
@@ -252,7 +252,7 @@ class QuotientErrors:
     angle : float
         Largest error of a normal's direction, in radians.
     turn : float
-        Largest error of the highlight's angle: gamma, or psi, in radians.
+        Largest error of the highlight angle gamma (of N·H, or of R·V), in radians.
     drift : float
         Largest error of s by the accumulators.
     mismatch : float

@@ -75,10 +75,10 @@ def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def squared_sine(vector: np.ndarray, frame: LightFrame, mirror: bool = False) -> np.ndarray:
-    """Squared sine of the highlight's angle from vectors of any length, as an exact quotient.
+    """Squared sine of the highlight angle from vectors of any length, as an exact quotient.
 
-    ``sin^2 gamma = (x^2 + y^2)/q`` with ``cos gamma = N·H``; with ``mirror``
-    ``sin^2 (psi/2) = (x^2 + cos^2 a y^2)/q``, of half the angle of ``cos psi = R·V``. In both
+    ``sin^2 gamma = (x^2 + y^2)/q`` with ``cos gamma = N·H``. With ``mirror`` it is the squared sine of half
+    the angle: ``sin^2 (gamma/2) = (x^2 + cos^2 a y^2)/q`` with ``cos gamma = R·V``. In both
     ``q = x^2 + y^2 + z^2``.
 
     Parameters
@@ -88,7 +88,7 @@ def squared_sine(vector: np.ndarray, frame: LightFrame, mirror: bool = False) ->
     frame : LightFrame
         The frame.
     mirror : bool
-        Whether the angle is psi, between R and V.
+        Whether gamma is the angle between R and V, in place of the angle between N and H.
 
     Source: docs/theory/quotient.md#identities.
     """
