@@ -182,8 +182,8 @@ def target_of(design: ShadingPipeline) -> ReflectionModel:
 def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None) -> float | None:
     """Bound of the error against exact normals of every pixel with the same model, in LSB.
 
-    Let c be the largest channel of all terms together, where 1 is the full channel. It is the largest sum,
-    over the materials, of the lights' colours times diffuse and specular reflection. Then::
+    For each material, multiply each light's colour by the sum of diffuse and specular reflection, and add
+    these products of all lights. Let c be the largest channel of these sums; 1 is the full channel. Then::
 
         arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
 

@@ -120,16 +120,16 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
 
 
 def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
-    """Halve spans until no pixel's normal is too short beside the longer end's; normals have lengths.
+    """Halve spans until no pixel's N/W is too short compared with that of the longer end.
 
-    Short normals come from values of W that differ much along a span, and from nearly opposite ends.
+    N/W is short if W differs much along a span, or if the ends are nearly opposite.
 
     Parameters
     ----------
     raster : Raster
         Spans.
     largest_ratio : float
-        Largest ratio of the length of an end to the length of a pixel's normal.
+        Largest length of N/W at an end, divided by the length of N/W at a pixel.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
 
 
 def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
-    """Halve spans whose end normals differ in length, or by over 90 degrees; normals have lengths.
+    """Halve spans whose ends N/W differ by more than a ratio in length, or by over 90 degrees in direction.
 
     Spans of two pixels become two spans of one pixel, for all ends.
 
@@ -164,7 +164,7 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
     raster : Raster
         Spans.
     largest_ratio : float
-        Largest ratio of the lengths.
+        Largest ratio of the lengths of N/W.
 
     Returns
     -------

@@ -59,7 +59,7 @@ class HighlightLimits:
     """Tolerances of u = 1 - N·H for the highlights of materials.
 
     For a polynomial or a power the tolerance follows from the exponent, as in `LocalChordInterpolator`. For a
-    lobe it is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope of its curve from u on.
+    lobe it is `LocalChordInterpolator.HIGHLIGHT_BUDGET`, divided by the curve's steepest slope from u on.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ class HighlightLimits:
     def turn(self, material: np.ndarray) -> np.ndarray:
         """Angle in radians by which a normal may turn, for every u.
 
-        It is `LocalChordInterpolator.HIGHLIGHT_BUDGET` over the steepest slope of S over gamma. For a
-        polynomial or a power the slope is at most `STEEPEST` times ``sqrt n``. For a lobe it is the largest
+        It is `LocalChordInterpolator.HIGHLIGHT_BUDGET`, divided by the largest ``|dS/dgamma|``. For a
+        polynomial or a power this slope is at most `STEEPEST` times ``sqrt n``. For a lobe it is the largest
         ``sqrt(2u) |dS/du|``.
 
         Parameters

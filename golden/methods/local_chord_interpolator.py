@@ -342,10 +342,10 @@ class LocalChordInterpolator(Interpolator):
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Largest error of u that keeps `HIGHLIGHT_BUDGET`, where no smaller u occurs.
 
-        The slope of a term over u is about n at the peak, and smaller farther off. It is ``n (1 - n u/2)``
-        for the cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With ``x = (n - 1) u`` both are
-        at most ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other models are at most 1.25
-        times this bound, and 1.6 times for n = 1.
+        The slope ``|dS/du|`` of a term is about n at the peak, and smaller farther off. It is
+        ``n (1 - n u/2)`` for the cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With
+        ``x = (n - 1) u`` both are at most ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other
+        models are at most 1.25 times this bound, and 1.6 times for n = 1.
 
         Parameters
         ----------

@@ -127,7 +127,7 @@ class QuotientInterpolator(Interpolator):
         constants = [f"constants: of L write sin a, 0, cos a, times {model.ONE}; H is not read"]
         return [
             *axes,
-            "v = N/W, linear on the screen over a triangle: corner normals over their W, interpolated.",
+            "v = N/W, linear on the screen: each corner's normal divided by its W, interpolated.",
             f"i_start: components {', '.join(model.components)} of v at the first pixel centre.",
             *mirrored,
             f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one factor, so",
@@ -256,7 +256,7 @@ class QuotientErrors:
     drift : float
         Largest error of s by the accumulators.
     mismatch : float
-        Largest relative error of q beside a light's own words. It is 0 for the first light.
+        Largest relative difference of q from ``|v|^2`` of a light's own words. It is 0 for the first light.
 
     Source: docs/theory/quotient.md#bound.
     """
@@ -361,8 +361,8 @@ class QuotientErrors:
         It is the sum of
 
         - the lobe's steepest slope a radian times the error of its angle;
-        - its slope over s times the drift, but at most the error by the angle ``asin(sqrt(drift))``;
-        - the relative error of s;
+        - its largest ``|dS/ds|`` times the drift, but at most the error by the angle ``asin(sqrt(drift))``;
+        - the part by the relative error of s;
         - for a further light, the change by the error of q.
 
         Parameters

@@ -24,8 +24,8 @@ class RecurrenceUnit(wiring.Component):
     `Recurrence`, the bit-accurate model, has forms, formats and the error bound. Both cosines share the
     register of the coefficient and the counter, which marks the last pixel of a span.
 
-    With ``interleave`` 1 every pixel depends on the pixel before it. So the registers of the loop cannot hold
-    other pixels meanwhile. ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift, sums),
+    With ``interleave`` 1 every pixel depends on the pixel before it. So the registers of the loop hold one
+    pixel at a time. ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift, sums),
     ``direct`` every 3 (product, sum, saturation). After a span of m pixels the next is accepted
     ``4 (m - 1) + 1`` (``3 (m - 1) + 1``) cycles later.
 

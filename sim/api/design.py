@@ -34,7 +34,7 @@ def design(
     lights, materials : int
         Numbers of lights and materials that it serves: 1 to 16 and 1 to 1024.
     factors : int
-        Number of lights that fade by distance or as spots; these come first. ``chord-local`` only.
+        How many of the first lights fade, by distance or as spots. ``chord-local`` only.
     method : str
         Method of interpolation along a span: one of `METHODS`; by default see `default_method`.
     model : str
@@ -46,7 +46,7 @@ def design(
     setup_interval : int
         Minimum cycles from one span to the next, for methods with this choice.
     style : {"throughput", "compact"}
-        One pixel a cycle, or few multipliers.
+        ``throughput``: one pixel a cycle. ``compact``: few multipliers.
 
     Raises
     ------

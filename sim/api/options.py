@@ -205,7 +205,7 @@ SCENE: dict[str, Option] = {
     "triangles": Option(
         Whole(MIN_TRIANGLES, MAX_TRIANGLES),
         DEFAULT_TRIANGLES,
-        "Approximate number, for the teapot.",
+        "Approximate number of triangles of the teapot.",
         "mesh.triangles",
     ),
     "crease": Option(
@@ -217,7 +217,7 @@ SCENE: dict[str, Option] = {
     "materials": Option(
         Choice("source of materials", ("file", "one")),
         "file",
-        "file: colours of the mesh file, where it has some and no option gives them. one: of options only.",
+        "file: colours of the mesh file, unless an option gives them. one: one material, of options only.",
         "mesh.materials",
     ),
     "projection": Option(
@@ -288,8 +288,8 @@ SCENE: dict[str, Option] = {
             "give an axis other than 0, a larger outer angle, colours and coefficients of 0 or more",
         ),
         None,
-        "Point light that shines along DX,DY,DZ: in full up to INNER degrees from this direction, not at "
-        "all from OUTER degrees on.",
+        "Point light that shines along DX,DY,DZ: full light up to INNER degrees from this direction, none "
+        "beyond OUTER degrees.",
     ),
     "ambient": Option(Color(), (0.08, 0.05, 0.03), "Ambient reflection k_a.", "material.ambient"),
     "diffuse": Option(Color(), (0.75, 0.42, 0.2), "Diffuse reflection k_d.", "material.diffuse"),
@@ -321,7 +321,8 @@ DESIGN: dict[str, Option] = {
     "model": Option(
         ReflectionOption(),
         "blinn",
-        "Reflection model. Every method serves it; only phong needs quotient. FILE.csv: a curve of N.H.",
+        "Reflection model. Every method serves every model, but phong needs quotient. FILE.csv: a curve of "
+        "N.H.",
         "pipeline.model",
     ),
     "operand": Option(
@@ -344,7 +345,10 @@ DESIGN: dict[str, Option] = {
         "pipeline.setup_interval",
     ),
     "style": Option(
-        Choice("style", STYLES), "throughput", "One pixel a cycle, or few multipliers.", "pipeline.style"
+        Choice("style", STYLES),
+        "throughput",
+        "throughput: one pixel a cycle. compact: few multipliers.",
+        "pipeline.style",
     ),
 }
 """Options of a design, but for its counts; ``setup_interval`` and ``style`` are fields of `Build`."""
@@ -355,7 +359,7 @@ COUNTS: dict[str, Option] = {
     "factors": Option(
         Whole(0, MAX_LIGHTS),
         0,
-        "Number of lights that fade by distance or as spots; these come first. Needs --method chord-local.",
+        "How many of the first lights fade, by distance or as spots. Needs --method chord-local.",
     ),
 }
 """Counts of a design, for commands without a scene; a scene gives its own."""
@@ -413,13 +417,13 @@ RENDERING: dict[str, Option] = {
     "specialise": Option(
         Truth(),
         False,
-        "Build only what the scene needs, print what is left out, and compare with the full pipeline.",
+        "Build only the parts that the scene needs, list the others, and compare with the full pipeline.",
         "pipeline.specialise",
     ),
     "short_words": Option(
         Truth(),
         False,
-        "With --specialise: also shorten words where the error bound stays. Pixels may change by one LSB.",
+        "With --specialise: also shorten words if the error bound stays. Pixels may change by one LSB.",
         "pipeline.short_words",
     ),
 }
