@@ -194,7 +194,7 @@ class VertexSortUnit(wiring.Component):
         with m.If(step == 3):
             m.d.sync += [covered.eq(Cat(inside).all()), digits.eq(_largest_digits(self.grid))]
             for count in reversed(range(3, _largest_digits(self.grid))):
-                with m.If(_are_few(rows, count, self.grid)):
+                with m.If(rows < _rows_of(count, self.grid)):
                     m.d.sync += digits.eq(count)
 
     def _area(self, m, corners, tag, odd, digits, leaves, free, ends) -> tuple[Value, Value]:
@@ -314,10 +314,6 @@ def _largest_digits(grid: Grid) -> int:
     return -(-(grid.bits + 1) // DIGIT_BITS)
 
 
-def _are_few(rows: Value, digits: int, grid: Grid) -> Value:
-    """Whether a height of so many scanlines, 0 or more, needs no more than ``digits`` digits.
-
-    They are under ``2^k - 1``. This is found by bits, because a comparison is a chain of carries.
-    """
-    k = DIGIT_BITS * digits - 1 - grid.subpixel_bits
-    return ~(rows[k:].any() | rows[:k].all())
+def _rows_of(digits: int, grid: Grid) -> int:
+    """Least number of scanlines for which a height may need more than ``digits`` digits."""
+    return (1 << (DIGIT_BITS * digits - 1 - grid.subpixel_bits)) - 1
