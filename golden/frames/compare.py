@@ -325,7 +325,7 @@ def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndar
     return mask.reshape(scene.height, scene.width)
 
 
-# Fragments looked at at once; bounds the memory.
+# Number of fragments processed together; it limits the memory.
 _CHUNK = 1 << 15
 
 
@@ -433,7 +433,7 @@ def _compare(
 
 
 def _errors(image: np.ndarray, exact: np.ndarray, border: np.ndarray) -> FrameErrors:
-    """Errors of pixels against those of a frame in [0, 1]; ``border``: which are at the border of a light."""
+    """Errors of an image against a frame in [0, 1]; ``border`` marks the pixels at the border of a light."""
     parts = (
         error_figures(image[of], exact[of], scale=255).max_lsb if of.any() else 0.0
         for of in (~border, border)

@@ -70,12 +70,12 @@ class HighlightOperand:
 
     @property
     def parts(self) -> int:
-        """Of a unit with a table: number of tables one after the other, each of another argument."""
+        """Number of tables in a row, each of another argument, for a unit with tables."""
         return 1
 
     @property
     def argument_text(self) -> str:
-        """Of a unit with a table: what the argument of the first one is."""
+        """Argument of the first table, as a text, for a unit with tables."""
         return "u = 1 - N.H"
 
     @property

@@ -219,7 +219,7 @@ class Interpolator(ABC):
         return None
 
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
-        """Lines that tell the user of a pipeline what a span brings, for a header of Verilog.
+        """Lines for the header of the Verilog: they tell a user the contents of a span.
 
         Parameters
         ----------

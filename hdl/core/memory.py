@@ -206,7 +206,7 @@ def connect_late_fifo(
     level = Signal(range(depth + 1), name=f"{name}_level")
     # What the level does not count; whether one payload waits in the memory, and whether more do.
     came, gone, one, more = (Signal(name=f"{name}_{word}") for word in ("came", "gone", "one", "more"))
-    # Whether the memory's word, and the one behind it, are valid.
+    # Whether the memory's word is valid, and whether the word behind it is valid.
     read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
     address, reads = Signal((depth - 1).bit_length(), name=f"{name}_address"), Signal(name=f"{name}_reads")
     m.submodules[name] = memory = Memory(shape=width, depth=1 << len(address), init=[])

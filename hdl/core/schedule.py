@@ -223,7 +223,7 @@ def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
             if left == 0:
                 yield ()
             return
-        # Each other run takes one use at least, and as many as the interval at most.
+        # Each other run takes at least one use, and at most `interval` uses.
         for size in range(min(interval, left - count + 1), max(1, left - interval * (count - 1)) - 1, -1):
             for rest in parts(left - size, count - 1):
                 yield size, *rest

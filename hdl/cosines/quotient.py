@@ -112,7 +112,7 @@ class QuotientUnit(PipelinedUnit):
         return g.register(name, lambda x, y: x * y, a, b)
 
     def _describe(self) -> dict[str, Word]:
-        """Words from those of a pixel to the results."""
+        """All words, from the words of a pixel to the results."""
         p, g, spans = self.model, self._graph, self.model.spans
         rest = g.input("rest", lambda operands: operands.rest, "w")
         span = g.input("span", lambda operands: operands.span)
@@ -172,7 +172,7 @@ class QuotientUnit(PipelinedUnit):
         return results | {name: marks[name] for name in ("span", "out_of_range")}
 
     def _root(self, normal: Word) -> Word:
-        """Word of r, from that of q shifted."""
+        """Word of r, from the shifted word of q."""
         p, g = self.model, self._graph
         bits = p.BASE_FORMAT.width + p.SLOPE_FORMAT.width
         fraction_bits = 21 - p.TABLE_BITS

@@ -449,7 +449,7 @@ class QuotientSpansUnit(wiring.Component):
 
     def _take(self, m: Module, advance: Value, takes: Any, waits: Any, start: stream.Interface) -> None:
         """Take words where the span before needs its own no more; count pixels."""
-        # Whether at most one, two, three pixels of a span are left, the one on the output among them.
+        # Whether at most one, two, three pixels of a span are left, counting the pixel on the output.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
         left, valid = Signal(self.length_bits, name="left"), Signal(name="valid")
         # Whether the second, the first differences of the next span were taken, and whether they may be.

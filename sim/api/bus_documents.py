@@ -53,7 +53,7 @@ def frame_text(core: ShadingPipelineUnit | RendererUnit | GeometryUnit) -> str:
 
 
 def _values(unit: BusUnit, field: Field) -> str:
-    """Number format of a field, and what its vector is."""
+    """Number format of a field, and the meaning of its vector."""
     frame = frame_text(unit.framing.core)
     return f"{field.values}; N/W {frame}" if field.name in _IN_FRAME and frame else field.values
 

@@ -282,7 +282,7 @@ def prepared(
     vcd: str | os.PathLike[str] | None = None,
     frames: int = 0,
 ) -> Rendering:
-    """`prepare_rendering` of what a caller gives, see `render`; ``frames`` of a turntable."""
+    """`prepare_rendering` from the arguments of `render`; ``frames`` is the length of a turntable."""
     if design is not None:
         for name in DESIGN.keys() & options.keys():
             raise OptionError(name, "", "the design has its own", "leave out one of them")

@@ -67,7 +67,7 @@ def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
     if lobe.parts == 2:
         half = lobe.entries // 2
         parts = [
-            f"  these are {half} values; then as many values of it over c = (N.H)^2 in place of s, "
+            f"  these are {half} values; then {half} values of S as a function of c = (N.H)^2 in place of s, "
             "from c = 0 on; last c = 1"
         ]
     return [
