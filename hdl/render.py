@@ -306,7 +306,9 @@ class RendererUnit(wiring.Component):
         answers = stream.Signature(1).create(path=("answers",))
         connect_late_fifo(m, "answers", coarse.o, answers, WAITING_SPANS)
         m.d.comb += [
-            *copy_fields(place, span.payload, ("x", "y", "length", "depth", "depth_step")),
+            # A design may have fewer bits of a place than geometry.
+            *(place[name].eq(span.payload[name]) for name in ("x", "y", "length")),
+            *copy_fields(place, span.payload, ("depth", "depth_step")),
             place.picture.eq(number ^ turns),
             coarse.i.valid.eq(span.valid & taken),
             room.eq(coarse.i.ready),

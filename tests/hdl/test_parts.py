@@ -13,8 +13,10 @@ import pytest
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.quotient import Quotient
 from blysk.golden.cosines.quotient_spans import QuotientSpans
+from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.difference_setup import DifferenceSetup
+from blysk.golden.presets import preset
 from blysk.hdl.cosines.angular_setup import AngularSetupUnit
 from blysk.hdl.cosines.arccos import ArccosUnit
 from blysk.hdl.cosines.chord_setup import ChordSetupUnit
@@ -46,6 +48,7 @@ class Stated(NamedTuple):
     rom_bits: int | None = None
 
 
+GATE = QuadraticInterpolator().gate(preset("quadratic", "cosquad").specular)
 TO_45, LINE_TO_45, PUBLISHED = Bisection(2, 45), Bisection(1, 45), DifferenceSetup(as_published=True)
 STATED = {
     "angular setup, half chord": Stated(
@@ -81,7 +84,7 @@ STATED = {
     ),
     "line setup": Stated(LineSetupUnit, 4, None, [9, 5, 3, 3, 2, 2, 2, 2, 1], None, 2048 * 24),
     "highlight gate": Stated(
-        *(HighlightGateUnit, 6, 15, [15, 8, 5, 4, 3, 3, 3, *[2] * 7, 1]),
+        *(partial(HighlightGateUnit, GATE), 6, 15, [15, 8, 5, 4, 3, 3, 3, *[2] * 7, 1]),
         [19, 23, 23, 24, 20, 21, 23, 28, 30, 31, 27, 24, 25, 25, 47],
     ),
 }
