@@ -41,7 +41,7 @@ MODELS = {"f2": "cosquad", "fQ (Q = 0.64)": "cosquad_q", "fQ2": "cosquad_lin"}
 _RELATED = ("cosquad7", "coscos2", "coscos4")
 
 _X = np.linspace(0, 30, 6001)
-"""``n (1 - cos gamma)``. The models depend on it almost alone. Above 30 Blinn's model is under 1e-13."""
+"""``n (1 - cos gamma)``. The models depend on almost nothing else. Above 30 Blinn's model is under 1e-13."""
 
 
 def errors(model: str) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def errors(model: str) -> dict[str, Any]:
         cosine = np.append(1 - _X[exponent >= _X] / exponent, ZONE ** (1 / exponent))
         blinn = cosine**exponent
         error = np.abs(REFLECTION_MODELS[model].reflect(cosine, exponent) - blinn)
-        # The zone's own bound is in it.
+        # The zone includes its bound.
         zone = blinn >= ZONE * (1 - 1e-12)
         found.append((exponent, float(error.max()), float((error[zone] / blinn[zone]).max())))
     shown = np.unique(np.geomspace(2, 1000, 60).astype(int)) - EXPONENTS[0]

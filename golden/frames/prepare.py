@@ -70,7 +70,7 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
     Raises
     ------
     ValueError
-        If the scene has point lights or a near viewer, and the method does not take values. If a light that
+        If the scene has point lights or a near viewer, and the method does not serve them. If a light that
         fades has no factor in the design. If `constants_of` refuses the scene.
     """
     if scene.local and not design.interpolator.serves_local:

@@ -15,10 +15,10 @@ from blysk.hdl.geometry.triangles import first_centre, tag_shape
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
 
 _DIVISORS = (0, "divisor"), (1, "triple")
-"""For k in 0 and 1 the name of a register: a divisor, and three times it with 2 k bits more."""
+"""Numbers k, and registers of 2 k bits more than a divisor: the divisor, and three times the divisor."""
 
 ALONG_BITS = 9
-"""Bits of `Edges.along`, 0 to 511, as in `EdgeSetup` n is 2 only where b is over 0."""
+"""Bits of `Edges.along`. It is 0 to 511, because n of `EdgeSetup` is 2 only where its b is over 0."""
 
 
 def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
@@ -113,7 +113,8 @@ class EdgeSetupUnit(PipelinedUnit):
         loads = [2 + (0 if dividers == 3 else k * turn) for k in range(3)]
         self._ages = [_Ages(load, load + steps + 2, load + steps + 4 + grid.subpixel_bits) for load in loads]
         fraction_read = self._ages[0].start + FRACTION_BITS // bits_per_cycle
-        # What an edge starts from stands for an interval, and is read as its start is loaded.
+        # The words from which an edge's start is computed stay in their registers for one interval. They are
+        # read when the start is loaded.
         least = max(FRACTION_BITS // bits_per_cycle, len(loads) // dividers * turn, self._ages[-1].start - 1)
         interval = least if initiation_interval is None else initiation_interval
         if interval < least:
@@ -137,7 +138,8 @@ class EdgeSetupUnit(PipelinedUnit):
         x, y = ([Value.cast(operands[name][k]) for k in range(3)] for name in "xy")
 
         def keep(value, name, age):
-            # A word stays for an interval from its age on; it is copied until it is there at the latency.
+            # From stage `age` on, a word stays in its register for one interval. It is copied until a copy is
+            # still there at the stage `latency`.
             register = value
             while True:
                 register = self.register(m, register, f"{name}_{age}", when=self.at(age))
@@ -187,7 +189,8 @@ class EdgeSetupUnit(PipelinedUnit):
                 value = Mux(self.at(moment), other, value)
             return value
 
-        # A remainder from -d to d - 1, and a word: dividend bits to come, quotient bits found below them.
+        # A remainder from -d to d - 1, and a word: above, the dividend bits to come; below, the quotient bits
+        # found so far.
         load = [age.divide for age in ages]
         rest, word = Signal(signed(bits + 1), name=f"rest_{number}"), Signal(bits, name=f"word_{number}")
         negative = Signal(name=f"negative_{number}")
@@ -308,7 +311,7 @@ class EdgeSetupUnit(PipelinedUnit):
         The sign of ``rest`` decides between minus and plus. The second step is computed for both signs of the
         first one's result, from ``rest``, with one or three times the divisor. Returns ``rest`` and ``word``.
         """
-        # Of a number without a sign a comparison with 0 would be constant.
+        # For an unsigned number the comparison with 0 would be constant.
         subtract = rest >= 0 if rest.shape().signed else Const(1)
 
         size = len(divisor) + 1
@@ -324,7 +327,8 @@ class EdgeSetupUnit(PipelinedUnit):
         positive = first >= 0
         if self.bits_per_cycle == 1:
             return first, Cat(positive, word[:-1])
-        # If the first result is not negative: minus 3 or plus 1 divisors; if it is: minus 1 or plus 3.
+        # First result not negative: minus 3 divisors if `subtract`, else plus 1. Negative: minus 1 divisor if
+        # `subtract`, else plus 3.
         down, up = added(word[-2:], triple, divisor), added(word[-2:], divisor, triple)
         second = Mux(positive, down, up).as_signed()
         return second, Cat(Mux(positive, down >= 0, up >= 0), positive, word[:-2])

@@ -35,8 +35,8 @@ class SpecularKind(NamedTuple):
     ----------
     unit : callable
         Makes the unit from its bit-accurate model and the options ``initiation_interval``, ``exponent``
-        (fixed at build time, or ``None``) and ``shares_slope`` (for a lobe, its memory). The unit has an
-        attribute ``latency``.
+        (fixed at build time, or ``None``) and ``shares_slope``: whether the slope unit, or the memory of a
+        lobe, is outside. The unit has an attribute ``latency``.
     compact_interval : callable
         Gives the initiation interval at which one multiplier is enough, from the model and the fixed exponent
         or ``None``.
@@ -44,7 +44,7 @@ class SpecularKind(NamedTuple):
         Makes, from the model, the unit of the words that depend on the exponent alone. This unit serves all
         lights. ``None``: no words depend on the exponent alone.
     memory : callable or None
-        Makes, from the model and the number of lights, the memory of their tables. ``None``: no tables.
+        Makes, from the model and the number of lights, the memory of the lights' tables. ``None``: no tables.
     constant : str
         Frame constant that the unit's port ``constants`` reads.
     """
@@ -123,17 +123,18 @@ class LightUnit(wiring.Component):
     diffuse : Diffuse
         Format of ``N . L``.
     initiation_interval : int
-        Cycles from an input to the next, at least 1. With a `Power` it becomes 42 from 42 on, else 1.
+        Cycles from an input to the next, at least 1. With a `Power`, a value of 42 or more becomes 42, and a
+        smaller value becomes 1.
     exponent : int or None
         Exponent that is fixed at build time; see `SpecularUnit`.
     shares_slope : bool
-        Whether slope and boundary come from a `SlopeUnit` outside, or tables from a `LobeMemory` outside.
-        `Power` needs neither.
+        Whether slope and boundary come from a `SlopeUnit` outside. Of a lobe: whether tables come from a
+        `LobeMemory` outside. `Power` needs neither.
     gated : bool
         Whether there is a highlight gate.
     factor : FactorUnit or None
         Unit that multiplies the specular term by the factor of a light that fades. A unit without a factor
-        takes its time alone. ``None``: the light has neither.
+        only delays the terms by the same two cycles. ``None``: the light has neither.
 
     Members
     -------
@@ -240,7 +241,7 @@ class LightUnit(wiring.Component):
         return m
 
     def _apply_factor(self, m: Module) -> stream.Interface:
-        """The factor unit before the output; the stream that it takes the terms from."""
+        """Put the factor unit before the output. Returns the stream from which it takes the terms."""
         m.submodules.factor = factor = self._factor
         connect(m, factor.o, wiring.flipped(self.o))
         if self.fades:
@@ -270,7 +271,7 @@ class LightUnit(wiring.Component):
     ) -> None:
         """Diffuse terms wait for the specular terms of their beats; a dark beat has none."""
         depth = self._depth
-        # A mark waits as long as its term is in the diffuse unit or its FIFO.
+        # For each beat a bit, dark or not, waits as long as its term is in the diffuse unit or its FIFO.
         m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)
         terms = diffuse.o.signature.create(path=("terms",))
         connect_fifo(m, "waiting", diffuse.o, terms, depth)

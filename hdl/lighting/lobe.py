@@ -29,7 +29,7 @@ def lobe_write_shape() -> data.StructLayout:
 
 
 def lobe_read_signature(model: Lobe) -> wiring.Signature:
-    """Read port, which gives the word of an ``address`` two cycles with ``enable`` later.
+    """Read port. It gives the word of an ``address`` after two cycles with ``enable``.
 
     Without ``enable`` the word stays; it may also stay on a cycle that writes to the address.
     """
@@ -51,9 +51,9 @@ class LobeMemory(wiring.Component):
 
     A write is taken on every cycle. The first write of a table, with ``begins``, tells its bank. The values
     follow in order. Each value but the first makes the word of the value before it. This word is in the
-    memory two cycles after the write was taken. Values beyond the end of a table are lost, and all values of
-    a missing bank. An incomplete table keeps the other words of the table before. Reset ends a table, and
-    clears no word. Write a bank only while no unit reads it.
+    memory two cycles after the write was taken. Values beyond the end of a table are lost, and so are all
+    values of a missing bank. An incomplete table keeps the other words of the table before. Reset ends a
+    table, and clears no word. Write a bank only while no unit reads it.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class LobeUnit(PipelinedUnit):
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
         ``N·H`` in ``SQ(4, 34)``, ``1 - N·H`` in ``UQ(1, B)`` or a place in `quotient.place_format`. ``dark``:
-        the beat is dark.
+        the light is behind the surface, or the span has no highlight. The term is then 0.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"bank": ...}))`
@@ -271,7 +271,7 @@ class LobeUnit(PipelinedUnit):
         bits, top = p.fraction_bits, p.fraction_bits - 1
 
         def limited(wide, lit):
-            # Where lit it is under 1.
+            # Where lit, u is under 1.
             return Mux(lit, Value.cast(wide.saturate(p.argument_format))[:bits], 0)[:bits]
 
         def coarse(argument, zeros):

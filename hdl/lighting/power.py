@@ -36,7 +36,8 @@ class PowerUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
-        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``. ``dark``: the beat is dark.
+        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``. ``dark``: the light is behind
+        the surface, or the span has no highlight. The term is then 0.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))`
@@ -118,7 +119,7 @@ class PowerUnit(PipelinedUnit):
         return s
 
     _SUM = UQ(1, 34)
-    """Format of ``p + q - p q``, which is 0 or more and little more than 1, as factors are cut."""
+    """Format of ``p + q - p q``. This is at least 0, and can be slightly above 1, as factors are cut."""
 
     def _products(self, m, p, q, name):
         """``p + q - p q`` two cycles later, registered, and ``p`` at the same stage."""

@@ -135,7 +135,7 @@ class SpecularUnit(PipelinedUnit):
     lyon3         4 9     19 19 23 19 two squares
     exp           2 9     15 14 15 14 64 words of 32 bits and a shift, no square
     coscos2       5 11    20 21 21 21 a product, 128 words of 36 bits, 64 of 33, and chords
-    coscos4       6 12    23 24 25 24 those and a square
+    coscos4       6 12    23 24 25 24 the same and a square
     as published  1 8     11 11 11 11 the slope's multiplier is of 18 by 17 bits, never shared
     ============= = ===== == == == == =====================================================
 
@@ -157,7 +157,8 @@ class SpecularUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"operand": ..., "dark": 1})))`
-        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``. ``dark``: the beat is dark.
+        ``cos gamma`` in ``SQ(4, 34)`` or ``1 - cos gamma`` in ``UQ(1, 25)``. ``dark``: the light is behind
+        the surface, or the span has no highlight. The term is then 0.
     o : :py:`Out(stream.Signature(UQ(0, 17)))`
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))` or :py:`In(slope_shape())`

@@ -27,7 +27,8 @@ def _check_testbench(build: Build) -> None:
         raise InputError("--testbench", reason, "leave one out")
     if build.takes_triangles:
         reason = f"its bench sends spans, and the core {build.top} takes triangles"
-        raise InputError("--testbench", reason, "leave one out")
+        remedy = "leave out --testbench, or the option that makes the core take triangles"
+        raise InputError("--testbench", reason, remedy)
 
 
 @click.command()
@@ -36,7 +37,10 @@ def _check_testbench(build: Build) -> None:
 @options_of(BUILD)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
-    "-o", "--output", type=OutputFile(), help="Verilog file.  [default: standard output; --testbench: none]"
+    "-o",
+    "--output",
+    type=OutputFile(),
+    help="Verilog file.  [default: standard output; with --testbench no file]",
 )
 @click.option(
     "--testbench",

@@ -31,7 +31,7 @@ _LENGTH = ONE * COMPONENT.step
 
 
 def _weights(chain, cosine, level, limit):
-    """Weights ``l`` and ``m`` by the polynomials in float64, of the first step if u exceeds the limit."""
+    """Weights ``l`` and ``m`` in float64. Where u exceeds the limit, the first step's polynomial is taken."""
     model, u = chain.bisection, 1 - cosine
     weight_l, weight_m = np.zeros(len(u)), np.ones(len(u))
     for k in range(1, _LEVELS + 1):
@@ -52,7 +52,8 @@ def _measure(rng, count, chain):
     def vectors(of_left, of_right):
         return _LENGTH * (of_left[:, np.newaxis] * a + of_right[:, np.newaxis] * b)
 
-    # The great circle by weights of its own, as the two vectors of codes are not of the same length.
+    # The exact normal gets its own weights for the great circle, because the vectors of codes differ in
+    # length.
     psi = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), dot(a, b))
     part = psi * 2.0**-level
     apart = psi > 0
@@ -61,7 +62,7 @@ def _measure(rng, count, chain):
         np.where(apart, np.sin(psi - part) / sine, 1 - 2.0**-level),
         np.where(apart, np.sin(part) / sine, 2.0**-level),
     )
-    # At the limit between the polynomials rounding decides: the one that the unit took counts.
+    # Near the limit, rounding decides which polynomial the unit takes. The nearer of both results counts.
     limits = model.widest_narrow.values + np.array([-8, 8]) * model.ANGLE_FORMAT.step
     early, late = (
         np.clip(vectors(*_weights(chain, dot(a, b), level, limit)), -1, _LENGTH) for limit in limits
@@ -89,7 +90,7 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles 0, 45, 90 and 180, small angles, to 100 degrees, and ends of words, every level as often."""
+    """Angles 0, 45, 90, 180, small angles, angles up to 100 degrees, ends of words, at all levels alike."""
     angles = np.r_[0, 45, 90, 180, 10.0 ** rng.uniform(-4, 0, count // 4), rng.uniform(0, 100, count)]
     ends = (
         np.vstack([end, word_ends(rng, count // 4, 3)]) for end in code_pairs_at(rng, len(angles), angles)
@@ -107,7 +108,7 @@ def _last_bits(unit, rng, count):
         return (abs((u - (7 << 13) + 20) % (1 << 17) - 20) < 20) & (u < ONE_SQUARED.codes)
 
     first = pairs_chosen(*code_pairs_at(rng, 2000, 90), at_border)
-    # The result of level 1 is the sum of the ends times f: components at the border of their rounding.
+    # The result of level 1 is f times the sum of the ends. Take pairs with a component at the border.
     ends = code_pairs_at(rng, count, rng.uniform(0, 90, count))
     model = unit.model.bisection
     u = (ONE_SQUARED - DotProduct().compute(*component_words(*ends))).round_half_up(20)
@@ -128,7 +129,7 @@ def _variants():
                 partial(_measure, chain=chain),
                 "spans to 90 degrees, levels 1 to 15",
                 beat={"normal_left": AXIS, "normal_right": AXIS, "level": 1},
-                note="times of level 1",
+                note="times for level 1",
                 as_published=model.as_published,
             ),
         )
@@ -137,7 +138,7 @@ def _variants():
 
 RECORD = Record(
     name="bisection_chain",
-    title="Normal at a power of two of a span, by repeated bisection",
+    title="Normal at 1/2^k of a span's angle, by repeated bisection",
     source="docs/theory/interpolation.md#bisection; [T] 2.1",
     variants=dict(_variants()),
     expect=_expect,
@@ -149,8 +150,8 @@ RECORD = Record(
     },
     waivers={
         "weight_l": (
-            "From 0 on, l becomes l/2 + 1 at most, so that it is not negative, less than 2, and never "
-            "saturates."
+            "l starts at 0, and a step gives at most l/2 + 1. So l is never negative, stays below 2, and "
+            "never saturates."
         ),
         "factor": "Operands are read on the cycle after they come; m, a product of factors, is not negative.",
     },
