@@ -8,7 +8,7 @@ __all__ = ["leading_zeros", "select"]
 
 
 def leading_zeros(code: Value) -> Value:
-    """Number of leading zeros, by halves.
+    """Number of leading zeros, found by halves.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def leading_zeros(code: Value) -> Value:
 
 
 def select(words: Sequence[Value], index: Value) -> Value:
-    """Word of an index, by halves; the last word beyond the end. It maps to wide multiplexers.
+    """Word at an index, chosen by halves; beyond the end the last word. This maps to wide multiplexers.
 
     Parameters
     ----------

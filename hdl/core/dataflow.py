@@ -33,7 +33,7 @@ MULTIPLIER_LATENCY = 2
 """Cycles of `registered_product`."""
 
 _LONG, _WIDE = 4, 4
-"""Least cycles that a word waits in a memory, and least bits of the word."""
+"""A word of at least `_WIDE` bits that waits for at least `_LONG` cycles waits in a memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +79,11 @@ class Dataflow:
     interval : int
         Initiation interval of the unit, at least 1.
     spaced : bool
-        Whether beats come at any distance from the interval on, see `PipelinedUnit`.
+        Whether beats may come any number of cycles apart, at least the interval. See `PipelinedUnit`.
     low_latency : bool
         Whether a product takes a single register, two cycles in all.
     memories : bool
-        Whether wide words that wait for long wait in memories of look-up tables, with an interval of 1.
+        Whether wide words with a long delay wait in memories of look-up tables. This needs an interval of 1.
 
     Raises
     ------
@@ -160,8 +160,8 @@ class Dataflow:
         *words : Word
             Operands of the register.
         since : int or Word
-            Earliest stage of the word, or another word with the same stage. A word that is read late needs no
-            copies before.
+            Earliest stage of the word, or another word with the same stage. If a word is made late and read
+            late, it needs no copies.
         formula : str or None
             Formula in drawings. ``None``: the formula read from ``function``.
         """
@@ -204,10 +204,10 @@ class Dataflow:
         operands : callable
             Wiring from the words' values to the operands.
         result : callable
-            Wiring from the functional unit's result to the word's value.
+            Wiring from the result of the functional unit to the value of the word.
         latency : int or None
-            Registers from the operands to this value, if ``result`` reads a register before the last
-            register. ``None``: all registers.
+            Registers from the operands to the value that ``result`` reads, if this is not the last register.
+            ``None``: all registers.
         since : int or Word
             Earliest stage of the word, as for `register`.
         formula : str or None
@@ -385,11 +385,11 @@ class _Build:
         self._issued: dict[tuple[FunctionalUnit, int], list[tuple[Value | None, Sequence[Any]]]] = {}
 
     def when(self, stage: int) -> Value | None:
-        """When a register of a stage is written. It is always, if a beat may come on every cycle."""
+        """When a register of a stage is written. ``None``: always, because a beat may come on every cycle."""
         return self.unit.at(stage) if self.unit.initiation_interval > 1 else None
 
     def at(self, word: Word, stage: int, cycles: int = 1) -> Any:
-        """Value of a word from a stage on, for so many cycles, through copies after its lifetime."""
+        """Value of a word for ``cycles`` cycles from a stage on. After its lifetime the word is copied."""
         copies = self.values[word]
         first = max(start for start in copies if start <= stage)
         if self.graph.memories and stage - first >= _LONG and len(Value.cast(copies[first])) >= _WIDE:

@@ -61,6 +61,6 @@ def dot(
         products.append(product(2))
         return graph.use(sums, f"{name}_total", products, lambda x, y, z: (x + y, z), formula=total)
     partial = graph.register(f"{name}_partial", lambda x, y: x + y, *products)
-    # An operand that waits takes fewer registers than a product.
+    # An operand that waits takes fewer registers than a product that waits.
     last = product(2, since=partial)
     return graph.register(f"{name}_total", lambda x, y: x + y, partial, last, formula=total)

@@ -184,7 +184,7 @@ def _cast(value: Any) -> Formula:
         return Formula(f"{value}")
     if isinstance(value, FixedValue):
         code = value.as_value()
-        # A constant that is read as signed, or as not.
+        # A constant that is read as signed or unsigned.
         code = code.operands[0] if getattr(code, "operator", "") in ("s", "u") else code
         if isinstance(code, Const):
             number = int(value.format.wrap(np.array(code.value))) * value.format.step

@@ -27,7 +27,7 @@ LATE_FIFO_LATENCY = 4
 """Cycles that a payload takes through the empty FIFO of `connect_late_fifo`."""
 
 UNCOUNTED = 3
-"""Payloads that `connect_late_fifo` has taken, before its level counts them."""
+"""Largest number of payloads that `connect_late_fifo` has taken and that its level does not count yet."""
 
 
 def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: int) -> Memory:
@@ -83,7 +83,7 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
     m.d.comb += [first.addr.eq(address), second.addr.eq(following)]
     with m.If(taken):
         m.d.sync += [address.eq(following), following.eq(following + 1)]
-    # Whether a beat leaves is known late: both words are read before.
+    # It is known late whether a beat leaves, so both words are read before.
     m.d.sync += leaves.eq(Mux(taken, second.data, first.data))
     return of_shape(word, leaves)
 
@@ -97,9 +97,9 @@ def registered_read(
 ) -> tuple[Signal, Value]:
     """Word of a memory, two cycles after its address; both registers move by one enable.
 
-    A memory gives its word late in a cycle, the register behind it early. FPGAs differ in the word read on a
-    cycle that writes to the same address. On this cycle the registers stand still. So no logic is needed
-    between the memory and the register.
+    A memory gives its word late in a cycle, and the register behind it gives the word early. FPGAs differ in
+    the word read on a cycle that writes to the same address. On this cycle the registers stand still. So no
+    logic is needed between the memory and the register.
 
     Parameters
     ----------
@@ -140,8 +140,8 @@ def turn_of(m: Module, cycles: int) -> Signal:
 def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Signal:
     """A word some cycles later, from a memory of look-up tables before a register.
 
-    Only cycles on which the module is enabled count. On each the memory is read at an address, and then
-    written there. After a reset words from before the reset come, in any order.
+    Only cycles on which the module is enabled count. On each of them the memory is read at an address, and
+    then written there. After a reset words from before the reset come, in any order.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def connect_late_fifo(
     payload = Signal(width, name=f"{name}_payload", reset_less=True)
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
     level = Signal(range(depth + 1), name=f"{name}_level")
-    # What the level does not count; whether one payload waits in the memory, and whether more do.
+    # ``came``, ``gone``: what the level does not count yet. ``one``, ``more``: how many wait in the memory.
     came, gone, one, more = (Signal(name=f"{name}_{word}") for word in ("came", "gone", "one", "more"))
     # Whether the memory's word is valid, and whether the word behind it is valid.
     read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
@@ -338,7 +338,7 @@ def connect_headed_fifo(
     ]
     m.d.sync += [
         some.eq(fetches | (some & ~sink.ready)),
-        # From registers alone: one payload more may come. The pointers tell of no more than depth - 1.
+        # From registers alone, so one payload more may come. The pointers can count up to depth - 1 payloads.
         room.eq((free - first)[:bits] < depth - 2),
     ]
     with m.If(comes):

@@ -11,8 +11,8 @@ __all__ = ["SteppedMultiplier"]
 class SteppedMultiplier:
     """Multiplier, shared by the steps of a sequence, with registers for its operands and its product.
 
-    One cycle after a step its operands are in their registers, two cycles after it the exact product. Between
-    steps the operands stay.
+    One cycle after a step its operands are in their registers. Two cycles after the step the exact product is
+    in its register. Between steps the operands stay.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from blysk.hdl.core.stream import skid_buffer, stop_output
 __all__ = ["PipelinedUnit"]
 
 _UNGROUPED, _GROUP = 36, 12
-"""Pipelines of more stages than the first reduce their valid bits in groups of the second."""
+"""Pipelines of more than `_UNGROUPED` stages reduce their valid bits in groups of `_GROUP`."""
 
 
 class PipelinedUnit(wiring.Component):
@@ -20,8 +20,9 @@ class PipelinedUnit(wiring.Component):
     A beat is on the output ``latency`` cycles after it was accepted. If the output is stalled, the whole unit
     is disabled and holds its payloads (`skid_buffer`). This begins in the cycle after the first refused beat.
     While a beat is inside, the next is accepted a whole multiple of ``initiation_interval`` enabled cycles
-    after it. In a *spaced* unit it is accepted any number of enabled cycles from ``initiation_interval`` on.
-    ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset empties the unit.
+    after it. In a *spaced* unit the number of enabled cycles is any number, at least
+    ``initiation_interval``. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset empties
+    the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
     from the *stage* of a beat: `at` tells whether a beat was accepted a number of enabled cycles ago.
@@ -38,7 +39,7 @@ class PipelinedUnit(wiring.Component):
     constants : ShapeLike or None
         Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     spaced : bool
-        Whether the next beat may come at any distance from ``initiation_interval`` on.
+        Whether the next beat may come any number of cycles later, at least ``initiation_interval``.
     ports : mapping of str to Member, optional
         Further members, by name.
     skid : bool
@@ -103,7 +104,7 @@ class PipelinedUnit(wiring.Component):
 
     @staticmethod
     def register(m: Module, value, name: str, *, when: Value | None = None):
-        """A register that takes ``value`` on every enabled cycle, or only while ``when`` is high, too.
+        """A register that takes ``value`` on every enabled cycle. With ``when``, only while this is high.
 
         It holds data and has no reset; `at` tells which data counts. A multiplier's own registers can take
         its place.
@@ -161,7 +162,7 @@ class PipelinedUnit(wiring.Component):
         return ready
 
     def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
-        """Whether a beat may come, as shared parts serve beats of several stages in fixed slots.
+        """Whether a beat may come. Shared parts serve beats of several stages in fixed slots.
 
         A register, computed a cycle ahead.
         """
@@ -170,7 +171,7 @@ class PipelinedUnit(wiring.Component):
         stays, opens = Signal(name="stays"), Signal(name="opens")
         inside = Cat(accept, self._stages)[: self.latency - 1]
         if self.latency > _UNGROUPED:
-            # By parts, each of which is worked out from the stages before its own.
+            # In parts. Each is computed a cycle ahead, from the stages that come before its own.
             parts = [Signal(name=f"inside_{k}") for k in range(-(-(self.latency - 3) // _GROUP))]
             with m.If(advance):
                 m.d.sync += [

@@ -7,8 +7,8 @@ The scheduler guarantees, for every schedule:
 
 - An operation reads its operands when all of them are there, and not before its ``since``.
 - Two uses of an instance of a functional unit never meet, in any two beats that the interval allows.
-- A functional unit has as few instances as the interval allows, ``ceil(uses / interval)``. If beats come at
-  any distance and operations depend on each other, it has as few as the search finds.
+- A functional unit has as few instances as the interval allows, ``ceil(uses / interval)``. In a spaced
+  schedule of operations that depend on each other, it has as few as the search finds.
 - The same operations in the same order give the same schedule.
 
 Source: docs/theory/scheduling.md.
@@ -22,7 +22,7 @@ from math import prod
 __all__ = ["Operation", "Placement", "Schedule", "place"]
 
 _MOST_SEARCHED = 500
-"""Largest number of ways to share instances that are tried, for beats at any distance."""
+"""Largest number of ways to share instances that are tried, in a spaced schedule."""
 
 
 @dataclass(eq=False)
@@ -36,16 +36,16 @@ class Operation:
     operands : tuple of Operation
         Operations whose results it reads, all on the same cycle.
     latency : int
-        Cycles from this cycle to the first cycle on which its result can be read. 0 for wiring.
+        Cycles from the read of the operands to the first cycle on which the result can be read. 0 for wiring.
     lifetime : int or None
         Cycles on which the result can be read, before the next beat's result replaces it. ``None`` for
         wiring: the lifetime of its operand.
     resource : hashable or None
-        Functional unit that serves it, equal instances of hardware that its uses share. ``None``: hardware of
+        Functional unit that serves it: equal instances of hardware, shared by its uses. ``None``: hardware of
         its own.
     since : int or Operation
-        Earliest stage of the result, as a number, or as the stage of another operation's result. A result
-        that is read late needs no copies before.
+        Earliest stage of the result, as a number, or as the stage of another operation's result. If a result
+        is made late and read late, it needs no copies.
     """
 
     name: str
@@ -101,8 +101,8 @@ def place(operations: Sequence[Operation], interval: int, spaced: bool = False) 
     """Place each operation at the earliest stage with its operands and a free slot.
 
     Beats come a whole multiple of the interval apart, so an instance has as many slots as the interval has
-    cycles. In a *spaced* schedule beats come at any distance from the interval on. The uses of an instance
-    then lie within as many stages as the interval has cycles.
+    cycles. In a *spaced* schedule beats come any number of cycles apart, at least the interval. The uses of
+    an instance then lie within as many stages as the interval has cycles.
 
     Then operations with hardware of their own move to the latest stage that needs no copy of their operands.
     They can move if other operations read the same operands later.
@@ -114,7 +114,7 @@ def place(operations: Sequence[Operation], interval: int, spaced: bool = False) 
     interval : int
         Initiation interval, at least 1.
     spaced : bool
-        Whether beats come at any distance from the interval on.
+        Whether beats may come any number of cycles apart, at least the interval.
 
     Returns
     -------
@@ -182,7 +182,7 @@ def _size(schedule: Schedule) -> tuple[int, int]:
 def _shared(
     operations: Sequence[Operation], interval: int, resources: Sequence[Hashable]
 ) -> Iterator[Schedule]:
-    """Schedules for beats at any distance with few instances; empty if there are too many ways.
+    """Spaced schedules with few instances. There are none if there are too many ways to search.
 
     The uses of a functional unit, sorted by their earliest stage, are divided into runs of neighbours. Each
     run has an instance; its first uses wait until all uses of the run lie within the interval.

@@ -1,4 +1,4 @@
-"""Streams behind one register: half the registers of a slice, at half its rate or with a path of ready."""
+"""Streams behind one register. Half the registers of a slice, at half the rate or with a path of ready."""
 
 from amaranth.hdl import Module, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream

@@ -131,7 +131,7 @@ def of_shape(like, bits: Value):
     Returns
     -------
     ValueLike
-        The bits in the shape of ``like``; as they are where this has a plain shape.
+        The bits in the shape of ``like``. If this is a plain shape, the bits unchanged.
     """
     shape = like.shape()
     return shape(bits) if isinstance(shape, ShapeCastable) else bits

@@ -81,9 +81,9 @@ class ChordSetupUnit(PipelinedUnit):
 
     A span has one product for its step, 3 for each u (with highlights), 2 for each f and 2 for each factor.
     They share multipliers of 18x18 bits, 2 for one light and an initiation interval of 3. The attribute
-    ``multipliers`` is their number. Beats come at any distance from the interval on. A table of
-    ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The attribute ``latency`` depends on how
-    the products share the multipliers.
+    ``multipliers`` is their number. Beats may come any number of cycles apart, at least the interval. A table
+    of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The attribute ``latency`` depends on
+    how the products share the multipliers.
 
     Parameters
     ----------

@@ -12,9 +12,9 @@ class DiffuseUnit(PipelinedUnit):
     """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated. `Diffuse` is the bit-accurate model.
 
     The latency is ``latency`` cycles: one for rounding, one for saturation, and a delay for the rest. If the
-    initiation interval is over 1, one more cycle takes the operand in. So the term leaves together with the
-    term of a longer unit beside it. If the interval is 1, the delay is a memory of look-up tables. Else it is
-    a register for each interval. The unit has no multipliers.
+    initiation interval is over 1, one more cycle takes the operand in. With the delay the term leaves
+    together with the term of a longer unit beside this unit. If the interval is 1, the delay is a memory of
+    look-up tables. Else it is a register for each interval. The unit has no multipliers.
 
     Parameters
     ----------

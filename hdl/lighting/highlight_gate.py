@@ -180,7 +180,7 @@ class HighlightGateUnit(PipelinedUnit):
             partial,
             multiply("a_b", a, b, since=partial),
         )
-        # A slack of 0 need not be told: the square below reaches it.
+        # A slack of 0 needs no flag: the square below reaches 0 in any case.
         exceeded = g.register(f"exceeded_{index}", lambda w: w[-1], total)
         slack = g.register(f"slack_{index}", lambda w: w[f + 2 :][:f], total)
 

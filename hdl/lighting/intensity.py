@@ -48,7 +48,7 @@ def _constants_shape(model: Intensity) -> data.StructLayout:
 
 
 class IntensityUnit(PipelinedUnit):
-    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, saturated to 255, rounded half up.
+    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, saturated to 255.
 
     Formats and error are those of the bit-accurate model `Intensity`. The sum grows by a bit at each level of
     the adder tree, so nothing wraps.
@@ -56,8 +56,8 @@ class IntensityUnit(PipelinedUnit):
     The latency is ``5 + ceil(log2(2 lights + 1))`` cycles (terms, factors, products, adder tree, rounding,
     saturation). The initiation interval is 1. Each multiplier has registers of its own for its operands and
     its product, as in `registered_product`. There are six multipliers of 17 by 17 bits for each light.
-    Without specular terms there are three for each light, and ``lights`` stands for ``2 lights`` in the
-    latency. With one channel there is a third of the multipliers.
+    Without specular terms there are three for each light, and the latency has ``lights`` in place of
+    ``2 lights``. With one channel there is a third of the multipliers.
 
     Parameters
     ----------
@@ -245,10 +245,11 @@ class CompactIntensityUnit(wiring.Component):
         busy, first = Signal(name="busy"), Signal(name="first", init=1)
         channel, accept = Signal(2, name="channel"), Signal(name="accept")
 
-        # The lowest term that is left is multiplied; a channel without any takes a cycle, too.
+        # The lowest term that is left is multiplied. A channel without terms takes a cycle, too.
         chosen, rest = Signal(len(terms), name="chosen"), Signal(len(terms), name="rest")
         ends_channel, ends_pixel = Signal(name="ends_channel"), Signal(name="ends_pixel")
-        # Not busy, or on the pixel's last cycle; and the output moves: registers, worked out a cycle ahead.
+        # ``free``: not busy, or on a pixel's last cycle. ``ready``: the output moves, too. Both are known a
+        # cycle ahead.
         free, ready = (Signal(name=name, init=1) for name in ("free", "ready"))
         following = Signal(name="following")
         m.d.sync += [free.eq(following), ready.eq(following & ~(self.o.valid & ~self.o.ready))]

@@ -85,7 +85,7 @@ class SlopeUnit(wiring.Component):
             a, b = (FixedValue.constant(term.format, term.values.item()) for term in p.slope_terms)
             code = Signal(p.SLOPE_FORMAT.width, name="slope_word", reset_less=True)
             m.d.sync += code.eq(((a * exponent).truncate(18) + b).wrap(p.SLOPE_FORMAT).as_value())
-        # Without reset a multiplier's own register can take the place of the scale.
+        # Without a reset, a multiplier's own register can take the place of this register.
         scale = Signal(FixedShape(p.SCALE_FORMAT), name="scale", reset_less=True)
         shift = Signal(_SHIFT_BITS, name="shift", reset_less=True)
         for s in range(-1, 10):
@@ -121,11 +121,11 @@ class SpecularUnit(PipelinedUnit):
     has the argument 0. So from one dark beat to the next only the input and the first register toggle.
 
     With an initiation interval I of 1 the latency is 7 cycles (difference from 1, saturation, shift,
-    saturation, product, base, square). Each of M products has a multiplier of 17 by 17 bits. In the chords of
-    ``coscos`` it has 17 by 11 and 14 by 11 bits, in the chords of ``exp`` 13 by 11. With a longer interval
-    the products share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles more, for
-    its operands and the registers around the multiplier (`registered_product`), and the cycles until its
-    slot.
+    saturation, product, base, square). Each of M products has a multiplier of 17 by 17 bits. Multipliers of
+    the chords have 17 by 11 and 14 by 11 bits for ``coscos``, and 13 by 11 for ``exp``. With a longer
+    interval the products share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles
+    more, for its operands and the registers around the multiplier (`registered_product`), and the cycles
+    until its slot.
 
     ============= = ===== == == == == =====================================================
     model         M I = 1 2  3  4  6  beside slope and square
