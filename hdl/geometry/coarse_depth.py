@@ -33,8 +33,8 @@ class CoarseDepthUnit(wiring.Component):
 
     A span takes a cycle for each of its blocks. The answer for a span of one block is on the output 8 cycles
     after the span was taken in. The word of a block is read, compared and written. Words of the last three
-    blocks, which the memory does not have yet, are forwarded. Products with a number of pixels are sums of
-    shifts, without multipliers.
+    blocks are not in the memory yet, and are forwarded. Products with a number of pixels are sums of shifts,
+    without multipliers.
 
     A span with another ``picture`` than the span before begins the next picture. It waits until all words of
     the spans before it are written, and `CoarseDepth.swept` words are cleared, one a cycle. After a reset
@@ -46,7 +46,7 @@ class CoarseDepthUnit(wiring.Component):
     model : CoarseDepth
         Bit-accurate model.
     x_bits, y_bits : int
-        Bits of a column, or a length, and of a scanline.
+        Bits of a column (and of a length), and of a scanline.
 
     Members
     -------
@@ -266,7 +266,7 @@ class CoarseDepthUnit(wiring.Component):
                 *copy_fields(ends, steps, (*common, "falls", "outside")),
                 *(ends[name].eq(steps.depth + steps[name]) for name in both),
                 *copy_fields(bound, ends, common),
-                # Never behind a bound, and never before it: what is there stays.
+                # A span outside is never behind a bound and never in front of it, so words stay as they are.
                 bound.lo.eq(Mux(ends.outside, 0, self._upper(Mux(ends.falls, ends.far, ends.near)))),
                 bound.hi.eq(
                     Mux(ends.outside, given.deepest, self._upper(Mux(ends.falls, ends.near, ends.far)))

@@ -45,7 +45,7 @@ def picture_shape(x_bits: int, y_bits: int) -> data.StructLayout:
 
 
 def is_inside(place: data.View, size: tuple[int, int]) -> Value:
-    """Whether a place is in a picture; a side that all codes of a coordinate are in needs no comparison."""
+    """Whether a place is in a picture. A side that is beyond all codes needs no comparison."""
     sides = [
         place[name] < side for name, side in zip("xy", size, strict=True) if side >> len(place[name]) == 0
     ]
@@ -57,7 +57,7 @@ class DepthMemory(wiring.Signature):
 
     If the same place is read and written on the same cycle, the read gets the old word. ``read_data`` keeps
     its value while ``read_enable`` is low. Before each picture every word is `DepthTester.CLEARED`. A
-    `DepthTesterUnit` that clears writes these words, else the owner of the memory.
+    `DepthTesterUnit` that clears writes these words. Else the owner of the memory writes them.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class DepthTesterUnit(wiring.Component):
             there = Signal.like(port.read_data, name="there")
             with m.If(advance):
                 m.d.sync += there.eq(port.read_data)
-        # Compared before it is known which depth counts: the memory's word comes late.
+        # The memory's word comes late, so it is compared before it is known which depth counts.
         m.d.comb += [nearer.eq(judged.depth < there), drawn.eq(valid[last - 1] & nearer)]
         # Whether places are the same is known a cycle before.
         nexts = [judged, *(pixel for _, pixel in late[:-1])]
@@ -217,7 +217,7 @@ class DepthTesterUnit(wiring.Component):
             *copy_fields(port.write_place, stages[last], "xy"),
         ]
         if self.clears:
-            # Nor is a pixel left with which those of the next picture would be compared.
+            # Empty means also: no pixel is left with which pixels of the next picture would be compared.
             empty = ~Cat(valid, *(written for written, _ in late)).any()
             m.d.comb += held.eq(self._clear(m, empty))
         m.d.sync += missed.eq(advance & valid[last - 1] & ~drawn)
@@ -225,12 +225,12 @@ class DepthTesterUnit(wiring.Component):
         return m
 
     def _clear(self, m: Module, empty: Value) -> Value:
-        """Write to every place of a picture before its first pixel; whether pixels are held back."""
+        """Write to every place of a picture before its first pixel. Returns whether pixels are held back."""
         picture, port = self.picture, self._port
         before, stale, sweeps = Signal(name="number"), Signal(name="stale", init=1), Signal(name="sweeps")
         place = Signal(port.write_place.shape(), name="place")
         turns = picture.number != before
-        # A picture that is larger than the coordinates would have no last place.
+        # In a picture larger than the coordinates, the largest coordinate is the last place.
         ends = {
             name: place[name].all() | (place[name] + 1 >= picture[size])
             for name, size in (("x", "width"), ("y", "height"))

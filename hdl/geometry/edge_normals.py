@@ -105,7 +105,8 @@ class EdgeNormalsUnit(wiring.Component):
         ]
         begins = moves & ~turn
         if self.compact:
-            # A cycle later: the piece stays for another cycle at least, and the next one begins later still.
+            # A cycle later. The piece stays for at least one more cycle, and the next piece begins after
+            # that.
             begun = Signal(name="begun")
             m.d.sync += begun.eq(begins)
             begins = begun
@@ -121,7 +122,7 @@ class EdgeNormalsUnit(wiring.Component):
                 m.d.sync += busy.eq(~last)
 
     def _collect(self, m: Module, normaliser, words, rest) -> Value:
-        """Collect normals, with lost ones replaced; whether one is replaced on this cycle."""
+        """Collect normals, and replace lost normals. Returns whether a normal is replaced on this cycle."""
         valid, result = Signal(name="valid"), Signal(self.o.payload.shape(), name="result")
         good = Signal(normal_shape(), name="good", init=_init())
         left = Signal(normal_shape(), name="left_normal")

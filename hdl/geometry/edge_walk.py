@@ -112,7 +112,7 @@ class EdgeWalkUnit(wiring.Component):
         flat = triangle.flat
         short = self._edge(m, "short", last, [(flat, 2), (~flat, 1)], advance, low_is_next, lower)
 
-        # Scanlines left in the triangle, and left in the picture: the walk ends with the smaller number.
+        # Scanlines left in the triangle, and left in the picture. The walk ends with the smaller number.
         total = (triangle.upper + triangle.lower - 2).as_signed()
         inside = self.constants.bottom - triangle.first - 2
         with m.If(advance):

@@ -113,7 +113,7 @@ class _TriangleSetup(wiring.Component):
         for to in (edges.i.payload, serialiser.i.payload):
             m.d.comb += copy_fields(to, drawn.payload)
 
-        # Largest number of triangles whose edges wait for their planes.
+        # Largest number of triangles whose edges wait for their planes at once.
         delay = planes.latency + self._gradients.latency + ATTRIBUTES * self._gradients.initiation_interval
         inside = delay // self.interval + 3
         corners, walks = _between("corners", planes.i), _between("walk", self.walks)
@@ -285,8 +285,8 @@ class GeometryUnit(wiring.Component):
             connect(m, drawn, lanes[0].i)
             return lanes[0].walks, lanes[0].planes
         turn = _turns(m, "lane", drawn, len(lanes))
-        # A triangle waits before each lane. Dealt straight into them, two lanes that accept on the same
-        # cycles would take turns there, at the rate of one.
+        # A triangle waits before each lane. Without these registers, two lanes that accept on the same cycles
+        # would together have the rate of one lane.
         dealt = [_between(f"dealt_{k}", drawn) for k in range(len(lanes))]
         for k, (to, lane) in enumerate(zip(dealt, lanes, strict=True)):
             m.d.comb += [to.payload.eq(drawn.payload), to.valid.eq(drawn.valid & (turn == k))]
@@ -373,7 +373,7 @@ def _between(name: str, port: stream.Interface) -> stream.Interface:
 
 
 def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int = 1) -> Signal:
-    """Index of the lane whose turn it is; the next one's after ``each`` payloads, a power of two."""
+    """Index of the lane whose turn it is. The next lane follows after ``each`` payloads, a power of two."""
     passed = Signal(range(count * each), name=f"turn_of_{name}")
     with m.If(moving.valid & moving.ready):
         m.d.sync += passed.eq(passed + 1)
@@ -381,7 +381,7 @@ def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int
 
 
 def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: stream.Interface) -> None:
-    """Two streams take a payload on the same cycle; its fields are connected by the caller."""
+    """Two streams take a payload on the same cycle. The caller connects the fields."""
     m.d.comb += [
         first.valid.eq(source.valid & second.ready),
         second.valid.eq(source.valid & first.ready),

@@ -86,7 +86,8 @@ class LightAdapterUnit(wiring.Component):
         given, made = self.i.payload, self.lights * self.rows
         result = Signal(self.o.payload.shape(), name="result")
         valid, advance = Signal(self.latency - 1, name="valid"), Signal(name="advance")
-        # The unit stands while a result has no place. Results are three cycles apart: a register is enough.
+        # The unit stops while a result has no place. Results are three cycles apart, so one register is
+        # enough.
         offered, waits = Signal(name="offered"), Signal(name="waits")
         output = Signal.like(result, name="output", reset_less=True)
         still = offered & ~self.o.ready
@@ -142,7 +143,7 @@ class LightAdapterUnit(wiring.Component):
                     m.d.sync += light.eq(Mux(ends_all, 1, light + 1))
                     with m.If(ends_all):
                         m.d.sync += of_step.eq(~of_step)
-            # So many bits tell consecutive numbers apart.
+            # As many low bits of a light's number as tell the lights apart.
             place = Cat(axis, row, light[: (self.lights - 1).bit_length()])
             code = self._axes(m, "axes", place, of_axes & (of_light > 0) & (of_light <= self.lights))
             vector = register(Mux(of_step, step, start).as_signed(), "vector")
@@ -180,7 +181,7 @@ class LightAdapterUnit(wiring.Component):
         return m
 
     def _axes(self, m: Module, name: str, place: Value, chosen: Value) -> Value:
-        """Code at a place of a memory of axes, of which ``chosen`` tells whether a write is for it."""
+        """Code at a place of a memory of axes. ``chosen`` tells whether a write is for this memory."""
         write, width = self.write, LightAdapter.FORMAT.width
         m.submodules[name] = memory = Memory(shape=width, depth=1 << len(place), init=[])
         writes, reads = memory.write_port(), memory.read_port(domain="comb")

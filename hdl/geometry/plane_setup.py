@@ -93,7 +93,8 @@ class PlaneSetupUnit(PipelinedUnit):
             name: g.input(name, lambda o, name=name: o[name]) for name in ("fraction", "down", "along")
         }
 
-        # A word shifted left to its first 1, and the places: bytes that have a 1; whole bytes; the rest.
+        # A word shifted left to its first 1, and the places. Steps: which bytes have a 1; shift by bytes; by
+        # bits.
         def normalise(register, word):
             used = register(Cat(byte.any() for byte in _bytes(word)), "used")
             word = register(word, "given")
@@ -110,7 +111,7 @@ class PlaneSetupUnit(PipelinedUnit):
         shifter = g.share("shifter", (unsigned(bits),), 3, normalise)
         top = g.use(shifter, "height_moved", (height,), lambda h: (Cat(Const(0, grid.bits), h),))
         wide = g.use(shifter, "area_moved", (area,), lambda a: (a,))
-        # The shifter holds its results for one cycle; they are needed for longer.
+        # The shifter holds a result for one cycle only, and the result is needed for longer.
         top, wide = (g.register(f"{w.name}_kept", lambda v: v, w) for w in (top, wide))
 
         def mantissa(view):
@@ -148,7 +149,7 @@ class PlaneSetupUnit(PipelinedUnit):
             kept = Mux(code[point], code[1:], code[:point])
             return FixedValue(p.WIDTH_FORMAT, Mux(sliver, 0, kept)[:point])
 
-        # e is 19 less the places of the height, of a grid of 8 bits, and g is 39 less those of the area.
+        # On a grid of 8 bits, e is 19 less the places of the height, and g is 39 less the places of the area.
         row = g.register("row_shift", lambda top: (8 - s + grid.bits - 1 - top.places)[: p.SHIFT_BITS], top)
         column = g.register(
             "column_shift",
@@ -184,7 +185,7 @@ def _bytes(word: Value) -> list[Value]:
 
 
 def _move(word: Value, step: int, moved: list) -> tuple[Value, list]:
-    """Left by ``step`` places if the first ``step`` bits are 0; ``moved`` takes in whether they are."""
+    """Left by ``step`` places if the first ``step`` bits are 0. ``moved`` gets a bit that tells this."""
     empty = ~word[-step:].any()
     return Mux(empty, (word << step)[: len(word)], word), [*moved, empty]
 

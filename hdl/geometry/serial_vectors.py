@@ -27,8 +27,8 @@ class SerialVectorsUnit(wiring.Component):
 
     The four attributes of a span are in rings that turn by one attribute a cycle.
 
-    1. A span comes in four turns. They also find its shift, and, by the shift of the piece before, whether
-       the span fits. If its own shift differs, four more turns test again.
+    1. A span comes in four turns. They also find its shift, and test with the shift of the piece before
+       whether the span fits. If its own shift differs, four more turns test again.
     2. Four turns find the exponent of the step.
     3. Four turns give the start.
     4. Four turns give the step, while the next span, or the rest of this span, comes in.
@@ -36,9 +36,9 @@ class SerialVectorsUnit(wiring.Component):
     Each component of a vector goes through one shifter, a subtraction, another shifter and a rounding.
 
     A piece takes 13 cycles. Each time that it does not fit it takes six more. Each time that the shift
-    differs from the shift before it takes five more. The words of the next piece begin when this piece was
-    taken. The steps before them go on meanwhile. A span that fits is offered at most `latency` cycles after
-    its last attribute was taken. The unit has no multipliers.
+    differs from the shift before it takes five more. Steps 3 and 4 of the next piece begin when this piece
+    was taken. Steps 1 and 2 go on meanwhile. A span that fits is offered at most `latency` cycles after its
+    last attribute was taken. The unit has no multipliers.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class SerialVectorsUnit(wiring.Component):
         turns, ends, whole = (Signal(name=name) for name in ("turns", "ends", "whole"))
         fits, agrees = Signal(name="fits"), Signal(name="agrees")
         begins, decides, retries = ~place.any(), Signal(name="decides"), Signal(name="retries")
-        # A piece is owed to the output: the words of the next have to wait.
+        # A piece has not left yet, so the words of the next piece have to wait.
         leaving = Signal(name="leaving")
         comes = loads | (steps & Mux(begins, whole & self.i.valid, overlaps))
         m.d.comb += [
@@ -99,7 +99,7 @@ class SerialVectorsUnit(wiring.Component):
         ]
         with m.If(turns):
             m.d.sync += [place.eq(place + 1), overlaps.eq(comes)]
-        # What is left of a span behind a piece comes about while the step goes.
+        # The rest of a span behind a piece is made in the turns that give the step.
         rest_goes = steps & ~whole
         with m.If(ends | settles | retries):
             m.d.sync += [
@@ -112,7 +112,7 @@ class SerialVectorsUnit(wiring.Component):
                 renews.eq(retries),
             ]
 
-        # Of a piece, or of what is left of a span: how its ends follow from those before.
+        # How the ends of a piece, or of the rest of a span, follow from the ends before.
         odd, renewed = Signal(name="odd"), renews | rest_goes
         heads = self._rings(m, turns, comes, renewed, odd, steps)
         tag, pixels, uncut, words = self._pixels(m, comes & ends, retries, steps & ends, (whole, odd))
@@ -136,7 +136,8 @@ class SerialVectorsUnit(wiring.Component):
             for name in ("near", "far", "last", "step")
         }
         near, far, last, step = (ring[0] for ring in rings.values())
-        # Behind a piece the next pixel; else one pixel less, or the mean of both ends.
+        # Behind a piece: the next pixel. After a try that does not fit: one pixel less, or the mean of both
+        # ends.
         other = Mux(leaves, step, Mux(odd, near, ~step))
         total = Signal(_WIDTH + 1, name="total")
         m.d.comb += total.eq(far.as_signed() + other.as_signed() + (~leaves & ~odd))
@@ -184,12 +185,13 @@ class SerialVectorsUnit(wiring.Component):
     def _test(self, m: Module, heads, kinds, place, pixels, results) -> Signal:
         """Whether the piece fits, from the third cycle behind its last component on; returns its shift.
 
-        It was looked at with the shift of the piece before. If its own does not agree it comes again.
+        The test uses the shift of the piece before. If the piece's own shift differs, the piece is tested
+        again.
         """
         (comes, settles), is_component, (fits, agrees) = kinds, ~place.all(), results
         bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
 
-        # Of a word that came on the cycle before.
+        # These belong to a word that came on the cycle before.
         came, first = Signal(name="came"), Signal(name="came_first")
         used, shift = Signal(places, name="used"), Signal(range(places + 1), name="shift")
         rest, chosen = used, []
@@ -205,7 +207,7 @@ class SerialVectorsUnit(wiring.Component):
             m.d.comb += sizes[end].eq(word)
         with m.If(came):
             m.d.sync += used.eq(Mux(first, 0, used) | sizes["near"][bits:] | sizes["far"][bits:])
-        # It stands until the next piece has come.
+        # The shift stays until the next piece has come.
         m.d.comb += agrees.eq(shift == Cat(chosen))
         with m.If(settles):
             m.d.sync += shift.eq(Cat(chosen))
@@ -266,7 +268,7 @@ class SerialVectorsUnit(wiring.Component):
 
         m.d.sync += [copy(after, before) for before, after in pairwise(notes)]
 
-        # All with the step's fraction bits: the first pixel's value under 1, and the step modulo 2.
+        # Both have the fraction bits of the step: the first pixel's value, under 1, and the step modulo 2.
         value, step = Mux(right, heads["far"], heads["near"]), heads["step"]
         beyond, sign = value[-1] ^ value[-2], value[-1]
         value = Cat(Mux(beyond, (~sign).replicate(bits - 1), value[: bits - 1]), sign)
@@ -280,7 +282,7 @@ class SerialVectorsUnit(wiring.Component):
         part = Cat(Mux(notes[2].is_start, 0, part[:low]), part[low:]).as_signed()
         small = register((code - part)[:bits].as_signed(), "small")
 
-        # The exponent stands until that of the next piece, and so do the flags.
+        # The exponent and the flags stay until those of the next piece come.
         used, exponent = Signal(p.LARGEST_EXPONENT, name="step_used"), Signal(4, name="exponent")
         with m.If(notes[2].finds):
             found = used_bits(p, [code])

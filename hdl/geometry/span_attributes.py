@@ -176,7 +176,7 @@ class SpanAttributesUnit(wiring.Component):
         return m
 
     def _give(self, m: Module, turns, walk, valid: Signal, walked) -> None:
-        """Give what the walk finds to the output; tell whether the walk may advance."""
+        """Give the pieces of the walk to the output, and drive whether the walk may advance."""
         if self.whole:
             m.d.comb += [
                 self.o.valid.eq(valid),
@@ -186,7 +186,7 @@ class SpanAttributesUnit(wiring.Component):
             return
         result, result_valid = Signal(self.o.payload.shape(), name="result"), Signal(name="result_valid")
         if self.serial:
-            # The walk's words replace the result, which must have been taken by then.
+            # When the walk's words replace the result, the result must have been taken.
             m.d.comb += [self.o.valid.eq(result_valid), copy(self.o.payload, result)]
             stands = Mux(result_valid, ~self.o.ready, valid & walked.ends)
             m.d.comb += turns.advances.eq(Mux(turns.advance, ~(stands & walk.gives), self.o.ready))

@@ -79,7 +79,7 @@ class SpanHalverUnit(wiring.Component):
         """The piece that is tried; the bits that tell whether it fits; what is tried next."""
         m = Module()
         given, result = self.i.payload, self.o.payload
-        # ``known``: its bits are those of its ends; ``whole``: it reaches to the end of the span.
+        # ``known``: the bits of the test belong to its ends; ``whole``: it reaches to the end of the span.
         valid, known, whole, uncut = (Signal(name=name) for name in ("valid", "known", "whole", "uncut"))
         fits, takes, leaves = (Signal(name=name) for name in ("fits", "takes", "leaves"))
         tag = {
@@ -155,7 +155,8 @@ class SpanHalverUnit(wiring.Component):
             for name in ("near", "far", "last", "step")
         )
         signed_far, signed_near = far.as_signed(), near.as_signed()
-        # Behind a piece the next pixel; else one pixel less, or the mean of both ends.
+        # Behind a piece: the next pixel. After a try that does not fit: one pixel less, or the mean of both
+        # ends.
         other = Mux(fits, step.as_signed(), Mux(odd, signed_near, ~step.as_signed()))
         total = Signal(SPAN_STEP.width + 1, name=f"total_{k}")
         m.d.comb += total.eq(signed_far + other + (~fits & ~odd))
@@ -243,7 +244,7 @@ def size_of(code: Value) -> Value:
     """First bits of the size of a component's code ``SPAN_STEP``: `SpanHalver.BITS`, and the bits of its
     shift.
 
-    Below 0 the size is the complement. Beyond the range all bits are 1.
+    The size of a negative code is its complement. Beyond the range all bits are 1.
     """
     top = SPAN_STEP.fraction_bits
     sign, beyond = code[-1], code[-1] ^ code[-2]
@@ -278,5 +279,5 @@ def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
 def is_apart(keeps: Value, first: Value, last: Value) -> Value:
     """Whether a component's ends are too far apart for a span of two pixels, from the first bits of both."""
     most = int(SpanHalver.STEEP * (1 << SpanHalver.BITS))
-    # Below 0 the first bits are one less than the size's, with the other sign.
+    # Of a negative code the first bits are one less than the size's, with the other sign.
     return Mux(keeps, (first - last > most) | (last - first > most), first + last >= most)

@@ -70,7 +70,7 @@ class VectorAdapterUnit(PipelinedUnit):
         start = [self.register(m, code, f"shifted_{k}") for k, code in enumerate(start)]
         step = [self.register(m, code, f"shifted_step_{k}") for k, code in enumerate(step)]
 
-        # So many places at most: lower bits do not count.
+        # A step is shifted by at most as many places, so lower bits do not count.
         used = self.register(m, used_bits(p, step), "step_used")
         step = [self.register(m, _smaller(p, code), f"small_step_{k}") for k, code in enumerate(step)]
         start = [self.register(m, _smaller(p, code), f"small_{k}") for k, code in enumerate(start)]
@@ -117,14 +117,14 @@ def _smaller(model: VectorAdapter, code: Value) -> Value:
 
 
 def shift_of(model: VectorAdapter, shift: Value) -> Value:
-    """Places by which a vector is shifted, one less if it will turn, which keeps its length under 1."""
+    """Places by which a vector is shifted. One less if it will turn, so that its length stays under 1."""
     return (shift - shift.any())[: len(shift)] if model.rotates else shift
 
 
 def used_bits(model: VectorAdapter, codes: list[Value]) -> Value:
-    """First bits below the sign that a code of a shifted step uses, because they differ from the sign."""
+    """First bits below the sign of a shifted step that a code uses: bits that differ from the sign."""
     p, used = model, 0
     for code in codes:
         used = used | (code[: p.STEP_BITS] ^ code[-1].replicate(p.STEP_BITS))[-p.LARGEST_EXPONENT :]
-    # For other frames a place less, but for none.
+    # If vectors turn into other frames, a step is shifted by one place less, but never by less than 0.
     return Cat(1, used[:-2], used[-2:].any()) if p.rotates else used

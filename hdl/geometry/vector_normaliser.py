@@ -235,7 +235,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return {"lost": lost} | {f"normal_{k}": normal for k, normal in enumerate(normals)}
 
     def _places(self, vector: Word) -> Word:
-        """Places of the shift, four bits, and above them whether a first bit is found with them."""
+        """Places of the shift, four bits. A bit above them tells whether there is a first 1 at this place."""
         g, bits = self._graph, self.model.format.width - 1
 
         def ones(v):
@@ -244,7 +244,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
             return found[0] | found[1] | found[2]
 
         def moved(word, step):
-            # By zero to three steps: both bits of this number follow from the word before it is shifted.
+            # Shift by zero to three steps. Both bits of this number follow from the unshifted word.
             empties = [~word[bits - (k + 1) * step : bits - k * step].any() for k in range(3)]
             two = empties[0] & empties[1]
             one = Mux(two, empties[2], empties[0])

@@ -21,7 +21,7 @@ from blysk.hdl.geometry.triangles import (
 __all__ = ["VertexSortUnit", "sorted_triangle_shape"]
 
 _PAIRS = (0, 1), (1, 2), (0, 2)
-"""Corners that are compared: whether the second one of a pair comes before the first one."""
+"""Pairs of corners that are compared: whether the second corner comes before the first."""
 
 DIGIT_BITS = 4
 """Bits of a height that go into the area on each cycle."""
