@@ -77,7 +77,7 @@ def _case(left, right, vector, length):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any distance, every sixteenth of arbitrary codes, with any vector and length."""
+    """Pairs of normals at any distance, with any vector and length. Every sixteenth pair has any codes."""
     return _case(*any_pairs(rng, count), unit_codes(rng, count), any_lengths(rng, count))
 
 

@@ -33,7 +33,7 @@ def _expect(unit, case):
 
 
 def _pairs(unit, rng, count):
-    """Pairs of unit vectors at any distance, every sixteenth of arbitrary codes."""
+    """Pairs of unit vectors at any distance. Every sixteenth pair has any codes."""
     return Case(dict(zip("ab", any_pairs(rng, count), strict=True)))
 
 

@@ -166,7 +166,7 @@ def _lengths(unit, rng, count):
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, every eighth span of arbitrary codes, with lengths by their logarithm."""
+    """Curves of every size; lengths spread by their logarithm. Every eighth span has any codes."""
     return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
 
 

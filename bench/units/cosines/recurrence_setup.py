@@ -71,7 +71,7 @@ def _vectors(unit, rng):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any distance, every sixteenth of arbitrary codes, at lengths by logarithm."""
+    """Normals at any distance; lengths spread by their logarithm. Every sixteenth pair has any codes."""
     left, right = any_pairs(rng, count)
     beats = {"normal_left": left, "normal_right": right, "length": any_lengths(rng, count)}
     return Case(beats, light_constants(unit, *_vectors(unit, rng)))

@@ -17,7 +17,7 @@ def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
     given = unit.model
     longest = min(longest, given.width)
     length = rng.integers(1, longest + 1, count)
-    # Every fourth span goes on where the one before ended, as triangles side by side do.
+    # Every fourth span begins where the span before it ended, as with triangles side by side.
     x = rng.integers(0, given.width - length + 1)
     y = rng.integers(0, lines or given.height, count)
     x[1::4] = np.minimum(x[0::4] + length[0::4], given.width - length[1::4])[: len(x[1::4])]
@@ -33,7 +33,7 @@ def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
 
 
 def _short(unit, rng, count):
-    """Spans of one to six pixels in few blocks, so that words are needed before the memory has them."""
+    """Spans of one to six pixels in few blocks, so that some words are read before the memory has them."""
     return _spans(unit, rng, count, 6, lines=1)
 
 
@@ -91,12 +91,12 @@ def _edges(unit, rng, count):
     twice = rng.random(groups) < 0.125
     upper = np.where(twice, 1, rng.integers(2, (1 << given.depth_bits) - 3, groups))
     marked, filled = code(upper + np.where(twice, 2, rng.integers(-1, 2, groups))), code(upper)
-    # Some groups leave out one pixel of the block, which then gets no bound.
+    # Some groups leave out one pixel of the block. The block then gets no bound.
     gap, hole = ~twice & (rng.random(groups) < 0.25), rng.integers(first + 1, end)
     begin = np.where(twice | gap, first, rng.integers(first, end + 1))
     last = np.where(gap, hole - 1, np.where(twice, end, rng.integers(begin, end + 1)))
     marks = span(begin, last, marked, rng.random(groups) < 0.5, True)
-    # A falling line may go on to the right, where it is nearer; a rising one may come from the left.
+    # A falling line may go on to the right, where it is nearer. A rising line may come from the left.
     limits = (
         np.where(gap, hole + 1, np.where(falls, first, size * rng.integers(0, block + 1))),
         np.where(falls & ~gap, np.minimum(size * rng.integers(block + 1, columns + 1), given.width) - 1, end),

@@ -57,7 +57,7 @@ def _same(unit, rng, count):
 
 
 def _far(unit, rng, count):
-    """Depths about `DepthTester.FARTHEST` and the depth that a picture is cleared to."""
+    """Depths near `DepthTester.FARTHEST` and near the depth to which a picture is cleared."""
     case = _case(rng, count, unit.size, 3, 3)
     case.beats["depth"] = (1 << 33) - 1 - case.beats["depth"]
     case.beats["depth_step"] = -case.beats["depth_step"]
@@ -65,7 +65,7 @@ def _far(unit, rng, count):
 
 
 def _again(unit, rng, count):
-    """Pixels at two places that differ in a bit, a third at one of these, two depths that differ in a bit."""
+    """Pixels at two places that differ in a bit, and a third at one place. Two depths differ in a bit."""
     count = -(-count // 3)
     bits = (unit.x_bits, unit.y_bits)
     first = rng.integers(0, 1 << sum(bits), count)
@@ -103,7 +103,7 @@ RECORD = Record(
         "few": Stimulus(_few, 2000),
         "same": Stimulus(_same, 500),
         "far": Stimulus(_far, 300),
-        # Odd: a bit that is inverted at each event is as it was after an even number of them.
+        # An odd number: after an even number, a bit that each event inverts would be as before.
         "again": Stimulus(_again, 901),
         "nearer": Stimulus(_nearer, 2001),
     },

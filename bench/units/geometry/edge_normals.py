@@ -60,7 +60,7 @@ def _long(unit, rng, count):
 
 
 def _deciding(unit, rng, count):
-    """Pieces of one pixel. A single bit decides how the normal is rounded."""
+    """Pieces of one pixel, of normals whose rounding depends on a single bit."""
     vector = deciding_vectors(rng, count)
     beats = _single(unit, rng, len(vector)).beats
     return Case(beats | {"left": vector, "right": vector, "flip": np.ones(len(vector), dtype=np.int64)})

@@ -40,7 +40,8 @@ def _mesh(unit, rng, count):
     pitch = rng.integers(step // 8, 2 * step, (layers, 1, 1, 1))
     nodes = np.stack(np.meshgrid(*2 * [np.arange(side + 1)]), axis=-1) * pitch
     nodes = nodes + rng.integers(-20 * step, 20 * step, (layers, 1, 1, 2))
-    # Moved by less than a cell, by more, or not at all; a third of the meshes lie on centres and borders.
+    # Nodes move by less than a cell, by more, or not at all. A third of the meshes lie on centres and
+    # borders.
     jitter = rng.integers(-step, step + 1, nodes.shape) * rng.integers(0, 3, (layers, 1, 1, 1))
     nodes += jitter * pitch // (2 * step)
     nodes[::3] = nodes[::3] // unit.grid.half * unit.grid.half
@@ -54,7 +55,7 @@ def _mesh(unit, rng, count):
 
 
 def _drawn(unit, rng, count):
-    """Small triangles, hardly any dropped, so that they come faster than they are set up."""
+    """Small triangles. Hardly any is dropped, so triangles come faster than they are set up."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
     return Case(ended(random_triangles(rng, count, unit.grid, 3.0, 0.1), unit.grid).beats, frame.codes)
 
@@ -63,7 +64,7 @@ def _dense(unit, rng, count):
     """Triangles of one pixel, all drawn, so that the setup alone decides the rate."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
     triangles = random_triangles(rng, count, unit.grid, 1.0, 0.1)
-    # Of a square of 5/4 pixels the half with the one centre.
+    # Half of a square of 5/4 pixels: the half that holds the only pixel centre.
     step = unit.grid.steps
     for place, far in ((triangles.x, [0, 1, 0]), (triangles.y, [0, 0, 1])):
         place[:] = rng.integers(-40, 40, (count, 1)) * step + np.array(far) * 5 * step // 4

@@ -18,7 +18,7 @@ def _expect(unit, case):
 
 
 def _vectors(unit, rng, count):
-    """Directions of all kinds, some of any words, some opposite or nearly opposite, some equal."""
+    """Directions of all kinds. Some have any words, some are opposite or nearly opposite, some are equal."""
     beats = {"light": unit_codes(rng, count), "viewer": unit_codes(rng, count)}
     beats["viewer"][::5] = -beats["light"][::5]
     beats["viewer"][::10] += rng.integers(-3, 4, beats["viewer"][::10].shape)

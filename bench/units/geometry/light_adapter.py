@@ -56,7 +56,7 @@ def _spans(unit, rng, count):
 
 
 def _any(unit, rng, count):
-    """Words of any codes, also longer than 1, so that sums are modulo 2. Most spans have one pixel."""
+    """Words of any codes. Vectors may be longer than 1, so sums are modulo 2. Most spans have one pixel."""
     vectors = {name: any_codes(rng, LightAdapter.FORMAT, count, 3) for name in ("start", "step")}
     codes = any_codes(rng, LightAdapter.FORMAT, unit.lights, unit.rows, 3)
     # Every bit of an axis's words changes.

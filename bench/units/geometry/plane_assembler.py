@@ -54,7 +54,7 @@ def _case(rng, count, limit):
 
 
 def _usual(unit, rng, count):
-    """Sizes of every power of two, bounds next to the borders of a piece's length, the default limit."""
+    """Sizes of every power of two, and bounds next to the borders of a piece's length. The default limit."""
     return _case(rng, count, 267)
 
 
@@ -64,7 +64,7 @@ def _largest(unit, rng, count):
 
 
 def _least(unit, rng, count):
-    """A limit of 0, which cuts all spans to single pixels, or of 1."""
+    """A limit of 0 or 1. With 0 all spans are cut to single pixels."""
     return _case(rng, count, int(rng.integers(0, 2)))
 
 

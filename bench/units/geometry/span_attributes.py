@@ -75,7 +75,7 @@ def attributes_of(spans):
 def _status(unit, case):
     beats = _rows_of(unit, case.beats)
     counts, rows = _pieces(beats, unit.whole)[1], beats["row"]
-    # A triangle is not yet known to be empty before its last scanline.
+    # Before its last scanline, the unit does not know that a triangle is empty.
     begun = np.flatnonzero(_firsts(rows["last"]))[-1]
     unknown = not rows["last"][-1] and not rows["length"][begun:].any()
     counts["empty"] -= unknown
@@ -83,7 +83,7 @@ def _status(unit, case):
 
 
 def _case(unit, triangles, frame, count):
-    # A few high triangles would fill the run.
+    # Only low triangles: a few high triangles would fill the run.
     low = np.ptp(triangles.y, axis=1) < 64 * GRID.steps
     stages = Stages(triangles[low], frame)
     rows = stages.clipped
@@ -125,7 +125,7 @@ def _any(unit, rng, count):
         flip=flags[2],
         material=rng.integers(0, 1024, total),
     )
-    # Long spans with short pieces would give too many of them.
+    # Long spans with short pieces would give too many pieces.
     least = np.maximum(np.ceil(np.log2(np.maximum(length, 1))).astype(np.int64) - 3, 0)
     words = {"start": GradientSetup.START_FORMAT} | dict.fromkeys(
         ("short", "long", "inward"), GradientSetup.FORMAT

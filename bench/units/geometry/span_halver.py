@@ -78,7 +78,7 @@ def _any(unit, rng, count):
 
 
 def _sizes(unit, rng, count):
-    """Powers of two, their halves and quarters, and a step more or less. They decide each bit of the test."""
+    """Powers of two, their halves and quarters, and codes beside them. They decide each bit of the test."""
     length = rng.integers(1, 12, count)
     ends = []
     for _ in range(2):

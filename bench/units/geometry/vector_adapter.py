@@ -29,7 +29,7 @@ def _expect(unit, case):
     words = {name: value for name, value in case.beats.items() if name not in ("start", "shift")}
     words |= {name: Fixed(format, case.beats[name]) for name, format in _FORMATS.items() if name in words}
     words |= {name: words[name].astype(bool) for name in ("flip", "turned")}
-    # The shift tells all that there is to know of the other end.
+    # Of the other end, the model needs only what the shift tells.
     start = Fixed(SPAN_NORMAL, case.beats["start"])
     reach = 1 << (SPAN_NORMAL.fraction_bits - 1 - case.beats["shift"])
     right = Fixed(SPAN_NORMAL, np.repeat(reach[:, np.newaxis], 3, axis=1))

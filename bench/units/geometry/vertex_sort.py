@@ -52,7 +52,7 @@ def _near(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """A picture anywhere, and boxes that begin or end at its borders or 2^k pixels off, or are 2^k high."""
+    """A picture anywhere. Boxes begin or end at its borders, or 2^k pixels beside, or are 2^k pixels high."""
     grid, first = unit.grid, rng.integers(-2048, 2047, 2)
     end = np.minimum(first + 2 ** rng.integers(0, 11, 2), 2048)
     frame = FrameSettings(*(int(end) for end in (*first, *end)))
@@ -65,7 +65,7 @@ def _borders(unit, rng, count):
     high = low + often(0.7, powers[1]) + rng.integers(-1, 2, (count, 2))
     pixels = np.stack([low, high, rng.integers(np.minimum(low, high), np.maximum(low, high) + 1)], axis=1)
     pixels = rng.permuted(pixels, axis=1)
-    # Anywhere from a pixel's centre back to just behind the centre before it.
+    # Any place from a pixel's centre back to just behind the centre of the pixel before.
     codes = pixels * grid.steps - grid.half + 1 + rng.integers(0, grid.steps, pixels.shape)
     codes = codes.clip(grid.coordinate.min_code, grid.coordinate.max_code)
     return Case(

@@ -98,7 +98,7 @@ def _near(unit, rng, count, exponent, spread, largest_bulge=2.0**-5):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Parabolas of every size with the least u about the threshold, every eighth of arbitrary codes."""
+    """Parabolas of every size, with the least u near the threshold. Every eighth has any codes."""
     values, exponent = _near(unit, rng, count, exponent, 1e-3, 2.0**-4)
     values[::8] = any_codes(rng, FORMAT, *values[::8].shape)
     return _case(unit, values, exponent)

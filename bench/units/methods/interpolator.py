@@ -173,7 +173,7 @@ def case_of(
 
 
 def _spans(unit, rng, count):
-    """Normals at angles of every size, every sixteenth pair of arbitrary codes. Most spans are short."""
+    """Normals at angles of every size. Every sixteenth pair has any codes. Most spans are short."""
     length = short_lengths(rng, count, 1)
     return case_of(unit, rng, *any_pairs(rng, len(length)), length)
 

@@ -136,7 +136,7 @@ def mixed_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, every eighth span of arbitrary codes. Most spans are short."""
+    """Curves of every size. Every eighth span has any codes. Most spans are short."""
     return _case(unit, rng, short_lengths(rng, count, 1))
 
 

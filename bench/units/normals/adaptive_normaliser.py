@@ -39,7 +39,7 @@ def straight_lines(left: np.ndarray, right: np.ndarray, levels: np.ndarray, t: n
     parts = 2.0**levels
     segment = np.minimum(np.floor(t * parts), parts - 1)
     before, after = (interpolate("slerp", left, right, (segment + k) / parts) for k in (0, 1))
-    # The great circle has the length of its left end; the last point is the right end.
+    # Points of the great circle have the length of its left end. So the last point is set to the right end.
     after = np.where((segment + 1 == parts)[:, np.newaxis], right, after)
     return before + (t * parts - segment)[:, np.newaxis] * (after - before)
 
@@ -69,19 +69,19 @@ def _expect(unit, case):
 
 
 def spans_of(ends, length):
-    """Input of spans with given ends, a pair of arrays, and lengths."""
+    """Input of spans with given lengths and ends, a pair of arrays."""
     left, right = ends
     return Case({"normal_left": left, "normal_right": right, "length": length})
 
 
 def _spans(unit, rng, count):
-    """Normals at angles of every size, and arbitrary codes, in short spans, some without a pixel."""
+    """Normals at angles of every size, and of arbitrary codes. Spans are short, and some have no pixel."""
     length = short_lengths(rng, count)
     return spans_of(any_pairs(rng, len(length)), length)
 
 
 def _corners(unit, rng, count):
-    """Every number of levels, angles 0, 45, 90 and 180, and lengths about powers of two, 0 and 4095."""
+    """Every number of levels; angles 0, 45, 90, 180 degrees; lengths 0, 4095 and near powers of two."""
     length = np.r_[1, 2, 3, 16, 0, 1, 1, 2, 2, 5, 17, 33, 64, 65, 100, 0, 0, 129, rng.integers(0, 80, count)]
     angles = rng.uniform(0, 95, len(length))
     angles[::5] = 10.0 ** rng.uniform(-4, 1, len(angles[::5]))

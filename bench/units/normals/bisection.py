@@ -49,7 +49,7 @@ def _measure(rng, count, model):
     first_step = (u > model.widest_narrow) & (model.max_angle == 90)
     factor = 0.5 + factor_of(model, cosine, first_step)
     formula = (left + right) * COMPONENT.step * factor[:, np.newaxis]
-    # A factor that is too large takes a component near 1 out of the word.
+    # If the factor is too large, a component near 1 leaves the range of its word.
     formula = np.clip(formula, -1, 1 - COMPONENT.step)
     return Sample(found.values, exact, formula, degrees_between(left, right))
 
@@ -70,13 +70,13 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles 0, 45, 90 and 180, small angles, to 90 degrees and beyond, word ends, u on a tie, its least."""
+    """Angles of 0, 45, 90 and 180 degrees, small and any angles, ends of words, u on a tie, the least u."""
     angles = np.r_[np.zeros(20), np.full(20, 45), np.full(20, 90), 10.0 ** rng.uniform(-4, 0, 100)]
     angles = np.r_[angles, rng.uniform(0, 90, count), rng.uniform(90, 180, 60), 180]
     a, b = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))
     order = rng.permutation(len(a))
     a, b = a[order], b[order]
-    # The code of 1 - cosine with 17 fraction bits is 180994.5.
+    # The tie: 1 - cosine is 180994.5 steps of 2^-17.
     a[0], b[0] = (35421, 119829, 39572), (-5993, -85566, 99107)
     a[1] = b[1] = COMPONENT.min_code
     return _case(a, b)

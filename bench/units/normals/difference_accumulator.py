@@ -34,7 +34,7 @@ def _expect(unit, case):
 
 
 def spans_of(unit, rng, length):
-    """Spans of given lengths with values of any size, some second pixels near the border of a rounding."""
+    """Spans of given lengths, with values of any size. Some second pixels are near a border of a rounding."""
     model = unit.model
     start = any_codes(rng, model.start_format, len(length), 3)
     first, second = (any_codes(rng, model.difference_format, len(length), 3) for _ in range(2))
@@ -45,7 +45,7 @@ def spans_of(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Starts and differences of any size, in short and a few long spans, some without a pixel."""
+    """Starts and differences of any size. Spans are short, a few are long, and some have no pixel."""
     return spans_of(unit, rng, short_lengths(rng, count))
 
 

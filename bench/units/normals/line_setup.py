@@ -16,7 +16,7 @@ _FORMAT = LineSetup.VECTOR_FORMAT
 
 
 def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of the ends of lines at any angle, in ratios to 1:100, every eighth of arbitrary codes."""
+    """Codes of ends of lines at any angle, with lengths of 1/100 to 1. Every eighth line has any codes."""
     ends = [sphere(rng, count) * 10.0 ** -rng.uniform(0, 2, (count, 1)) for _ in range(2)]
     left, right = quantise_line(*ends)
     left[::8], right[::8] = any_codes(rng, _FORMAT, 2, *left[::8].shape)
@@ -24,7 +24,7 @@ def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndar
 
 
 def _measure(rng, count):
-    """Component of a point of the line at any pixel."""
+    """Components of the point of a line at any of its pixels."""
     left, right = quantise_line(*(sphere(rng, count) * rng.uniform(0.1, 1, (count, 1)) for _ in range(2)))
     length = log_lengths(rng, count, 2)
     pixel = pixel_of(rng, length)[:, np.newaxis]
@@ -46,7 +46,7 @@ def _lengths(unit, rng, count):
 
 
 def _lines(unit, rng, count):
-    """Ends in any proportion and angle, every eighth of arbitrary codes, with lengths by logarithm."""
+    """Lines of `any_lines`. Numbers of pixels are spread by their logarithm."""
     left, right = any_lines(rng, count)
     return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
 

@@ -30,7 +30,7 @@ def _measure(rng, count, model):
     u = (1 - cosine) * ONE_SQUARED.values
     coefficients = np.r_[0.5 + model.constant.values, model.coefficients.values]
     factor = np.polynomial.polynomial.polyval(u, coefficients)[:, np.newaxis]
-    # A factor that is too large takes a component near 1 out of the word.
+    # If the factor is too large, a component near 1 leaves the range of its word.
     formula = (left + right) * COMPONENT.step * factor
     formula = np.clip(formula, -1, model.FORMAT.max_code * model.FORMAT.step)
     return Sample(found.values, exact, formula, degrees_between(left, right))
@@ -52,7 +52,7 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Equal and opposite normals, angles to 45 degrees, at 45 and beyond, ends of words."""
+    """Equal and opposite normals, angles up to 45 degrees, of 45, and of more, and ends of words."""
     angles = np.r_[np.zeros(20), rng.uniform(0, 45, count), np.full(20, 45), rng.uniform(45, 180, 60), 180]
     ends = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))
     return _case(*ends)
