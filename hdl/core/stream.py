@@ -272,7 +272,7 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
     remaining = Signal(len(length), name="remaining")
     with m.If(advance):
         with m.If(ends):
-            # By bits: a comparison is a chain of carries.
+            # Tested by bits, because a comparison would be a chain of carries.
             m.d.sync += [active.eq(valid & length.any()), ends.eq(~(valid & length[1:].any()))]
             m.d.sync += remaining.eq(length)
         with m.Else():

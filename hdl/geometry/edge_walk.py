@@ -144,7 +144,7 @@ class EdgeWalkUnit(wiring.Component):
         """
         triangle, bits = self.i.payload, self.grid.bits
         edge = _Edge(name, bits)
-        # The remainder is compared before it is reduced: both sums are there.
+        # Both sums are computed, so the remainder is compared before it is reduced.
         more = edge.error + edge.error_step
         less = (edge.error - edge.lack).as_signed()
         m.d.comb += edge.carry.eq(less >= 0)

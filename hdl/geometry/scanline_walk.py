@@ -16,7 +16,7 @@ _BITS = GradientSetup.FORMAT.width
 
 
 class AttributeTurns:
-    """Control of the attributes' turns: all attributes on one cycle, or *serial* one a cycle, four in all.
+    """Control of the turns of attributes. All come on one cycle; *serial*: in four turns, one a cycle.
 
     In the serial form the first attribute decides for all four whether a scanline comes in. The control of
     the walk moves on with the last attribute, `ends`. With ``ahead`` registers tell whether the walk
@@ -53,7 +53,7 @@ class AttributeTurns:
         with m.If(rows.valid):
             m.d.sync += has_pixels.eq(covered)
         if ahead:
-            # Whether the output lets the walk advance is known a cycle before.
+            # It is known a cycle before whether the output lets the walk advance.
             stays, advances = Signal(name="stays_busy"), Signal(name="advances")
             self.advances = advances
             m.d.comb += stays.eq(Mux(self.goes, self.loads | (busy & ~self.leaves), busy))
@@ -74,7 +74,7 @@ class AttributeTurns:
 
 
 class AttributeRing:
-    """A register of one attribute; *serial* a ring with a word of each attribute, moved on by every step.
+    """A register of one attribute. *Serial*: a ring with a word of each attribute; every step moves it on.
 
     A *late* word is replaced one step later, on its way round the ring, by values from
     `AttributeTurns.late`.
@@ -128,7 +128,7 @@ class ScanlineWalk:
         after = (left + ~mask)[:PIXEL_BITS]
         count = row.length - 1
         if turns.serial:
-            # The scanline is there for three cycles before it is taken, and a step takes four cycles: the
+            # The scanline is there for three cycles before it is taken, and a step takes four cycles. So the
             # numbers that follow from both are computed one a cycle, with registers between them.
             def registered(value, name):
                 register = Signal.like(value, name=name)
@@ -208,10 +208,10 @@ class ScanlineWalk:
     ) -> tuple[Value, Value]:
         """Values of an attribute at both ends of the piece.
 
-        Its step is ``inward`` when a span is loaded, and ``following_step`` later. Without ``cuts`` no piece
-        follows another: once the span is found, its values are not read.
+        The attribute's step is ``inward`` when a span is loaded, and ``following_step`` later. Without
+        ``cuts`` no piece follows another. So the values of a span are not read once the span is found.
         """
-        # Chosen behind registers: the sums take a whole cycle.
+        # The sums take a whole cycle, so the choice is behind their registers.
         nears, totals = (
             AttributeRing(m, f"{name}_{word}", self.turns, late=True) for word in ("near", "total")
         )

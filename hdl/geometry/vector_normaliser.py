@@ -125,7 +125,7 @@ class VectorNormaliserUnit(PipelinedUnit):
         rest = register(m, s[:bits], "rest")
         large = self._delay(m, large, "large", 6)
         c0, c1 = self._coefficients(m, segment)
-        # In half steps, always odd: half a step for the bits that were cut.
+        # In half steps. The number is always odd: half a step stands for the bits that were cut.
         u = self._delay(m, _offset(rest), "u", 2)
         # c1 is unsigned: a zero above it completes its last Booth digit.
         digits = Cat(Const(0, 1), Value.cast(c1), Const(0, 2))

@@ -293,7 +293,7 @@ class VertexSortUnit(wiring.Component):
 
 
 def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Value]:
-    """Value times a Booth digit (`booth_term`), or minus that if ``negative``; without a carry.
+    """Value times a Booth digit (`booth_term`), negated if ``negative``; without a carry.
 
     A negated multiple has inverted bits and so is 1 too small: the second result tells where this 1 is to be
     added.

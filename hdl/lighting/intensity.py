@@ -285,7 +285,7 @@ def _one_at_most(bits: Value) -> Value:
 
 
 def _selected(one_hot: Value, words: Sequence[Value]) -> Value:
-    """The word whose bit is set; 0 if none is."""
+    """The word whose bit is set; 0 if no bit is set."""
     return reduce(or_, (Mux(one_hot[k], Value.cast(word), 0) for k, word in enumerate(words)))
 
 

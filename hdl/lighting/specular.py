@@ -28,7 +28,7 @@ def highlight_shape(model: HighlightOperand) -> data.StructLayout:
 
 
 def slope_shape() -> data.StructLayout:
-    """Shape of the output of a `SlopeUnit`: K, the shift s + 1, and the largest lit shifted argument."""
+    """Shape of the output of a `SlopeUnit`: K, shift s + 1, and the largest shifted argument that is lit."""
     return data.StructLayout(
         {
             "scale": FixedShape(Specular.SCALE_FORMAT),
@@ -278,7 +278,7 @@ class SpecularUnit(PipelinedUnit):
         if p.is_coscos:
             base = self._cosine(argument, product, below_one, lit)
         else:
-            # 1 - 2^-17 - product is its inverse.
+            # 1 - 2^-17 - product is the product with inverted bits.
             base = g.register(
                 "base",
                 lambda product, lit: FixedValue(p.BASE_FORMAT, Mux(lit, ~below_one(product), 0)[:17]),
