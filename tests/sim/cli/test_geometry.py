@@ -37,7 +37,7 @@ def test_picture_and_figures(capsys):
     assert figures["counts"]["cut_spans"] == model.counts["cut"]
     assert 0 < figures["triangle_cycles"] <= figures["cycles"]
     printed = capsys.readouterr().out
-    assert f"hardware, the last triangle taken in after {figures['triangle_cycles']:,} cycles" in printed
+    assert f"hardware, took the last triangle after {figures['triangle_cycles']:,} cycles" in printed
     assert "the same method and model in float64" not in printed
 
 
