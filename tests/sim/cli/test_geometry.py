@@ -137,8 +137,8 @@ def test_several_lights(capsys):
     """With the defaults: errors within the bound that is printed; Verilog tells of the axes."""
     lights = "--light", "1,1,1", "--light", "-1,0.5,1"
     assert main(["render", *SMALL, *HARDWARE, *lights, "-o", "a.png", "--json", "a.json"]) == 0
-    (frame,) = json.loads(Path("a.json").read_text())["frames"]
-    assert 0.4 < frame["method_error"]["steady_lsb"] <= frame["bound_lsb"] < 0.7
+    frame = json.loads(Path("a.json").read_text())
+    assert 0.4 < frame["method_error"]["steady_lsb"] <= frame["bound_lsb"] < 0.8
     capsys.readouterr()
     assert main(["verilog", *HARDWARE, "--lights", "2", "--model", "phong"]) == 0
     text = capsys.readouterr().out
