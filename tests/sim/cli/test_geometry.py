@@ -142,7 +142,7 @@ def test_several_lights(capsys):
     capsys.readouterr()
     assert main(["verilog", *HARDWARE, "--lights", "2", "--model", "phong"]) == 0
     text = capsys.readouterr().out
-    assert "276 to 278   axis y cos a in the frame of light 0, SQ(1, 17) (light 1)" in text
+    assert "276 to 278  axis y cos a in the frame of light 0, SQ(1, 17) (light 1)" in text
     assert "vertex normal in the frame of light 0 (H along z, L and V in the xz plane)" in text
 
 
