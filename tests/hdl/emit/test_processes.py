@@ -16,15 +16,19 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
 
 # A shell that starts a program in turn, as a compiler does.
 PARENT = """
-import sys, threading
+import sys, threading, time
 from blysk.hdl.emit import processes
 from blysk.hdl.emit.processes import Process, run_program
 run_program(["true"])
 shell = ["sh", "-c", "sleep 300 & echo $! >> numbers; sleep 300 & echo $! >> numbers; wait"]
 threading.Thread(target=run_program, args=(shell,), daemon=True).start()
 Process(shell)
+# A shell may tell of its programs before its parent has told the guard of the shell.
+while len(processes._guard._running) < 2:
+    time.sleep(0.01)
+print("guarded", flush=True)
 """
-WAYS = {"killed": "import time; time.sleep(300)", "over": "sys.stdin.read()"}
+WAYS = {"killed": "time.sleep(300)", "over": "sys.stdin.read()"}
 
 
 def numbers(folder):
@@ -50,7 +54,9 @@ def wait(condition):
 @pytest.mark.parametrize("way", WAYS)
 def test_programs_end_with_their_parent(tmp_path, way):
     command = [sys.executable, "-c", PARENT + WAYS[way]]
-    with subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.PIPE) as parent:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=tmp_path, **pipes) as parent:
+        assert parent.stdout.readline() == b"guarded\n"
         wait(lambda: len(numbers(tmp_path)) == 4)
         started = numbers(tmp_path)
         assert all(map(runs, started))
