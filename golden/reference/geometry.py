@@ -25,17 +25,23 @@ class Mesh:
         Unit vertex normals.
     material : int64 array, shape (F,), optional
         Index of the material of each face, 0 or more. Empty: 0 for all.
+    colors : float64 array, shape (V, 3), optional
+        Colours of the vertices in linear light, 0 to 1. Empty: none, which is white.
+    coordinates : float64 array, shape (V, 2), optional
+        Texture coordinates u and v of the vertices, finite, see `Texture`. Empty: none.
 
     Raises
     ------
     ValueError
-        If a shape is wrong, an index is out of range, or a number is not finite.
+        If a shape is wrong, an index is out of range, or a number is not finite or out of range.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     normals: np.ndarray
     material: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    colors: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         for name, kind in (("vertices", np.float64), ("faces", np.int64), ("normals", np.float64)):
@@ -60,6 +66,21 @@ class Mesh:
             raise ValueError(
                 f"material must be an index of 0 or more for each of the {len(self.faces)} faces"
             )
+        self._check_looks()
+
+    def _check_looks(self) -> None:
+        """Refuse colours and texture coordinates of another shape, or out of range."""
+        for name, columns in (("colors", 3), ("coordinates", 2)):
+            array = np.asarray(getattr(self, name), dtype=np.float64)
+            object.__setattr__(self, name, array)
+            if array.size and array.shape != (len(self.vertices), columns):
+                raise ValueError(
+                    f"{name} must have shape ({len(self.vertices)}, {columns}), not {array.shape}"
+                )
+        if not ((self.colors >= 0) & (self.colors <= 1)).all():
+            raise ValueError("colors must be 0 to 1")
+        if not np.isfinite(self.coordinates).all():
+            raise ValueError("coordinates must be finite")
 
 
 def normalise(vectors: ArrayLike) -> np.ndarray:

@@ -16,6 +16,7 @@ from blysk.golden.reference.lobes import (
     roughness_of_exponent,
 )
 from blysk.golden.reference.reflection import ReflectionModel
+from blysk.golden.reference.texture import Texture
 
 __all__ = [
     "Light",
@@ -73,6 +74,15 @@ class Material:
     two_sided : bool
         Whether back faces of this material are drawn, with negated normals, in a scene that leaves out back
         faces.
+    texture : Texture, optional
+        Image that multiplies ambient and diffuse reflection, by the mesh's texture coordinates.
+    emission : three floats, float or str
+        Light that the surface adds by itself, at least 0, in the same forms.
+    tinted : bool
+        Whether texture and vertex colours multiply specular reflection, too, as of metals.
+    unlit : bool
+        Whether the surface shows ``diffuse``, times texture and vertex colours, whatever the lights. Then
+        there is no ambient, diffuse or specular light.
 
     Raises
     ------
@@ -89,9 +99,13 @@ class Material:
     roughness: float | None = None
     fresnel: Triple | None = None
     two_sided: bool = False
+    texture: Texture | None = None
+    emission: Triple = (0.0, 0.0, 0.0)
+    tinted: bool = False
+    unlit: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("ambient", "diffuse", "specular"):
+        for name in ("ambient", "diffuse", "specular", "emission"):
             object.__setattr__(self, name, color_triple(f"a material's {name}", getattr(self, name)))
         object.__setattr__(self, "exponent", operator.index(self.exponent))
         if not 1 <= self.exponent <= 1000:
