@@ -147,6 +147,8 @@ class FrameConstants:
         - A light that is off has vectors and colours of 0. So its terms are 0, and the compact style spends
           no cycle on them.
         - Fresnel's reflection of a distant light and viewer is a constant, and part of the specular colour.
+        - A material that is unlit has its k_d as ambient colour. Its diffuse and specular colours are 0.
+        - In a scene without albedo the emission is part of the ambient colour.
 
         With ``energy`` the highlight has the energy-normalised form: `ReflectionModel.energy_factor`
         multiplies k_s here, once a frame. The specular unit stays as it is. The factor multiplies the unit's
@@ -188,7 +190,6 @@ class FrameConstants:
         for index, light in enumerate(scene.lights):
             if not light.is_on:
                 continue
-            diffuse[index] = Intensity.color(np.multiply(material.diffuse, light.color))
             between = np.zeros(3)
             if light.direction is not None and not scene.local:
                 direction[index] = quantise(np.asarray(light.direction))
@@ -196,6 +197,10 @@ class FrameConstants:
             has_halfway = np.any(between)
             if has_halfway:
                 halfway[index] = quantise(between)
+            # Materials share the vectors, not the colours.
+            if material.unlit:
+                continue
+            diffuse[index] = Intensity.color(np.multiply(material.diffuse, light.color))
             if scene.local or has_halfway or mirror:
                 reflection = material.reflection(distant_cosine(light, scene.distant_viewer))
                 highlight = factor * reflection * light.color
@@ -206,8 +211,10 @@ class FrameConstants:
                         f"{MAX_INTENSITY}; {_WIDER[energy.PARAMETER]} the specular coefficient or the light"
                     )
                 specular[index] = Intensity.color(highlight)
-        ambient = Intensity.color(np.multiply(material.ambient, scene.ambient_light))
-        return cls(material.exponent, ambient, direction, halfway, diffuse, specular)
+        ambient = material.ambient_term(scene.ambient_light)
+        if not scene.has_albedo:
+            ambient = ambient + material.emission
+        return cls(material.exponent, Intensity.color(ambient), direction, halfway, diffuse, specular)
 
     def writes(self, index: int | None = None, loads: bool = True) -> dict[str, np.ndarray]:
         """Beats for the write port: ``address`` and ``data``, 18 bits of each code.

@@ -245,6 +245,7 @@ def _parts(raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarr
         triangle=raster.triangle[origin],
         **ends,
         back=raster.back[origin],
+        level=raster.level[origin] if len(raster.level) else raster.level,
         span=span,
         offset=(np.arange(len(span)) - start[span]).astype(np.int16),
     )

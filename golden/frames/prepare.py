@@ -244,7 +244,7 @@ def sort_by_material(raster: Raster, material: np.ndarray) -> Raster:
     place[spans] = np.arange(len(spans))
     fragments = np.argsort(place[raster.span], kind="stable")
     by_span = ["x", "y", "length", "triangle", "normal_left", "normal_right", "back"]
-    by_span += ["magnitude_left", "magnitude_right", "weights_left", "weights_right"]
+    by_span += ["magnitude_left", "magnitude_right", "weights_left", "weights_right", "level"]
     kept = {name: getattr(raster, name) for name in by_span}
     moved = {name: values[spans] if len(values) else values for name, values in kept.items()}
     moved |= {name: getattr(raster, name)[fragments] for name in ("offset", "pixel", "visible")}

@@ -31,7 +31,14 @@ def fragment_barycentrics(raster: Raster, which: np.ndarray) -> np.ndarray:
     -------
     float64 array, shape (count, 3)
         Shares of the triangle's three vertices; they add up to 1.
+
+    Raises
+    ------
+    ValueError
+        If the raster's weights were left out.
     """
+    if len(raster.weights_left) != len(raster.length):
+        raise ValueError("point lights, a near viewer and an albedo need the weights of the spans")
     span, t = _position(raster, which)
     weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
     found: np.ndarray = weights / sum_of_components(weights)[:, np.newaxis]

@@ -174,6 +174,13 @@ class Material:
         found: np.ndarray = np.array(self.specular) * schlick(self.fresnel, 1.0 if cosine is None else cosine)
         return found
 
+    def ambient_term(self, ambient_light: Sequence[float]) -> np.ndarray:
+        """Light without a direction: ``k_a I_a``, or k_d of a surface that is unlit; shape (3,)."""
+        if self.unlit:
+            return np.array(self.diffuse)
+        found: np.ndarray = np.multiply(self.ambient, ambient_light)
+        return found
+
     def parameter(self, model: ReflectionModel) -> float | None:
         """Exponent or roughness, as `ReflectionModel.PARAMETER` of a model says; ``None`` if it has none."""
         if model.PARAMETER == "roughness" and self.roughness is None:
@@ -244,6 +251,7 @@ def intensity(
     model: ReflectionModel,
     chord: bool = False,
     points: np.ndarray | None = None,
+    albedo: ArrayLike | None = None,
 ) -> np.ndarray:
     """Intensity of every normal, not saturated.
 
@@ -251,6 +259,9 @@ def intensity(
     `Light.factor`. The cosine of a mirror model, such as Phong's, is R·V with ``R = 2 (N·L) N - L``. The
     cosine of the other models is N·H. k_s is `Material.reflection` at the V·H of a distant light and viewer.
 
+    - The albedo multiplies ambient and diffuse light. It multiplies specular light of a tinted material, too.
+    - The emission is added.
+    - The light of an unlit material is k_d.
     - A light with ``N·L <= 0`` has neither diffuse nor specular term.
     - A light with ``L = -V`` has no half-way vector. It has a specular term only by a mirror model.
     - A point light has no terms at the point where it is.
@@ -274,6 +285,8 @@ def intensity(
         (docs/theory/chord.md#the-chord).
     points : array, shape (..., 3), optional
         Position of each normal; needed for point lights only.
+    albedo : array, shape (..., 3), optional
+        Albedo of each normal; ``None``: white.
 
     Returns
     -------
@@ -283,12 +296,13 @@ def intensity(
     ------
     ValueError
         If a point light has no points.
+
+    Source: docs/theory/textures.md.
     """
     normals = np.asarray(normals, dtype=np.float64)
     viewer = np.asarray(viewer, dtype=np.float64)
-    total = np.empty(normals.shape)
-    total[...] = np.multiply(material.ambient, ambient_light)
-    for light in lights:
+    sums = _Sums(material, ambient_light, normals.shape, albedo)
+    for light in () if material.unlit else lights:
         direction = light.towards(points)
         cosine = _dot(normals, direction)
         halfway = halfway_vector(direction, viewer)
@@ -305,8 +319,8 @@ def intensity(
         specular = light.color * material.reflection(constant)
         factor = light.factor(points)
         given = cosine * factor, highlight_cosine, factor
-        _add_light(total, material, light, np.asarray(specular), *given, has_highlight, model)
-    return total
+        sums.add(light, np.asarray(specular), *given, has_highlight, model)
+    return sums.intensity
 
 
 def intensity_of_cosines(
@@ -318,6 +332,7 @@ def intensity_of_cosines(
     model: ReflectionModel,
     viewer: ArrayLike | None = None,
     factor: np.ndarray | None = None,
+    albedo: ArrayLike | None = None,
 ) -> np.ndarray:
     """Intensity as by `intensity`, from the cosines of a method without normals.
 
@@ -331,19 +346,20 @@ def intensity_of_cosines(
         Unit vector V to a distant viewer, for Fresnel's reflection.
     factor : array, shape (..., lights), optional
         Factor of each light; ``None``: 1.
+    albedo : array, shape (..., 3), optional
+        As for `intensity`.
 
     Returns
     -------
     float64 array, shape (..., 3)
     """
-    total = np.empty((*np.shape(cosine)[:-1], 3))
-    total[...] = np.multiply(material.ambient, ambient_light)
-    for index, light in enumerate(lights):
+    sums = _Sums(material, ambient_light, (*np.shape(cosine)[:-1], 3), albedo)
+    for index, light in enumerate(() if material.unlit else lights):
         given = cosine[..., index], highlight_cosine[..., index]
         specular = light.color * material.reflection(distant_cosine(light, viewer))
         own = np.float64(1) if factor is None else factor[..., index]
-        _add_light(total, material, light, np.asarray(specular), *given, own, np.True_, model)
-    return total
+        sums.add(light, np.asarray(specular), *given, own, np.True_, model)
+    return sums.intensity
 
 
 def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -351,27 +367,51 @@ def _dot(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
     return found
 
 
-def _add_light(
-    total: np.ndarray,
-    material: Material,
-    light: Light,
-    specular: np.ndarray,
-    cosine: np.ndarray,
-    highlight_cosine: np.ndarray | None,
-    factor: np.ndarray | np.float64,
-    has_highlight: np.ndarray | np.bool_,
-    model: ReflectionModel,
-) -> None:
-    """Add both terms of a light in place; without a cosine of the highlight, the diffuse term alone.
+class _Sums:
+    """Sum of the light that an albedo multiplies, and sum of the other light."""
 
-    The factor multiplies the specular term; N·L is multiplied by it before.
-    """
-    color = np.asarray(light.color)
-    total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * material.diffuse)
-    if highlight_cosine is not None:
-        highlight = model.reflect(highlight_cosine, material.parameter(model))
-        highlight = np.where((cosine > 0) & has_highlight, highlight, 0.0)
-        total += (factor * highlight)[..., np.newaxis] * specular
+    def __init__(
+        self,
+        material: Material,
+        ambient_light: Sequence[float],
+        shape: Sequence[int],
+        albedo: ArrayLike | None,
+    ):
+        self.material, self.albedo = material, albedo
+        self.total = np.empty(shape)
+        self.total[...] = material.ambient_term(ambient_light)
+        self.gloss = self.total if albedo is None or material.tinted else np.zeros(shape)
+
+    def add(
+        self,
+        light: Light,
+        specular: np.ndarray,
+        cosine: np.ndarray,
+        highlight_cosine: np.ndarray | None,
+        factor: np.ndarray | np.float64,
+        has_highlight: np.ndarray | np.bool_,
+        model: ReflectionModel,
+    ) -> None:
+        """Add both terms of a light; without a cosine of the highlight, the diffuse term alone.
+
+        The factor multiplies the specular term; N·L is multiplied by it before.
+        """
+        color = np.asarray(light.color)
+        self.total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * self.material.diffuse)
+        if highlight_cosine is not None:
+            highlight = model.reflect(highlight_cosine, self.material.parameter(model))
+            highlight = np.where((cosine > 0) & has_highlight, highlight, 0.0)
+            self.gloss += (factor * highlight)[..., np.newaxis] * specular
+
+    @property
+    def intensity(self) -> np.ndarray:
+        """Both sums together, with albedo and emission."""
+        if self.albedo is None:
+            return self.total + self.material.emission
+        tinted = self.total * self.albedo
+        if self.gloss is not self.total:
+            tinted += self.gloss
+        return tinted + self.material.emission
 
 
 def saturate(values: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Triangles to spans and fragments: exact coverage, clipping, depth, perspective-correct normals at ends."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from blysk.golden.number.spans import runs_of
 from blysk.golden.reference.faces import face_normals, seen_from_behind
 from blysk.golden.reference.geometry import any_component, normalise, sum_of_components
+from blysk.golden.reference.levels import span_levels
 from blysk.golden.reference.scene import Scene
 
 __all__ = [
@@ -78,6 +79,9 @@ class Raster:
         Spans that were left out because all of their pixels are hidden.
     repaired_normals : int
         Ends of spans whose interpolated normal was 0. The face's normal takes its place.
+    level : int8 array, shape (S,)
+        Level of each span's texture, see `span_levels`. Empty if no face has a texture with several levels.
+        Parts of a span have the level of the whole span.
     """
 
     x: np.ndarray
@@ -102,6 +106,7 @@ class Raster:
     uncovered: int
     hidden_spans: int
     repaired_normals: int
+    level: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
 
 
 @dataclass(frozen=True)
@@ -318,6 +323,10 @@ def rasterise(scene: Scene) -> Raster:
         _end(corners, fallback, _weights(pieces, piece, column, line)) for column in (left, left + length - 1)
     ]
 
+    level = np.zeros(0, dtype=np.int64)
+    if any(texture.mipmapped for texture in scene.textures.values()):
+        level = span_levels(scene, triangle, [end.weights for end in ends], _slopes(pieces, piece))
+
     offset = _counting(length).astype(np.int16)
     span = np.repeat(np.arange(len(length), dtype=np.int32), length)
     pixel = np.repeat(line * width + left, length)
@@ -345,6 +354,7 @@ def rasterise(scene: Scene) -> Raster:
         uncovered=int((present[2] & ~present[3]).sum()),
         hidden_spans=count - len(kept),
         repaired_normals=sum(int(end.lost.sum()) for end in ends),
+        level=level.astype(np.int8),
     )
 
 
@@ -404,3 +414,9 @@ def _weights(pieces: _Pieces, piece: np.ndarray, x: np.ndarray, y: np.ndarray) -
         share = value / pieces.area[piece] * pieces.weight[piece, edge]
         result += share[:, np.newaxis] * pieces.corner[piece, edge]
     return result
+
+
+def _slopes(pieces: _Pieces, piece: np.ndarray) -> list[np.ndarray]:
+    """Derivatives of `_weights` along x and along y, in pixels, each of shape (count, 3)."""
+    share = pieces.weight / pieces.area[:, np.newaxis]
+    return [np.einsum("pe,pek->pk", of * share, pieces.corner)[piece] for of in pieces.edges()[:2]]

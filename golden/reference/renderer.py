@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blysk.golden.reference.albedo import fragment_albedo
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.faces import face_normals
 from blysk.golden.reference.fragments import fragment_barycentrics, fragment_normals
@@ -171,6 +172,9 @@ def render(
       GPU does: the reference image;
     - ``slerp``: normals on the great circle between the ends of each span, linear in screen space ([T] 2.1).
 
+    Every pixel has its own albedo, of vertex colours and textures. Where a method shades vertices or middles,
+    these have the pixel's albedo.
+
     With point lights or a near viewer L and V belong to the shaded point. This is a fragment's point of the
     surface, a vertex, or the middle of an edge.
 
@@ -209,7 +213,8 @@ def render(
                 chosen = linear[raster.triangle[raster.span[which]]]
                 by_nodes, by_normals = which[chosen], which[~chosen]
             if nodes is not None:
-                colors[raster.pixel[by_nodes]] = nodes.interpolate(by_nodes)
+                albedo = fragment_albedo(scene, raster, by_nodes)
+                colors[raster.pixel[by_nodes]] = nodes.interpolate(by_nodes, albedo)
             if shading in ("phong", "adaptive"):
                 normals = fragment_normals(scene, raster, by_normals)
                 span = raster.span[by_normals]
@@ -221,6 +226,7 @@ def render(
                         raster.triangle,
                         span,
                         points=_points(scene, raster, by_normals),
+                        albedo=fragment_albedo(scene, raster, by_normals),
                     )
                 )
     return ExactFrame(image=image, mask=visible_mask(scene, raster))
@@ -258,11 +264,20 @@ class _NodeColors:
         back[self.place] = raster.back
         back &= scene.flips[shown]
         normals = np.where(back[:, np.newaxis, np.newaxis], -normals, normals)
-        self.colors = saturate(_shade(scene, normals, model, shown, slice(None), points=points))
+        # The intensity is a line of the albedo: it is known by its values at black and at white.
+        self.white = _shade(scene, normals, model, shown, slice(None), points=points)
+        if scene.has_albedo:
+            black = np.zeros_like(normals)
+            self.black = _shade(scene, normals, model, shown, slice(None), points=points, albedo=black)
 
-    def interpolate(self, which: np.ndarray) -> np.ndarray:
-        """Colors of fragments, shape (count, 3)."""
-        colors = self.colors[self.place[self.raster.span[which]]]
+    def interpolate(self, which: np.ndarray, albedo: np.ndarray | None) -> np.ndarray:
+        """Colors of fragments with their albedo, each of shape (count, 3)."""
+        place = self.place[self.raster.span[which]]
+        colors = self.white[place]
+        if albedo is not None:
+            black = self.black[place]
+            colors = black + albedo[:, np.newaxis] * (colors - black)
+        colors = saturate(colors)
         if self.shading == "flat":
             found: np.ndarray = colors[:, 0]
             return found
@@ -289,8 +304,8 @@ def shade_spans(
         Size, background, materials, lights and viewer; the mesh is read for the materials of its faces.
     raster : Raster
         The spans. normal_left, normal_right, length, span, offset, pixel and visible are used. Several
-        materials need triangle, too. Point lights or a near viewer need triangle, weights_left and
-        weights_right. So `dataclasses.replace` may put quantised normals in.
+        materials need triangle, too. Point lights, a near viewer or an albedo need triangle, weights_left and
+        weights_right. Textures need level. So `dataclasses.replace` may put quantised normals in.
     curve : str or callable
         One of `CURVES`, or a function of the normals at both ends and t.
     model : ReflectionModel
@@ -306,7 +321,7 @@ def shade_spans(
     Raises
     ------
     ValueError
-        If the curve is unknown, or the spans lack weights that point lights or a near viewer need.
+        If the curve is unknown, or the spans lack weights that point lights, a near viewer or an albedo need.
     """
     image = _background(scene)
     colors = image.reshape(-1, 3)
@@ -316,7 +331,8 @@ def shade_spans(
         ends = raster.normal_left[span], raster.normal_right[span]
         normals = interpolate(curve, *ends, t) if isinstance(curve, str) else curve(*ends, t)
         points = _points(scene, raster, which)
-        shaded = _shade(scene, normals, model, raster.triangle, span, chord, points)
+        albedo = fragment_albedo(scene, raster, which)
+        shaded = _shade(scene, normals, model, raster.triangle, span, chord, points, albedo)
         colors[raster.pixel[which]] = saturate(shaded)
     return image
 
@@ -336,7 +352,8 @@ def shade_operands(
     scene : Scene
         Size, background, materials and the lights' colours; the mesh is read for the materials of its faces.
     raster : Raster
-        The fragments; span, pixel, visible and triangle are used.
+        The fragments; span, pixel, visible and triangle are used. An albedo needs all that `fragment_albedo`
+        reads.
     cosine, highlight_cosine : arrays, shape (fragments, lights)
         N·L, for a light that fades times its factor; and N·H.
     model : ReflectionModel
@@ -353,8 +370,10 @@ def shade_operands(
     colors = image.reshape(-1, 3)
     for which in _visible(raster):
         material = scene.mesh.material[raster.triangle[raster.span[which]]]
+        albedo = fragment_albedo(scene, raster, which)
         for index, coefficients in enumerate(scene.materials):
-            chosen = which[material == index]
+            own = material == index
+            chosen = which[own]
             shaded = intensity_of_cosines(
                 coefficients,
                 scene.lights,
@@ -364,6 +383,7 @@ def shade_operands(
                 model,
                 scene.distant_viewer,
                 None if factor is None else factor[chosen],
+                None if albedo is None else albedo[own],
             )
             colors[raster.pixel[chosen]] = saturate(shaded)
     return image
@@ -390,8 +410,6 @@ def fragment_positions(scene: Scene, raster: Raster, which: np.ndarray) -> np.nd
     ValueError
         If the raster's weights were left out.
     """
-    if len(raster.weights_left) != len(raster.length):
-        raise ValueError("point lights and a near viewer need the weights of the spans")
     corners = scene.mesh.vertices[scene.mesh.faces[raster.triangle[raster.span[which]]]]
     found: np.ndarray = np.einsum("fn,fnk->fk", fragment_barycentrics(raster, which), corners)
     return found
@@ -424,19 +442,20 @@ def _shade(
     which: np.ndarray | slice,
     chord: bool = False,
     points: np.ndarray | None = None,
+    albedo: np.ndarray | None = None,
 ) -> np.ndarray:
     """Intensities of normals; the first axis is that of their triangles, ``triangles[which]``."""
 
-    def shade(normals: np.ndarray, material: Material, points: np.ndarray | None) -> np.ndarray:
-        viewer = scene.view_vectors(points)
-        return intensity(normals, material, scene.lights, scene.ambient_light, viewer, model, chord, points)
+    def shade(normals: np.ndarray, material: Material, *given: np.ndarray | None) -> np.ndarray:
+        viewer = scene.view_vectors(given[0])
+        return intensity(normals, material, scene.lights, scene.ambient_light, viewer, model, chord, *given)
 
     if len(scene.materials) == 1:
-        return shade(normals, scene.materials[0], points)
+        return shade(normals, scene.materials[0], points, albedo)
     result = np.empty(normals.shape)
     material = scene.mesh.material[triangles[which]]
     for index in np.unique(material):
         chosen = material == index
-        own = None if points is None else points[chosen]
-        result[chosen] = shade(normals[chosen], scene.materials[index], own)
+        given = (None if of is None else of[chosen] for of in (points, albedo))
+        result[chosen] = shade(normals[chosen], scene.materials[index], *given)
     return result

@@ -2,6 +2,7 @@
 
 import operator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.light import Light, Triple, color_triple
 from blysk.golden.reference.lighting import Material
+from blysk.golden.reference.texture import Texture
 
 __all__ = ["BACK_FACES", "LARGEST_SIDE", "VIEWERS", "Scene"]
 
@@ -58,7 +60,7 @@ class Scene:
     ------
     ValueError
         If a value is out of range, or a face has the index of a missing material. If the viewer is near and
-        the camera orthographic.
+        the camera orthographic. If a face has a texture, and the mesh no texture coordinates.
     TypeError
         If a size is not an integer, a light is not a `Light` or a material is not a `Material`.
     """
@@ -92,6 +94,11 @@ class Scene:
         used = 1 + self.mesh.material.max(initial=0)
         if len(self.materials) < used:
             raise ValueError(f"the mesh has faces of {used} materials, the scene {len(self.materials)}")
+        if self.textures and not self.mesh.coordinates.size:
+            raise ValueError(
+                "the material of a face has a texture, and the mesh has no texture coordinates: "
+                "give coordinates, or a material without texture"
+            )
         object.__setattr__(self, "ambient_light", color_triple("a scene's ambient_light", self.ambient_light))
         object.__setattr__(self, "background", color_triple("a scene's background", self.background, 0, 1))
         if self.back_faces not in BACK_FACES:
@@ -111,6 +118,18 @@ class Scene:
         """The scene without the lights that are off."""
         on = tuple(light for light in self.lights if light.is_on)
         return self if len(on) == len(self.lights) else replace(self, lights=on)
+
+    @cached_property
+    def textures(self) -> dict[int, Texture]:
+        """Textures by the index of their material, of materials that faces have."""
+        given = {index: of.texture for index, of in enumerate(self.materials) if of.texture is not None}
+        used = np.unique(self.mesh.material).tolist() if given else []
+        return {index: given[index] for index in used if index in given}
+
+    @property
+    def has_albedo(self) -> bool:
+        """Whether the surface has vertex colours or a texture."""
+        return bool(self.mesh.colors.size or self.textures)
 
     @property
     def culls(self) -> np.ndarray:

@@ -92,6 +92,12 @@ class Texture:
         if self.filter not in FILTERS:
             raise ValueError(f"filter must be one of {', '.join(FILTERS)}, not {self.filter!r}")
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows of level 0."""
+        height, width, _ = self.texels.shape
+        return width, height
+
     @cached_property
     def levels(self) -> tuple[np.ndarray, ...]:
         """Images of all levels that are used, each a float64 array of shape (height, width, 3)."""

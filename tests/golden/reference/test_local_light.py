@@ -118,7 +118,7 @@ def test_local_refusals():
     scene = SCENES["point light"]
     raster = rasterise(scene)
     raster = replace(raster, weights_left=raster.weights_left[:0], weights_right=raster.weights_right[:0])
-    with pytest.raises(ValueError, match=r"^point lights and a near viewer need the weights of the spans$"):
+    with pytest.raises(ValueError, match=r"^point lights, a near viewer and an albedo need the weights"):
         shade_spans(scene, raster, "normalised", BLINN)
 
 
