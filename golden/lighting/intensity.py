@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blysk.golden.number.fixed import UQ, Fixed
+from blysk.golden.number.fixed import UQ, Fixed, Format
 
 __all__ = ["MAX_INTENSITY", "MAX_LIGHTS", "Intensity"]
 
@@ -17,12 +17,12 @@ MAX_LIGHTS = 16
 
 @dataclass(frozen=True)
 class Intensity:
-    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, saturated to 255.
+    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, and saturated.
 
     The products ``k I`` are inputs, *colour operands* in LSB of the 8-bit channel. Their format is
     ``UQ(11, 6)``, 17 bits for the multipliers. So a term may reach 2047.98 LSB, eight times the full channel.
     The sum is exact. Only the operands and the result are rounded: by 2^-7 LSB each times a term of at most
-    1, and by 1/2 LSB.
+    1, and by 1/2 LSB, or with 6 fraction bits by 2^-7 LSB.
 
     Parameters
     ----------
@@ -32,11 +32,13 @@ class Intensity:
         Whether there are specular terms. If not, their inputs must be 0.
     channels : int
         3 or 1. With 1 every channel takes the colour operands of red.
+    fraction_bits : int
+        Fraction bits of the result: 0 for the codes of a picture in linear light, 6 for a `Transfer` behind.
 
     Raises
     ------
     ValueError
-        If the number of lights or channels is out of range.
+        If the number of lights, channels or fraction bits is out of range.
 
     Source: docs/theory/units.md#intensity; [B] 4 and 5, [T] figure 4.10.
     """
@@ -44,16 +46,23 @@ class Intensity:
     lights: int = 1
     has_specular: bool = True
     channels: int = 3
+    fraction_bits: int = 0
 
     COLOR_FORMAT = UQ(11, 6)
     TERM_FORMAT = UQ(0, 17)
-    RESULT_FORMAT = UQ(8, 0)
 
     def __post_init__(self) -> None:
         if not 0 <= self.lights <= MAX_LIGHTS:
             raise ValueError(f"lights must be 0 to {MAX_LIGHTS}, not {self.lights}")
         if self.channels not in (1, 3):
             raise ValueError(f"channels must be 1 or 3, not {self.channels}")
+        if self.fraction_bits not in (0, 6):
+            raise ValueError(f"fraction_bits must be 0 or 6, not {self.fraction_bits}")
+
+    @property
+    def result_format(self) -> Format:
+        """Format of a channel, ``UQ(8, 0)`` or ``UQ(8, 6)``, in LSB of the 8-bit channel."""
+        return UQ(8, self.fraction_bits)
 
     @classmethod
     def color(cls, intensity: np.ndarray) -> np.ndarray:
@@ -86,7 +95,8 @@ class Intensity:
 
         Returns
         -------
-        uint8 array, shape (pixels, 3)
+        uint8 or uint16 array, shape (pixels, 3)
+            Codes of `result_format`.
 
         Raises
         ------
@@ -103,8 +113,9 @@ class Intensity:
         fraction_bits = self.COLOR_FORMAT.fraction_bits + self.TERM_FORMAT.fraction_bits
         total = diffuse.codes @ diffuse_color.codes + specular.codes @ specular_color.codes
         total = total + (ambient.codes << self.TERM_FORMAT.fraction_bits)
-        rounded = Fixed(UQ(17, fraction_bits), total).round_half_up(0).saturate(self.RESULT_FORMAT)
-        channels = rounded.codes.astype(np.uint8)
+        rounded = Fixed(UQ(17, fraction_bits), total).round_half_up(self.fraction_bits)
+        codes = rounded.saturate(self.result_format).codes
+        channels = codes.astype(np.uint16 if self.fraction_bits else np.uint8)
         return channels if self.channels == 3 else np.repeat(channels[:, :1], 3, axis=-1)
 
     def cycles(self, diffuse: Fixed, specular: Fixed) -> np.ndarray:

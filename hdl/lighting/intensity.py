@@ -25,9 +25,9 @@ def color_shape() -> data.ArrayLayout:
     return data.ArrayLayout(FixedShape(_COLOR), 3)
 
 
-def pixel_color_shape() -> data.StructLayout:
-    """Shape of a shaded pixel: red, green, blue in 8 bits."""
-    return data.StructLayout({"r": unsigned(8), "g": unsigned(8), "b": unsigned(8)})
+def pixel_color_shape(fraction_bits: int = 0) -> data.StructLayout:
+    """Shape of a shaded pixel: red, green, blue in 8 bits, and perhaps fraction bits behind the point."""
+    return data.StructLayout(dict.fromkeys("rgb", unsigned(8 + fraction_bits)))
 
 
 def _kinds(model: Intensity) -> tuple[str, ...]:
@@ -48,7 +48,7 @@ def _constants_shape(model: Intensity) -> data.StructLayout:
 
 
 class IntensityUnit(PipelinedUnit):
-    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, saturated to 255.
+    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, and saturated.
 
     Formats and error are those of the bit-accurate model `Intensity`. The sum grows by a bit at each level of
     the adder tree, so nothing wraps.
@@ -68,8 +68,8 @@ class IntensityUnit(PipelinedUnit):
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse": ..., "specular": ...})))`
         A term of each kind for each light, ``UQ(0, 17)``. ``specular`` only if there are specular terms.
-    o : :py:`Out(stream.Signature(pixel_color_shape()))`
-        Channels.
+    o : :py:`Out(stream.Signature(pixel_color_shape(fraction_bits)))`
+        Channels, in the model's `result_format`.
     constants : :py:`In(StructLayout({"ambient", "diffuse", "specular"}))`
         Colour operands, constant while beats are inside: one ``ambient``, and the other two for each light.
 
@@ -94,7 +94,7 @@ class IntensityUnit(PipelinedUnit):
         terms = len(self.kinds) * p.lights
         super().__init__(
             _term_shape(p),
-            pixel_color_shape(),
+            pixel_color_shape(p.fraction_bits),
             latency=5 + terms.bit_length(),
             constants=_constants_shape(p),
         )
@@ -125,8 +125,8 @@ class IntensityUnit(PipelinedUnit):
                     for k, pair in enumerate(pairs)
                 ]
                 level += 1
-            rounded = register(m, terms[0].round_half_up(0), f"rounded_{name}")
-            code = register(m, rounded.saturate(Intensity.RESULT_FORMAT), name).as_value()
+            rounded = register(m, terms[0].round_half_up(self.model.fraction_bits), f"rounded_{name}")
+            code = register(m, rounded.saturate(self.model.result_format), name).as_value()
             of_channel = name if len(channels) > 1 else "rgb"
             m.d.comb += [result[each].eq(code) for each in of_channel]
         return result
@@ -172,7 +172,7 @@ class CompactIntensityUnit(wiring.Component):
         super().__init__(
             {
                 "i": In(stream.Signature(_term_shape(p))),
-                "o": Out(stream.Signature(pixel_color_shape())),
+                "o": Out(stream.Signature(pixel_color_shape(p.fraction_bits))),
                 "constants": In(_constants_shape(p)),
             }
         )
@@ -196,8 +196,9 @@ class CompactIntensityUnit(wiring.Component):
         total = Signal(FixedShape(UQ(11 + self._terms.bit_length(), 23)))
         start = FixedValue(_COLOR, _of_channel(self.constants.ambient, multiplied.channel))
         before = Mux(multiplied.first, Value.cast(start.extend(total.format)), Value.cast(total))
-        rounded = Signal.like(Value.cast(total.round_half_up(0)))
-        channels = [Signal(8, name=name) for name in "rgb"[: last_channel + 1]]
+        fraction_bits, result_format = self.model.fraction_bits, self.model.result_format
+        rounded = Signal.like(Value.cast(total.round_half_up(fraction_bits)))
+        channels = [Signal(result_format.width, name=name) for name in "rgb"[: last_channel + 1]]
         pixel = Cat(*channels, *channels[:1] * (2 - last_channel))
         m.d.comb += advance.eq(skid_buffer(m, self.o, valid, pixel))
         with m.If(advance):
@@ -217,10 +218,11 @@ class CompactIntensityUnit(wiring.Component):
                 # At most 2 lights + 1 numbers under 2^11 each.
                 m.d.sync += total.eq((FixedValue(total.format, before) + product).wrap(total.format))
             with m.If(added.live & added.last):
-                m.d.sync += rounded.eq(Value.cast(total.round_half_up(0)))
+                m.d.sync += rounded.eq(Value.cast(total.round_half_up(fraction_bits)))
             for k, result in enumerate(channels):
                 with m.If(rounding.live & rounding.last & (rounding.channel == k)):
-                    code = FixedValue(UQ(len(rounded), 0), rounded).saturate(Intensity.RESULT_FORMAT)
+                    wide = UQ(len(rounded) - fraction_bits, fraction_bits)
+                    code = FixedValue(wide, rounded).saturate(result_format)
                     m.d.sync += result.eq(code.as_value())
         return m
 

@@ -98,6 +98,8 @@ def _variants():
             yield f"{lights} lights, {style}", Variant(partial(unit, Intensity(lights)), long=is_long)
         p = Intensity(2, channels=1)
         yield f"1 channel, {style}", Variant(partial(unit, p), long=style != "compact")
+        p = Intensity(fraction_bits=6)
+        yield f"6 fraction bits, {style}", Variant(partial(unit, p), long=style != "compact")
         p = Intensity(2, has_specular=False)
         yield f"no highlights, {style}", Variant(partial(unit, p), long=style != "throughput")
 

@@ -9,20 +9,21 @@ from blysk.golden.number.fixed import UQ, Fixed
 COLOR, TERM = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
 
 
-def compute(ambient, diffuse_color, specular_color, diffuse, specular):
-    return Intensity(len(diffuse_color)).compute(
+def compute(ambient, diffuse_color, specular_color, diffuse, specular, fraction_bits=0):
+    return Intensity(len(diffuse_color), fraction_bits=fraction_bits).compute(
         *(Fixed(COLOR, color) for color in (ambient, diffuse_color, specular_color)),
         *(Fixed(TERM, term) for term in (diffuse, specular)),
     )
 
 
-def exact(ambient, diffuse_color, specular_color, diffuse, specular):
+def exact(ambient, diffuse_color, specular_color, diffuse, specular, fraction_bits=0):
     """Python integers, in units of 2^-23 LSB: half added, cut, limited."""
     ambient, diffuse_color, specular_color, diffuse, specular = (
         np.asarray(x).astype(object) for x in (ambient, diffuse_color, specular_color, diffuse, specular)
     )
     total = ambient * 2**17 + diffuse.dot(diffuse_color) + specular.dot(specular_color)
-    return np.minimum((total + 2**22) // 2**23, 255).astype(np.uint8)
+    cut = 23 - fraction_bits
+    return np.minimum((total + (1 << cut - 1)) >> cut, (256 << fraction_bits) - 1).astype(np.uint16)
 
 
 @pytest.mark.parametrize("lights", [1, 2, 7, 16])
@@ -38,6 +39,9 @@ def test_is_exact_to_the_last_rounding(lights, brightness):
     result = compute(*operands)
     assert result.dtype == np.uint8
     np.testing.assert_array_equal(result, exact(*operands))
+    finer = compute(*operands, fraction_bits=6)
+    assert finer.dtype == np.uint16
+    np.testing.assert_array_equal(finer, exact(*operands, fraction_bits=6))
     assert len(np.unique(result)) > (30 if brightness < 8 else 0)
 
 
@@ -107,6 +111,8 @@ def test_bad_arguments_are_refused():
             Intensity(lights)
     with pytest.raises(ValueError, match=r"^channels must be 1 or 3, not 2$"):
         Intensity(channels=2)
+    with pytest.raises(ValueError, match=r"^fraction_bits must be 0 or 6, not 5$"):
+        Intensity(fraction_bits=5)
     ambient, color, term = Fixed(COLOR, [0, 0, 0]), Fixed(COLOR, [[0, 0, 0]]), Fixed(TERM, [[0]])
     other = Fixed(UQ(12, 5), [[0, 0, 0]])
     for colors in ((other, color, color), (ambient, other, color), (ambient, color, other)):

@@ -1,0 +1,108 @@
+"""Output transfer in float64: from linear light to the values that the codes of a picture stand for."""
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["LARGEST_SLOPE", "TRANSFERS", "decode", "encode", "slope"]
+
+TRANSFERS = ("srgb", "linear")
+"""Output transfers: the curve of sRGB, or linear light as it is."""
+
+LARGEST_SLOPE = 12.92
+"""Slope of the curve of sRGB at black, its largest."""
+
+_LAST_LINEAR, _LAST_LINEAR_ENCODED = 0.0031308, 0.04045
+_SCALE, _OFFSET, _EXPONENT = 1.055, 0.055, 2.4
+
+
+def encode(light: npt.ArrayLike, transfer: str = "srgb") -> np.ndarray:
+    """Encoded values of linear light.
+
+    For ``srgb``, up to 0.0031308 the value is ``12.92 x``, and above ``1.055 x^(1/2.4) - 0.055``. It rises
+    from 0 to 1, and its slope falls.
+
+    Parameters
+    ----------
+    light : float array, any shape
+        Linear light; 1 is the full channel. Values outside [0, 1] are limited to this range.
+    transfer : str
+        One of `TRANSFERS`.
+
+    Returns
+    -------
+    float64 array, same shape
+        In [0, 1]; times 255, codes of a picture before rounding.
+
+    Raises
+    ------
+    ValueError
+        If the transfer is unknown.
+
+    Source: docs/theory/textures.md#transfer; IEC 61966-2-1.
+    """
+    light = np.clip(np.asarray(light, dtype=np.float64), 0, 1)
+    if _is_linear(transfer):
+        return light
+    power = light ** (1 / _EXPONENT)
+    # Exactly 1 at 1, as the offset is the scale less 1.
+    curve = power + _OFFSET * (power - 1)
+    found: np.ndarray = np.where(light <= _LAST_LINEAR, LARGEST_SLOPE * light, curve)
+    return found
+
+
+def decode(encoded: npt.ArrayLike, transfer: str = "srgb") -> np.ndarray:
+    """Linear light of encoded values, the inverse of `encode`.
+
+    Parameters
+    ----------
+    encoded : float array, any shape
+        Codes of a picture divided by 255. Values outside [0, 1] are limited to this range.
+    transfer : str
+        One of `TRANSFERS`.
+
+    Returns
+    -------
+    float64 array, same shape
+        In [0, 1]; 1 is the full channel.
+
+    Raises
+    ------
+    ValueError
+        If the transfer is unknown.
+
+    Source: docs/theory/textures.md#transfer; IEC 61966-2-1.
+    """
+    encoded = np.clip(np.asarray(encoded, dtype=np.float64), 0, 1)
+    if _is_linear(transfer):
+        return encoded
+    curve = ((encoded + _OFFSET) / _SCALE) ** _EXPONENT
+    found: np.ndarray = np.where(encoded <= _LAST_LINEAR_ENCODED, encoded / LARGEST_SLOPE, curve)
+    return found
+
+
+def slope(least: float, transfer: str = "srgb") -> float:
+    """Largest slope of `encode` over light of a value or more: 12.92 at black, 0.44 at full light.
+
+    Parameters
+    ----------
+    least : float
+        The least linear light, 0 to 1.
+    transfer : str
+        One of `TRANSFERS`.
+
+    Raises
+    ------
+    ValueError
+        If the transfer is unknown.
+    """
+    if _is_linear(transfer):
+        return 1.0
+    if least <= _LAST_LINEAR:
+        return LARGEST_SLOPE
+    return float(_SCALE / _EXPONENT * min(least, 1) ** (1 / _EXPONENT - 1))
+
+
+def _is_linear(transfer: str) -> bool:
+    if transfer not in TRANSFERS:
+        raise ValueError(f"transfer must be one of {', '.join(TRANSFERS)}, not {transfer!r}")
+    return transfer == "linear"
