@@ -152,13 +152,51 @@ class Material:
         for name, value in (("metallic", metallic), ("roughness", roughness)):
             if not 0 <= value <= 1:
                 raise ValueError(f"{name} must be 0 to 1, not {value}")
+        f0 = 0.04 * (1 - metallic) + metallic * color
+        return cls._of_roughness(ambient * color, (1 - metallic) * color, f0, roughness)
+
+    @classmethod
+    def of_specular_glossiness(
+        cls, diffuse: Sequence[float], specular: Sequence[float], glossiness: float, ambient: float = 0.1
+    ) -> "Material":
+        """Material of the factors of glTF's extension KHR_materials_pbrSpecularGlossiness.
+
+        ``F_0 = specular``, ``k_d = (1 - max(F_0)) diffuse``, and the roughness is ``1 - glossiness``. The
+        rest follows as in `of_metallic_roughness`.
+
+        Parameters
+        ----------
+        diffuse, specular : three floats
+            Linear colours, 0 to 1 a channel.
+        glossiness : float
+            Factor, 0 to 1.
+        ambient : float
+            k_a, as a share of ``k_d + F_0``, of 1 at most.
+
+        Raises
+        ------
+        ValueError
+            If a value is out of range.
+
+        Notes
+        -----
+        Source: docs/theory/models.md#reflection-models; KHR_materials_pbrSpecularGlossiness.
+        """
+        f0 = np.array(triple("a specular colour", specular, 0, 1))
+        color = (1 - f0.max()) * np.array(triple("a diffuse colour", diffuse, 0, 1))
+        if not 0 <= glossiness <= 1:
+            raise ValueError(f"glossiness must be 0 to 1, not {glossiness}")
+        return cls._of_roughness(ambient * np.minimum(color + f0, 1), color, f0, 1 - glossiness)
+
+    @classmethod
+    def _of_roughness(
+        cls, ambient: np.ndarray, diffuse: np.ndarray, f0: np.ndarray, roughness: float
+    ) -> "Material":
+        """Material of k_a, k_d and F_0; k_s and the exponent follow."""
         roughness = max(float(roughness), LEAST_ROUGHNESS)
         exponent = round(min(max(exponent_of_roughness(roughness), 1), 1000))
-        dielectric = 1 - metallic
-        f0 = 0.04 * dielectric + metallic * color
         peak = min(1 / (4 * roughness**4), 1 / max(f0.max(), 0.25))
-        diffuse = tuple(dielectric * color)
-        return cls(tuple(ambient * color), diffuse, (peak,) * 3, exponent, roughness, tuple(f0))
+        return cls(tuple(ambient), tuple(diffuse), (peak,) * 3, exponent, roughness, tuple(f0))
 
     def reflection(self, cosine: float | None = None) -> np.ndarray:
         """k_s with Fresnel's reflection: ``k_s F``, or k_s where there is no ``fresnel``; shape (3,).

@@ -4,12 +4,15 @@ from collections.abc import Callable, Collection, Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from blysk.golden.reference.lighting import Material, Triple
+from blysk.golden.reference.texture import Texture
 from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, shown
 
 __all__ = ["FileMaterial", "Found", "color_of", "surfaces"]
 
 # k_a of a material whose k_d is the file's: most MTL files have a Ka of 1, which would wash the picture out.
 _AMBIENT_SHARE = 0.1
+# From this metallic factor on, colours of vertices and texels are those of a metal.
+_TINTED = 0.5
 # Names of a kind in the list of what is not read; the others are counted.
 _MOST_NAMES = 12
 
@@ -36,6 +39,16 @@ class FileMaterial:
         F_0 of `Material`, and k_a. ``None`` of k_a: a share of the diffuse colour.
     two_sided : bool
         Whether its faces are seen from behind, too.
+    texture : Texture or None
+        Image that multiplies the diffuse colour.
+    emission : three floats or None
+        Light of the surface itself, 0 or more.
+    unlit : bool
+        Whether the surface shows its diffuse colour, whatever the lights.
+    metallic : float or None
+        Metallic factor, 0 to 1. The other values hold its effect on a surface of one colour.
+    colored : bool
+        Whether colours of the vertices multiply the diffuse colour.
     """
 
     name: str = ""
@@ -46,6 +59,11 @@ class FileMaterial:
     fresnel: Triple | None = None
     ambient: Triple | None = None
     two_sided: bool = False
+    texture: Texture | None = None
+    emission: Triple | None = None
+    unlit: bool = False
+    metallic: float | None = None
+    colored: bool = False
 
     @classmethod
     def of_metallic_roughness(
@@ -53,8 +71,24 @@ class FileMaterial:
     ) -> "FileMaterial":
         """A material of glTF's factors, 0 to 1 each, see `Material.of_metallic_roughness`."""
         made = Material.of_metallic_roughness(base, metallic, roughness, _AMBIENT_SHARE)
-        names = ("diffuse", "specular", "exponent", "roughness", "fresnel", "ambient")
-        return cls(name, **{field: getattr(made, field) for field in names}, two_sided=two_sided)
+        return replace(cls._of(name, made, two_sided), metallic=float(metallic))
+
+    @classmethod
+    def of_specular_glossiness(
+        cls, name: str, diffuse: Triple, specular: Triple, glossiness: float, two_sided: bool = False
+    ) -> "FileMaterial":
+        """A material of an extension's factors, 0 to 1 each, see `Material.of_specular_glossiness`."""
+        made = Material.of_specular_glossiness(diffuse, specular, glossiness, _AMBIENT_SHARE)
+        return cls._of(name, made, two_sided)
+
+    @classmethod
+    def _of(cls, name: str, made: Material, two_sided: bool) -> "FileMaterial":
+        return cls(name, **{said: getattr(made, said) for said in _SAID}, two_sided=two_sided)
+
+    @property
+    def has_albedo(self) -> bool:
+        """Whether its colour differs from pixel to pixel."""
+        return self.colored or self.texture is not None
 
 
 @dataclass
@@ -124,6 +158,10 @@ def surfaces(
     If ``fixed`` has the exponent, the file's roughness does not count. In the same way the specular colour
     excludes the file's F_0, and the diffuse colour its k_a.
 
+    Colours of vertices and textures stay, and multiply the diffuse colour, also that of an option. A material
+    that has them and no diffuse colour gets white. They multiply highlights, too, if the metallic factor is
+    1/2 or more. An emission over 1 counts as 1, which already gives the brightest pixel.
+
     Parameters
     ----------
     materials : sequence of FileMaterial
@@ -136,9 +174,15 @@ def surfaces(
     result = []
     for material in materials:
         said = {name: getattr(material, name) for name in _SAID}
-        if material.diffuse is not None and material.ambient is None:
-            said["ambient"] = tuple(_AMBIENT_SHARE * channel for channel in material.diffuse)
+        if material.has_albedo and material.diffuse is None:
+            said["diffuse"] = (1.0, 1.0, 1.0)
+        if said["diffuse"] is not None and material.ambient is None:
+            said["ambient"] = tuple(_AMBIENT_SHARE * channel for channel in said["diffuse"])
         hidden = {*fixed, *(other for name, other in _INSTEAD if name in fixed)}
         said = {name: value for name, value in said.items() if value is not None and name not in hidden}
-        result.append(replace(default, **said, two_sided=material.two_sided))
+        looks = {name: getattr(material, name) for name in ("two_sided", "texture", "unlit")}
+        looks["tinted"] = material.has_albedo and (material.metallic or 0.0) >= _TINTED
+        if material.emission is not None:
+            looks["emission"] = tuple(min(channel, 1.0) for channel in material.emission)
+        result.append(replace(default, **said, **looks))
     return tuple(result)

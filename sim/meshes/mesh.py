@@ -4,7 +4,7 @@ import io
 import logging
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -45,7 +45,7 @@ from blysk.sim.run_files import OutputIsInput, reads
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["LoadedMesh", "given_mesh", "load_mesh"]
+__all__ = ["LoadedMesh", "given_mesh", "load_mesh", "merged"]
 
 
 GIVE_ARRAYS = "give (vertices, faces) or (vertices, faces, normals)"
@@ -55,6 +55,12 @@ GIVE_A_MESH = (
 )
 
 
+# Coordinates beyond which the steps of a float32 are as large as an image of 8 texels.
+_FARTHEST = 2.0**20
+# How far from 0 to 1 a colour may lie by rounding.
+_ROUNDED = 1e-6
+
+
 @dataclass(frozen=True)
 class LoadedMesh:
     """A mesh, its materials, and the counts of repairs.
@@ -62,7 +68,7 @@ class LoadedMesh:
     Parameters
     ----------
     mesh : Mesh
-        The triangles, with unit vertex normals.
+        The triangles, with unit vertex normals, and perhaps colours and texture coordinates.
     name : str
         ``teapot``, or the file's name without folder and suffix.
     repaired_normals : int
@@ -77,8 +83,8 @@ class LoadedMesh:
         Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
         differ in more than the name.
     ignored : tuple of str
-        Contents or references of the file that change a picture and are not read: textures, vertex colours,
-        alpha, a missing material file, and the names that a reader does not know.
+        Contents or references of the file that change a picture and are not read: alpha, textures other than
+        those of the colour, a missing image or material file, and the names that a reader does not know.
     """
 
     mesh: Mesh
@@ -175,7 +181,7 @@ def load_mesh(
             scene, found = _load_scene(path, data, materials)
         # Overflow and NaN are looked for, and reported, in what comes out.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _assemble(scene, found, path, data, crease_angle)
+            return _assemble(scene, found, path, data, crease_angle, materials)
     except Refused as refusal:
         raise InputError(source, refusal.reason, refusal.remedy) from None
     except OutputIsInput:
@@ -260,7 +266,8 @@ def _of_arrays(source: Sequence[ArrayLike], crease_angle: float) -> LoadedMesh:
         raise Refused(f"there are {len(normals)} normals for {len(vertices)} vertices", GIVE_ARRAYS)
     flags = np.full(len(vertices), "normals" in arrays)
     material = np.zeros(len(faces), dtype=np.int64)
-    return _finish(vertices, faces, material, normals, flags, "arrays", 0, crease_angle)
+    none = np.zeros((0, 3)), np.zeros((0, 2))
+    return _finish(vertices, faces, material, normals, flags, *none, "arrays", 0, crease_angle)
 
 
 def _fault(error: Exception) -> str:
@@ -350,9 +357,18 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
 
 
 def _assemble(
-    scene: "trimesh.Scene", found: Found, path: Path, data: bytes, crease_angle: float
+    scene: "trimesh.Scene",
+    found: Found,
+    path: Path,
+    data: bytes,
+    crease_angle: float,
+    painted: bool = False,
 ) -> LoadedMesh:
-    """All triangles of a scene in world coordinates, as one mesh."""
+    """All triangles of a scene in world coordinates, as one mesh.
+
+    If it is ``painted``, a part's metadata may have ``"colors"``, a float64 array of shape (V, 3), linear,
+    and ``"coordinates"``, a float64 array of shape (V, 2), with v from the top of the image.
+    """
     import trimesh
 
     nodes = _placed(scene)
@@ -368,6 +384,8 @@ def _assemble(
     # trimesh drops the normals of an OBJ file if one of their indices is missing or out of range.
     promised = path.suffix.lower() == ".obj" and re.search(rb"^f\b.*/-?\d*/-?\d", data, re.MULTILINE)
     vertices, normals, faces, material, lost = [], [], [], [], 0
+    colors: list[np.ndarray | None] = []
+    coordinates: list[np.ndarray | None] = []
     offset = 0
     for matrix, geometry, number in nodes:
         part, triangles = np.array(geometry.vertices), np.array(geometry.faces)
@@ -389,8 +407,12 @@ def _assemble(
             part = part @ rotation.T + matrix[:3, 3]
             stored = transformed(stored, -cofactors if mirrored else cofactors)
             triangles = triangles[:, ::-1] if mirrored else triangles
+        metadata = geometry.metadata if painted else {}
+        colors.append(_colors(metadata.get("colors"), triangles, found))
+        coordinates.append(_coordinates(metadata.get("coordinates"), triangles))
+        kind = 4 * number + 2 * (colors[-1] is not None) + (coordinates[-1] is not None)
         faces.append(triangles + offset)
-        material.append(np.full(len(triangles), number))
+        material.append(np.full(len(triangles), kind))
         vertices.append(part)
         normals.append((stored, np.full(len(part), has_normals)))
         offset += len(part)
@@ -400,11 +422,56 @@ def _assemble(
         np.concatenate(material),
         np.concatenate([stored for stored, _ in normals]),
         np.concatenate([flag for _, flag in normals]),
+        _joined(colors, vertices, np.ones((1, 3))),
+        _joined(coordinates, vertices, np.zeros((1, 2))),
         path.stem,
         lost,
         crease_angle,
     )
     return _with_materials(loaded, found)
+
+
+def _colors(given: np.ndarray | None, faces: np.ndarray, found: Found) -> np.ndarray | None:
+    """Colours of a part's vertices, 0 to 1; colours over 1 are told."""
+    if given is None:
+        return None
+    used = np.unique(faces)
+    seen = given[used]
+    if wrong := np.flatnonzero(~(np.isfinite(seen) & (seen >= -_ROUNDED)).all(axis=1)).tolist():
+        text = " ".join(f"{channel:g}" for channel in seen[wrong[0]].tolist())
+        raise Refused(f"a vertex has the colour {text!r}, not three numbers from 0", ONE_MATERIAL)
+    over = int((seen > 1 + _ROUNDED).any(axis=1).sum())
+    found.tell("vertex colour's part over 1", "vertex colours' parts over 1", over)
+    result = np.ones(given.shape)
+    result[used] = np.clip(seen, 0, 1)
+    return result
+
+
+def _coordinates(given: np.ndarray | None, faces: np.ndarray) -> np.ndarray | None:
+    """Texture coordinates of a part's vertices, finite."""
+    if given is None:
+        return None
+    used = np.unique(faces)
+    if wrong := np.flatnonzero(~(np.abs(given[used]) <= _FARTHEST).all(axis=1)).tolist():
+        text = " ".join(f"{number:g}" for number in given[used[wrong[0]]].tolist())
+        raise Refused(
+            f"a vertex has the texture coordinates {text!r}, not numbers to {_FARTHEST:,.0f}", ONE_MATERIAL
+        )
+    result = np.zeros(given.shape)
+    result[used] = given[used]
+    return result
+
+
+def _joined(parts: list[np.ndarray | None], vertices: list[np.ndarray], other: np.ndarray) -> np.ndarray:
+    """Values of all vertices, with another value where a part has none; no rows if no part has any."""
+    if all(part is None for part in parts):
+        return other[:0]
+    return np.concatenate(
+        [
+            np.repeat(other, len(of), axis=0) if part is None else part
+            for part, of in zip(parts, vertices, strict=True)
+        ]
+    )
 
 
 def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
@@ -433,11 +500,46 @@ def _number(name: str, geometry: object, path: Path) -> int:
 
 
 def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
-    """The mesh with the materials that its faces use, numbered from 0, equal ones merged."""
+    """The mesh with the materials that its faces use, numbered from 0, equal ones merged.
+
+    The faces have four times the number of their material in the file, plus 2 if their vertices have colours,
+    plus 1 if these have texture coordinates.
+    """
+    used = np.unique(loaded.mesh.material).tolist()
+    read = {number: found.read(number) for number in sorted({kind // 4 for kind in used})}
+    materials = {}
+    for kind in used:
+        material = read[kind // 4]
+        # White vertices are white, and not of the colour of a default.
+        colored = kind & 2 > 0 and (len(loaded.mesh.colors) > 0 or material.diffuse is None)
+        material = replace(material, colored=colored)
+        if material.texture is not None and not kind & 1:
+            found.tell("texture of a part without coordinates", "textures of parts without coordinates")
+            material = replace(material, texture=None)
+        if material.has_albedo and 0 < (material.metallic or 0.0) < 1:
+            found.tell("the exact highlights of colours that are partly metallic")
+        materials[kind] = material
+    loaded = merged(loaded, materials)
+    mesh = loaded.mesh
+    if all(material.texture is None for material in loaded.materials):
+        mesh = replace(mesh, coordinates=mesh.coordinates[:0])
+    return replace(loaded, mesh=mesh, ignored=found.ignored)
+
+
+def merged(loaded: LoadedMesh, of: Mapping[int, FileMaterial]) -> LoadedMesh:
+    """A mesh with materials numbered from 0, equal ones merged; its faces have the keys of these materials.
+
+    Raises
+    ------
+    Refused
+        If there are more than 1024.
+    """
     used, of_face = np.unique(loaded.mesh.material, return_inverse=True)
-    places, materials, of_used = {}, [], []
+    places: dict[FileMaterial, int] = {}
+    materials: list[FileMaterial] = []
+    of_used = []
     for number in used.tolist():
-        material = found.read(number)
+        material = of[number]
         place = places.setdefault(replace(material, name=""), len(materials))
         if place == len(materials):
             materials.append(material)
@@ -450,7 +552,6 @@ def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
         loaded,
         mesh=replace(loaded.mesh, material=np.array(of_used)[of_face.ravel()]),
         materials=tuple(materials),
-        ignored=found.ignored,
     )
 
 
@@ -460,6 +561,8 @@ def _finish(
     material: np.ndarray,
     normals: np.ndarray,
     has_normals: np.ndarray,
+    colors: np.ndarray,
+    coordinates: np.ndarray,
     name: str,
     lost: int,
     crease_angle: float,
@@ -484,17 +587,23 @@ def _finish(
     faces, material, directions = faces[found], material[found], directions[found]
 
     kept = has_normals[faces[:, 0]]
+    if (colors == 1).all():
+        colors = colors[:0]
+    looks = np.concatenate([given for given in (colors, coordinates) if len(given)] or [colors], axis=1)
     corner, smooth_faces, smooth_normals = crease_normals(
-        scaled, faces[~kept], directions[~kept], crease_angle
+        scaled, faces[~kept], directions[~kept], crease_angle, looks
     )
     own = np.unique(faces[kept])
     own_normals, repaired = repaired_normals(scaled, faces[kept], directions[kept], normals, own)
     renumbered = np.searchsorted(own, faces[kept])
+    kept_vertices = np.concatenate([own, corner])
     mesh = Mesh(
-        vertices=np.concatenate([vertices[own], vertices[corner]]),
+        vertices=vertices[kept_vertices],
         faces=np.concatenate([renumbered, smooth_faces + len(own)]).astype(np.int64),
         normals=np.concatenate([own_normals, smooth_normals]),
         material=np.concatenate([material[kept], material[~kept]]).astype(np.int64),
+        colors=colors[kept_vertices] if len(colors) else colors,
+        coordinates=coordinates[kept_vertices] if len(coordinates) else coordinates,
     )
     opposed = (np.einsum("fki,fi->fk", own_normals[renumbered], directions[kept]) < 0).all(axis=1).sum()
     return LoadedMesh(mesh, name, repaired + lost, dropped, int(opposed))

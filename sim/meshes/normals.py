@@ -128,12 +128,19 @@ def repaired_normals(
 
 
 def crease_normals(
-    vertices: np.ndarray, faces: np.ndarray, directions: np.ndarray, crease_angle: float
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    directions: np.ndarray,
+    crease_angle: float,
+    looks: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cut a mesh at its creases: the old vertex of each new vertex, the new faces, and the new normals.
 
     ``directions`` are the unit normals of the faces. Two corners at one position share a new vertex if a
     chain of faces around the position joins them. The faces of the chain meet at edges that are no creases.
+
+    ``looks`` are colours and texture coordinates, a row for each old vertex, or no rows. Corners that share a
+    normal and differ in their looks have vertices of their own.
     """
     if not len(faces):
         return np.zeros(0, dtype=np.int64), faces, np.zeros((0, 3))
@@ -157,9 +164,16 @@ def crease_normals(
     graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(faces.size, faces.size))
     count, group = connected_components(graph, directed=False)
     new_faces = group.reshape(faces.shape).astype(np.int64)
+    normals = weighted_normals(vertices, faces, directions, new_faces, count)
+    if len(looks):
+        _, look = np.unique(looks + 0.0, axis=0, return_inverse=True)
+        pairs = group.astype(np.int64) * len(looks) + look.ravel()[faces.ravel()]
+        pairs, group = np.unique(pairs, return_inverse=True)
+        normals, count = normals[pairs // len(looks)], len(pairs)
+        new_faces = group.reshape(faces.shape).astype(np.int64)
     old_vertex = np.zeros(count, dtype=np.int64)
     old_vertex[group] = faces.ravel()
-    return old_vertex, new_faces, weighted_normals(vertices, faces, directions, new_faces, count)
+    return old_vertex, new_faces, normals
 
 
 def transformed(normals: np.ndarray, cofactors: np.ndarray) -> np.ndarray:

@@ -366,3 +366,16 @@ def test_material_of_metallic_roughness():
     for values, name in (((-0.1, 0.5), "metallic"), ((0.5, 1.1), "roughness")):
         with pytest.raises(ValueError, match=rf"^{name} must be 0 to 1, not"):
             Material.of_metallic_roughness(base, *values)
+
+
+def test_material_of_specular_glossiness():
+    """With F_0 = 0.04 a dielectric's, but for the diffuse light that F_0 takes; without diffuse a metal."""
+    base = (0.8, 0.5, 0.2)
+    made = Material.of_specular_glossiness(base, (0.04,) * 3, 0.6)
+    same = Material.of_metallic_roughness(base, 0, 0.4)
+    assert made.diffuse == pytest.approx([0.96 * channel for channel in base])
+    assert (made.specular, made.exponent, made.fresnel) == (same.specular, same.exponent, same.fresnel)
+    metal = Material.of_specular_glossiness((0, 0, 0), base, 0.6)
+    assert metal == Material.of_metallic_roughness(base, 1, 0.4)
+    with pytest.raises(ValueError, match=r"^glossiness must be 0 to 1, not 1.5"):
+        Material.of_specular_glossiness(base, base, 1.5)
