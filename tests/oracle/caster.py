@@ -2,12 +2,14 @@
 
 It takes plain numbers and arrays and imports nothing of blysk. A ray goes through each pixel centre; of a
 triangle that it meets, the barycentric coordinates in space weight the normals of the corners, whose sum is
-normalised. That is what perspective-correct interpolation means, without a line of rasterisation.
+normalised. That is what perspective-correct interpolation means, without a line of rasterisation. The same
+coordinates weight colours and texture coordinates of the corners.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 MODELS = {
     "blinn": lambda c, n: np.maximum(c, 0) ** n,
@@ -79,6 +81,40 @@ class View:
 
 
 @dataclass
+class Paint:
+    """Colours and texture coordinates of vertices, and an image; each may be missing."""
+
+    faces: np.ndarray
+    colors: np.ndarray | None = None
+    coordinates: np.ndarray | None = None
+    image: np.ndarray | None = None
+    wrap: tuple = ("wrap", "wrap")
+    """Of u and of v, in the words of `numpy.pad`: ``wrap``, ``symmetric``, ``edge``."""
+    order: int = 1
+    """1: bilinear; 0: nearest."""
+
+    def at(self, index, weights):
+        """Albedo at points of a triangle, from barycentric coordinates of shape (..., 3)."""
+        face, albedo = self.faces[index], np.ones(weights.shape)
+        if self.colors is not None:
+            albedo = albedo * (weights @ self.colors[face])
+        if self.image is None:
+            return albedo
+        return albedo * self.texel(weights @ self.coordinates[face])
+
+    def texel(self, place):
+        """Colours of the image, continued as far as the places of shape (..., 2) go."""
+        size = np.array(self.image.shape[1::-1])
+        # Centres of texels at whole numbers.
+        x, y = np.moveaxis(place * size - 0.5, -1, 0)
+        margin = 2 + int(np.ceil(max(-x.min(), -y.min(), x.max() - size[0], y.max() - size[1], 0)))
+        whole = np.pad(self.image, ((0, 0), (margin, margin), (0, 0)), self.wrap[0])
+        whole = np.pad(whole, ((margin, margin), (0, 0), (0, 0)), self.wrap[1])
+        at = [y + margin, x + margin]
+        return np.stack([map_coordinates(whole[..., k], at, order=self.order) for k in range(3)], axis=-1)
+
+
+@dataclass
 class Picture:
     """What the caster sees at every pixel; arrays of the picture's size."""
 
@@ -89,18 +125,45 @@ class Picture:
     """The lesser of the least barycentric coordinate and the relative distance to the next surface behind."""
 
 
+def meet(view, corners, x, y):
+    """Barycentric coordinates of shape (..., 3) and ray lengths, where rays through pixels meet a plane."""
+    origin, ray = view.rays(x, y)
+    # Moeller and Trumbore: origin + t ray = (1 - u - v) a + u b + v c.
+    a, ab, ac = corners[0], corners[1] - corners[0], corners[2] - corners[0]
+    p, s = np.cross(ray, ac), origin - a
+    q, volume = np.cross(s, ab), p @ ab
+    # A ray along the triangle's plane meets it nowhere.
+    volume = np.where(volume == 0, np.nan, volume)
+    u, v, t = (s * p).sum(axis=-1) / volume, (ray * q).sum(axis=-1) / volume, q @ ac / volume
+    return np.stack([1 - u - v, u, v], axis=-1), t
+
+
 def cast(
-    vertices, faces, normals, view, light, coefficients, exponent, model, steps=None, f0=None, one_sided=()
+    vertices,
+    faces,
+    normals,
+    view,
+    light,
+    coefficients,
+    exponent,
+    model,
+    steps=None,
+    f0=None,
+    one_sided=(),
+    paint=None,
+    tinted=False,
+    emission=(0.0, 0.0, 0.0),
 ):
     """Colours 0 to 255, not rounded, of one directional white light.
 
     ``coefficients`` are k_a, k_d and k_s, each of three channels; with ``steps``, corners stand on a grid of
     so many places a pixel. Normals are turned where the triangle is seen from behind; triangles of the
-    indices ``one_sided`` are then not seen. With ``f0``, k_s is of Fresnel's reflection, by Schlick.
+    indices ``one_sided`` are then not seen. With ``f0``, k_s is of Fresnel's reflection, by Schlick. A
+    ``paint`` gives the surface an albedo, which a ``tinted`` highlight takes, too.
     """
     shape = (view.height, view.width)
     depth, second = np.full(shape, np.inf), np.full(shape, np.inf)
-    normal, inside = np.zeros((*shape, 3)), np.zeros(shape)
+    normal, inside, albedo = np.zeros((*shape, 3)), np.zeros(shape), np.ones((*shape, 3))
     for index, face in enumerate(np.asarray(faces)):
         corners = np.asarray(vertices, dtype=np.float64)[face]
         x, y, far = view.places(corners)
@@ -114,28 +177,24 @@ def cast(
             continue
         place = np.s_[first[0] : last[0], first[1] : last[1]]
         j, i = np.mgrid[place]
-        origin, ray = view.rays(i + 0.5, j + 0.5)
-        # Moeller and Trumbore: origin + t ray = (1 - u - v) a + u b + v c.
-        a, ab, ac = corners[0], corners[1] - corners[0], corners[2] - corners[0]
-        p, s = np.cross(ray, ac), origin - a
-        q, volume = np.cross(s, ab), p @ ab
-        # A ray along the triangle's plane meets it nowhere.
-        volume = np.where(volume == 0, np.nan, volume)
-        u, v, t = (s * p).sum(axis=-1) / volume, (ray * q).sum(axis=-1) / volume, q @ ac / volume
-        least = np.minimum(np.minimum(u, v), 1 - u - v)
+        weights, t = meet(view, corners, i + 0.5, j + 0.5)
+        least = weights.min(axis=-1)
         hit = (least >= 0) & (t > view.near)
+        _, ray = view.rays(i + 0.5, j + 0.5)
+        from_behind = ray @ np.cross(corners[1] - corners[0], corners[2] - corners[0]) > 0
         if index in one_sided:
-            hit &= ray @ np.cross(ab, ac) < 0
+            hit &= ~from_behind
         nearer = hit & (t < depth[place])
         second[place] = np.where(
             nearer, depth[place], np.where(hit, np.minimum(second[place], t), second[place])
         )
         depth[place] = np.where(nearer, t, depth[place])
         inside[place] = np.where(nearer, least, inside[place])
-        weights = np.stack([1 - u - v, u, v], axis=-1)
-        towards = np.where((ray @ np.cross(ab, ac) > 0)[..., None], -1.0, 1.0)
+        towards = np.where(from_behind[..., None], -1.0, 1.0)
         own = unit(weights @ np.asarray(normals, dtype=np.float64)[face]) * towards
         normal[place] = np.where(nearer[..., None], own, normal[place])
+        if paint is not None and nearer.any():
+            albedo[place][nearer] = paint.at(index, weights[nearer])
     hit = np.isfinite(depth)
     to_light, to_viewer = unit(light), -view.forward
     cosine = normal @ to_light
@@ -147,7 +206,8 @@ def cast(
     if f0 is not None:
         k_s = k_s * (f0 + (1 - np.asarray(f0)) * (1 - to_viewer @ halfway) ** 5)
     term = MODELS[model](highlight, exponent) * (cosine > 0)
-    color = k_a + k_d * np.maximum(cosine, 0)[..., None] + k_s * term[..., None]
+    color = albedo * (k_a + k_d * np.maximum(cosine, 0)[..., None]) + emission
+    color += (albedo if tinted else 1) * k_s * term[..., None]
     behind = np.where(np.isfinite(second), second, 2 * np.where(hit, depth, 1))
     margin = np.where(hit, np.minimum(inside, behind / np.where(hit, depth, 1) - 1), 0)
     return Picture(255 * np.clip(color, 0, 1), cosine, hit, margin)

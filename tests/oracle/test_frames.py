@@ -68,25 +68,22 @@ def camera_of(name: str, projection: str) -> Camera:
     return Camera((0.1, 0.2, 2.2), (0.0, 0.0, 0.0), projection=projection, height=2.4, field_of_view=70.0)
 
 
+def view_of(scene: Scene) -> View:
+    """The scene's camera for the ray caster."""
+    camera = scene.camera
+    perspective = camera.projection == "perspective"
+    of_projection = perspective, camera.field_of_view, camera.height, camera.near
+    return View(camera.position, camera.target, scene.width, scene.height, *of_projection)
+
+
 def held(scene: Scene, design, light=LIGHT, **options) -> tuple[np.ndarray, float]:
     """Errors at the pixels that are not in doubt, in LSB; and the project's own method error."""
-    camera, (width, height) = scene.camera, SIZE
-    view = View(
-        camera.position,
-        camera.target,
-        width,
-        height,
-        camera.projection == "perspective",
-        camera.field_of_view,
-        camera.height,
-        camera.near,
-    )
     mesh = scene.mesh
     seen = cast(
         mesh.vertices,
         mesh.faces,
         mesh.normals,
-        view,
+        view_of(scene),
         light,
         COEFFICIENTS,
         scene.materials[0].exponent,
