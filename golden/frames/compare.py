@@ -182,14 +182,15 @@ def target_of(design: ShadingPipeline) -> ReflectionModel:
 def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None) -> float | None:
     """Bound of the error against exact normals of every pixel with the same model, in LSB.
 
-    For each material, multiply each light's colour by the sum of diffuse and specular reflection, and add
-    these products of all lights. Let c be the largest channel of these sums; 1 is the full channel. Then::
+    For each material that is not unlit, multiply each light's colour by the sum of diffuse and specular
+    reflection, and add these products of all lights. Let c be the largest channel of these sums; 1 is the
+    full channel. Then::
 
         arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
 
     The half is the rounding of the pixel. The quarter is the tolerance of cut spans. It is checked at some
     places of a span; a proof for all places is missing (docs/theory/chord.md#where-spans-are-cut). The
-    sixteenth holds the rounding of operands and terms.
+    sixteenth holds the rounding of operands and terms. It is at least 1/128, for the ambient operand.
 
     The bound holds for spans from software, and off the border of every light, see `border_mask`.
 
@@ -206,13 +207,16 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
         The bound of the method error. ``None``: no bound is known, in one of these cases:
 
         - another method than ``chord-local``, ``renormalise`` and ``quotient``;
+        - vertex colours or textures;
         - a pipeline for other materials than the scene's;
         - a measured curve;
         - a roughness under `LEAST_ROUGHNESS`;
         - ``renormalise`` with a lobe for which `Lobe.scale_of` gives a scale. Its words of 1 - N·H are too
           coarse for this sharp lobe.
     """
-    return None if design.specular is None else design.interpolator.bound(_Bounds(scene, design, cut))
+    if design.specular is None or scene.has_albedo:
+        return None
+    return design.interpolator.bound(_Bounds(scene, design, cut))
 
 
 @dataclass(frozen=True)
@@ -267,11 +271,11 @@ def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
     viewer, brightness = scene.distant_viewer, 0.0
     for material in scene.materials:
         total = np.zeros(3)
-        for light in scene.lights:
+        for light in () if material.unlit else scene.lights:
             reflected = material.diffuse + material.reflection(distant_cosine(light, viewer))
             total += light.color * reflected
         brightness = max(brightness, float(total.max()))
-    return 0.5 + brightness / 16 + brightness / 4
+    return 0.5 + max(brightness / 16, 1 / 128) + brightness / 4
 
 
 def highlight_step(scene: Scene, model: ReflectionModel) -> float:
@@ -283,6 +287,8 @@ def highlight_step(scene: Scene, model: ReflectionModel) -> float:
     brightest = max((max(light.color) for light in scene.lights), default=0.0)
     steps = [0.0]
     for material in scene.materials:
+        if material.unlit:
+            continue
         before, behind = model.reflect(np.array([1e-6, -1e-6]), material.parameter(model))
         steps.append(float(255 * (before - behind) * max(material.specular) * brightest))
     return max(steps) if max(steps) > 0.25 else 0.0
@@ -292,7 +298,7 @@ def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndar
     """Shown pixels at the border of a light, where its term switches between on and off.
 
     There ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if there is a `highlight_step`. An error there may be as
-    large as the term.
+    large as the term. An unlit surface has no border.
 
     Parameters
     ----------
@@ -309,7 +315,8 @@ def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndar
     """
     mask = np.zeros(scene.height * scene.width, dtype=bool)
     steps = highlight_step(scene, model) > 0
-    shown = np.flatnonzero(raster.visible)
+    is_lit = np.array([not material.unlit for material in scene.materials])
+    shown = np.flatnonzero(raster.visible & is_lit[scene.mesh.material[raster.triangle]][raster.span])
     for start in range(0, len(shown), _CHUNK):
         which = shown[start : start + _CHUNK]
         normals = fragment_normals(scene, raster, which)
@@ -349,7 +356,7 @@ def compare_triangles(
     """Errors of a picture by triangles, with the bound of the method ``quotient``.
 
     The bound holds where the picture shows the triangle that the exact picture shows, see
-    `quotient_triangle_bound`. Other methods have no known bound.
+    `quotient_triangle_bound`. Other methods, vertex colours and textures have no known bound.
 
     Parameters
     ----------
@@ -363,7 +370,7 @@ def compare_triangles(
         The frame buffer.
     """
     design, bound = renderer.design, None
-    if design.specular is not None:
+    if design.specular is not None and not scene.has_albedo:
         bound = design.interpolator.bound(_TriangleBounds(scene, renderer, sent))
     return _compare(scene, design, image, rasterise(scene), None, bound)
 

@@ -127,7 +127,7 @@ def _bound(
         table = lobe.line_error(parameter) + Lobe.ERROR
         highlights = [bounds.highlight(lobe.reflection, parameter) + table for bounds in kinds]
         total = np.zeros(3)
-        for index, light in enumerate(scene.lights):
+        for index, light in enumerate(() if material.unlit else scene.lights):
             kind = min(index, len(kinds) - 1)
             bounds, highlight = kinds[kind], highlights[kind]
             reflection = material.reflection(distant_cosine(light, scene.distant_viewer))

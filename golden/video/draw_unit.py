@@ -11,7 +11,6 @@ from blysk.golden.frames.vector_axes import triangle_axes
 from blysk.golden.geometry.triangles import FrameSettings, Triangles
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import preset
-from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import DrawnPixels, Renderer
 from blysk.golden.video.controls import Controls
@@ -282,4 +281,4 @@ def turned(scene: Scene, angle: int, axis: Sequence[float] = (0.0, 1.0, 0.0)) ->
     centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     turn = rotation(axis, Motion.radians(angle))
     vertices = (mesh.vertices - centre) @ turn.T + centre
-    return replace(scene, mesh=Mesh(vertices, mesh.faces, mesh.normals @ turn.T, mesh.material))
+    return replace(scene, mesh=replace(mesh, vertices=vertices, normals=mesh.normals @ turn.T))

@@ -85,7 +85,7 @@ def specialise(
     - the highlight gate, if there is nothing to gate;
     - the memory of materials, if all are equal;
     - the PROM, if there is one exponent;
-    - two of three channels, if all colours are grey;
+    - two of three channels, if all colours are grey, and there is no albedo;
     - the upper bits of coordinates and lengths.
 
     The words of the arithmetic keep their widths, so that every pixel stays the same. Vectors of spans depend
@@ -120,7 +120,7 @@ def specialise(
     constants = prepared[0].constants
     if not (exact and design.interpolator.lights_share_words):
         reductions += _without_highlights(design, prepared, constants)
-    reductions += _with_fixed_values(design, constants, reductions)
+    reductions += _with_fixed_values(scenes[0], design, constants, reductions)
     longest = max(int(frame.spans.length.max(initial=0)) for frame in prepared)
     reductions += _with_fewer_bits(full, scenes[0], longest)
     if not exact and design.lights:
@@ -160,7 +160,13 @@ def _without_equal_materials(
     scenes: tuple[Scene, ...], full: ShadingPipeline
 ) -> tuple[tuple[Scene, ...], list[Reduction]]:
     keys = [
-        (*of.writes()["data"].tolist(), full.highlight_parameter(material), material.two_sided)
+        (
+            *of.writes()["data"].tolist(),
+            full.highlight_parameter(material),
+            material.two_sided,
+            material.tinted,
+            material.texture,
+        )
         for of, material in zip(_constants(scenes[0], None, full.mirror), scenes[0].materials, strict=True)
     ]
     first: dict[tuple, int] = {}
@@ -202,7 +208,10 @@ def _without_highlights(
 
 
 def _with_fixed_values(
-    design: ShadingPipeline, constants: Sequence[FrameConstants], reductions: Sequence[Reduction]
+    scene: Scene,
+    design: ShadingPipeline,
+    constants: Sequence[FrameConstants],
+    reductions: Sequence[Reduction],
 ) -> list[Reduction]:
     """Reductions by fixed values: exponent or tables, if there is specular light, and grey colours."""
     found = []
@@ -219,7 +228,7 @@ def _with_fixed_values(
         reason = f"exponent fixed at {exponent}: PROM folded"
         found.append(Reduction(reason, {"build": {"exponent": exponent}}))
     colors = [np.reshape(x, (-1, 3)) for of in constants for x in (of.ambient, of.diffuse, of.specular)]
-    if np.all(np.ptp(np.concatenate(colors), axis=1) == 0):
+    if not scene.has_albedo and np.all(np.ptp(np.concatenate(colors), axis=1) == 0):
         found.append(Reduction("one channel of three: every colour is grey", {"grey": True}))
     return found
 

@@ -115,6 +115,17 @@ def test_the_step_is_that_of_the_curve():
         assert highlight_step(dim, model) == 0
 
 
+@pytest.mark.parametrize(("method", "model"), [("chord-local", "ggx"), ("quotient", "blinn")])
+def test_an_unlit_surface_has_no_border(method, model):
+    """N·L goes through 0. The colour lies just under half a code, and its operand on the half."""
+    scene = facing([[-1, 0, 0.1], [1, 0, 0.1], [1, 0.1, 1]], (1, 0, 0), diffuse=100.4924 / 255, unlit=True)
+    assert border_mask(replace(scene, material=GREY), rasterise(scene), GGX).any()
+    found = compare(scene, made(method, model, scene), model_frame(scene, made(method, model, scene)))
+    assert (found.border_pixels, found.step_lsb) == (0, 0)
+    assert 0.507 < found.method_error.steady_lsb <= found.bound_lsb
+    assert found.bound_lsb == pytest.approx(0.5 + (3 if method == "quotient" else 1) / 128)
+
+
 def test_no_bound_where_none_is_known():
     scene = facing(np.eye(3) + 1)
     assert error_bound(scene, made("linear", "blinn", scene)) is None
@@ -125,6 +136,8 @@ def test_no_bound_where_none_is_known():
     assert error_bound(sharp, made("renormalise", "ggx", sharp)) is None
     sharper = facing(np.eye(3) + 1, roughness=0.03)
     assert error_bound(sharper, made("chord-local", "ggx", sharper)) is None
+    painted = replace(scene, mesh=replace(scene.mesh, colors=np.ones((3, 3))))
+    assert error_bound(painted, preset("renormalise", "cosquad")) is None
     two = replace(scene, lights=[Light((0, 0, 1)), Light((0, 1, 1), (2.0, 0.5, 0.5))])
     assert error_bound(two, made("renormalise", "blinn", two)) == pytest.approx(0.5 + 3 * (1 / 16 + 1 / 4))
     assert error_bound(scene, preset("renormalise", "cosquad")) == pytest.approx(0.5 + 5 / 16)

@@ -50,6 +50,16 @@ def rounded_coordinates(drawing, exact, found):
     return replace(found, x=x, y=y)
 
 
+def test_a_turned_mesh_keeps_its_looks():
+    shown = scene()
+    count = len(shown.mesh.vertices)
+    mesh = replace(shown.mesh, colors=np.full((count, 3), 0.5), coordinates=np.ones((count, 2)))
+    found = turned(replace(shown, mesh=mesh), 2000).mesh
+    for name in ("faces", "material", "colors", "coordinates"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(mesh, name))
+    assert (found.normals != mesh.normals).any()
+
+
 @pytest.mark.parametrize("angle", [8, 2000])
 def test_error_is_that_of_shading_and_of_rounded_coordinates(angle, monkeypatch):
     """With the coordinates of the exact frame no pixel is off by 0.6 LSB; its own are a step apart."""
