@@ -1,13 +1,13 @@
-"""Exceptions. Bad input has a thing, a reason and a remedy. A failed simulation has one line."""
+"""Exceptions. The message for bad input names a thing, a reason and a remedy. Each message is one line."""
 
 __all__ = ["CompilerMissing", "InputError", "OptionError", "SimulationError", "one_line"]
 
 
 def one_line(text: str, most: int = 1000) -> str:
-    """Make a text of a user, a file or another program fit for a message: one line, and not too long.
+    """Text for a message, made from a text of unknown content: one line of limited length.
 
-    Characters that cannot be printed become ``?``. These are line breaks, escape sequences of a terminal, and
-    bytes that are not text.
+    The text may come from a user, a file or another program. Characters that cannot be printed become ``?``.
+    These are line breaks, escape sequences of a terminal, and bytes that are not text.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class InputError(Exception):
 
 
 class OptionError(InputError):
-    """Bad value of an option, by the option's name in Python.
+    """Bad value of an option. The thing is the option's name in Python with the value.
 
     The value may come from a scene file or from the command line. `at` makes an error that names this place.
 

@@ -52,7 +52,7 @@ def frame(triangles: int, size: Sequence[int], method: str, mhz: float) -> dict[
     Parameters
     ----------
     triangles : int
-        Number of triangles, about.
+        Approximate number of triangles.
     size : sequence of int
         Width and height.
     method : str
@@ -63,8 +63,10 @@ def frame(triangles: int, size: Sequence[int], method: str, mhz: float) -> dict[
     Returns
     -------
     dict
-        ``cycles``; ``pixels``; ``cycles_a_pixel``; ``spans`` after cutting and ``uncut_spans``; ``latency``
-        of a pixel in cycles; ``frames_a_second`` and ``milliseconds`` of a frame.
+        - ``cycles``, ``pixels`` and ``cycles_a_pixel`` of the frame;
+        - ``spans``: number of spans after cutting, and ``uncut_spans``: number before cutting;
+        - ``latency``: cycles from a span to its first pixel;
+        - ``frames_a_second``, and ``milliseconds`` of a frame.
     """
     scene, raster = _rastered(triangles, *size)
     design = preset(method, _MODEL)
@@ -88,7 +90,10 @@ def frame(triangles: int, size: Sequence[int], method: str, mhz: float) -> dict[
 
 
 def simulated(method: str) -> dict[str, float]:
-    """Cycles of a simulated frame of a method with `model_of` it, of the cycle model, and their ``ratio``."""
+    """Cycles of a frame, ``simulated`` and ``modelled`` (by the cycle model), and their ``ratio``.
+
+    `model_of` chooses the reflection model of the method.
+    """
     simulated, modelled = cycle_model.compare(preset(method, model_of(method)), 992, (160, 120))
     return {"simulated": simulated, "modelled": modelled, "ratio": modelled / simulated}
 
@@ -99,15 +104,19 @@ def resources(lights: int) -> dict[str, int]:
 
 
 def use(date: str) -> dict[str, int]:
-    """Parts of the default pipeline, as placed on a date; see `placed`."""
+    """Resources of the default pipeline after its committed placement, which has this date; see `placed`."""
     entry = placed(DEVICE)[_METHOD, _MODEL]
     if entry["date"] != date:
-        raise ValueError(f"placed {entry['date']}, not {date}")
+        raise ValueError(f"the committed placement is of {entry['date']}, not of {date}")
     return {part: entry[part] for part in ("luts", "flip_flops", "multipliers")}
 
 
 def refused(command: Sequence[str]) -> dict[str, Any]:
-    """Response of the command line: ``status``, number of ``lines``, the last one, and if a ``traceback``."""
+    """Response of the command line to a command.
+
+    ``status`` is the exit status, ``lines`` the number of lines, and ``says`` the last line. ``traceback``
+    is true if a traceback was printed.
+    """
     said = io.StringIO()
     with redirect_stdout(said), redirect_stderr(said):
         try:
@@ -139,7 +148,7 @@ def _frame(triangles: int, size: Sequence[int], method: str) -> dict[str, Any]:
 def _criteria(quick: bool) -> list[Claim]:
     found = []
     for size in _SIZES:
-        # Short spans matter most here, so one size has all numbers of triangles.
+        # Spans are shortest at the first size. A quick report has most triangles at this size only.
         for triangles in _TRIANGLES[: -1 if quick and size != _SIZES[0] else None]:
             settings = _frame(triangles, size, _METHOD)
             scene = f"teapot of {triangles:,} triangles at {size[0]}x{size[1]}"
@@ -160,7 +169,7 @@ def _criteria(quick: bool) -> list[Claim]:
 
 
 def _cycles(quick: bool) -> list[Claim]:
-    # Methods of a scene follow each other, so that a process rasterises it once.
+    # `_rastered` keeps one scene. All methods of a scene come together, so a process draws no scene twice.
     scenes = [(_SIZES[0], triangles, method) for triangles in _TRIANGLES for method in METHODS]
     scenes += [(_SIZES[1], triangles, _METHOD) for triangles in _TRIANGLES[: -1 if quick else None]]
     return [
@@ -196,7 +205,7 @@ def _refused(quick: bool) -> list[Claim]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """All criteria; if quick, without a million triangles at 1920x1080, and of up to two lights."""
+    """All criteria. If quick, they have no million triangles at 1920x1080 and at most two lights."""
     return [claim for table in _DOCUMENT.tables for claim in table.claims(quick)]
 
 
@@ -219,8 +228,8 @@ _DOCUMENT = Document(
             "Cycles by number of triangles",
             _cycles,
             "Small triangles have short spans. Work that is done once a span then takes more cycles than "
-            "the pixels. A span of `quotient` takes at least three cycles, and a span of one pixel takes "
-            "one cycle.",
+            "the pixels. With `quotient` a span of one pixel takes one cycle. A longer span takes at least "
+            "three cycles.",
             {"cycles": "cycles", "pixels": "pixels", "spans": "spans", "spans before cutting": "uncut_spans"},
         ),
         ClaimTable(

@@ -58,7 +58,7 @@ _ROUNDS, _FEW = 100, 10
 _SETTINGS = {"router2/currCongWeightMult": "0.2"}
 """Settings of nextpnr, put into the netlist: the cost of a wire that is used twice grows by this each round.
 
-By default the cost is constant. If wires are scarce, some hundreds then stay in use twice.
+By default the cost is constant. If wires are scarce, a few hundred wires then stay in use twice.
 """
 
 _PARTS = {

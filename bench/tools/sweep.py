@@ -31,7 +31,7 @@ OPERANDS = get_args(Operand)
 
 
 SERVED = LOBES | MIRROR_LOBES | MODELS
-"""Specular units by reflection model. A model with a roughness takes the roughness of the exponent."""
+"""Specular units by reflection model. A model with a roughness takes the roughness that fits the exponent."""
 
 DEGREES = sorted({degree for of in METHODS.values() for degree in of.degrees})
 """Degrees that polynomials of methods can have."""
@@ -49,8 +49,9 @@ class Candidate:
     method, model, lights, operand
         See `ShadingPipeline`.
     degree : int, optional
-        Degree of the method's polynomial in the angle: for the middle normal (``quadratic`` and its forms: 2,
-        a plain minimax fit, or 3), or for the bisection's factor (1 or 2).
+        Degree of the method's polynomial in the angle. ``quadratic`` and its forms have a polynomial for the
+        middle normal, of degree 2 (a plain minimax fit) or 3. ``bisection`` has a polynomial for its factor,
+        of degree 1 or 2.
     fraction_bits : int, optional
         Fraction bits of the differences of ``chord-local``.
     style : str
@@ -79,7 +80,7 @@ class Candidate:
         usual = preset(self.method, self.model, self.lights, operand=self.operand, style=self.style)
         interpolator = usual.interpolator
         if interpolator.needs_table and self.model in MODELS:
-            raise ValueError(f"method {self.method} has tables of lobes, and no circuits of other models")
+            raise ValueError(f"method {self.method} serves only models that come from a table")
         if self.fraction_bits is not None:
             interpolator = interpolator.with_words(self.fraction_bits)
         if self.degree is not None:
@@ -88,14 +89,14 @@ class Candidate:
 
     def unit(self) -> "ShadingPipelineUnit":
         """The design's hardware."""
-        # The hardware's description takes a second to import, and a sweep is listed without it.
+        # This import takes a second, and listing a sweep does not need it.
         from blysk.hdl.pipeline import ShadingPipelineUnit
 
         return ShadingPipelineUnit(self.design)
 
     @property
     def command(self) -> str:
-        """Shell command that prints it as Verilog."""
+        """Shell command that prints the design as Verilog."""
         usual = preset(self.method, self.model, operand=self.operand).interpolator
         if self.method in METHODS and self.design.interpolator == usual:
             words = ["blysk", "verilog", "--method", self.method, "--model", self.model]
@@ -104,14 +105,14 @@ class Candidate:
             words += ["--style", self.style] if self.style != "throughput" else []
             return shlex.join(words)
         given = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
-        # JSON has its strings in double quotes, so that the shell can have the single ones.
+        # JSON puts strings into double quotes. The shell's single quotes can then surround them.
         arguments = ", ".join(f"{name}={json.dumps(x)}" for name, (x, usual) in given.items() if x != usual)
         imports = "from blysk.bench.tools.sweep import Candidate; from blysk.hdl.emit.verilog import emit"
         return shlex.join(["python", "-c", f'{imports}; print(emit(Candidate({arguments}).unit(), "blysk"))'])
 
 
 class Sweep(NamedTuple):
-    """Values to combine in all ways. A method that lacks a choice is taken once.
+    """Values to combine in all ways. If a method does not have a parameter, the parameter is not varied.
 
     Parameters
     ----------

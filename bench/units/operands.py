@@ -69,7 +69,10 @@ def component_words(*codes: np.ndarray) -> tuple[Fixed, ...]:
 
 
 def any_codes(rng: np.random.Generator, format: Format, *shape: int) -> np.ndarray:
-    """Codes anywhere in a format. Every third row has codes of every size, every 16th row ends, 0 or 1."""
+    """Random codes of a format.
+
+    Every third row has codes of every size. Every 16th row has the smallest code, the largest code, 0 or 1.
+    """
     codes = rng.integers(format.min_code, format.max_code, shape, endpoint=True)
     codes[1::3] >>= rng.integers(0, format.width, codes[1::3].shape)
     ends = [format.min_code, format.max_code, 0, 1]
@@ -83,7 +86,7 @@ def word_ends(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 
 def word_corners(*words: int) -> np.ndarray:
-    """Codes of all pairs of vectors whose components are a few codes, shape (2, count, 3).
+    """Codes of all pairs of vectors whose components are among given codes, shape (2, count, 3).
 
     Parameters
     ----------
@@ -144,9 +147,9 @@ def pairs_of_length(
 def pairs_chosen(
     left: np.ndarray, right: np.ndarray, choose: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of a vector of ``left`` and a vector of ``right`` whose ``1 - a . b`` is chosen.
+    """Pairs of vectors a of ``left`` and b of ``right`` for which ``choose`` accepts ``1 - a . b``.
 
-    A test can find, among many pairs, the few whose word of ``1 - a . b`` is at the border of a rounding.
+    So a test can find the rare pairs for which the word of ``1 - a . b`` is at the border of a rounding.
 
     Parameters
     ----------
@@ -162,7 +165,10 @@ def pairs_chosen(
 
 
 def spread_angles(rng: np.random.Generator, count: int, widest: float) -> np.ndarray:
-    """Angles in degrees, with both ends. Half of them are spread evenly, half by their logarithm."""
+    """Angles in degrees, 0 to ``widest``, with both ends of this range.
+
+    In one half the angle is uniform, in the other half its logarithm.
+    """
     angles = rng.uniform(0, widest, count)
     angles[::2] = widest * 10.0 ** rng.uniform(-6, 0, len(angles[::2]))
     angles[: count // 20] = 0
@@ -202,7 +208,7 @@ def degrees_between(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def exact_middle(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Exact middle of two vectors of codes, with the length of a unit vector, and their cosine."""
+    """Exact unit vector half-way between two vectors of codes, and the cosine of their angle."""
     cosine = dot(left, right) / ONE**2
     return (left + right) * COMPONENT.step / np.sqrt(2 + 2 * cosine)[:, np.newaxis], cosine
 
@@ -218,7 +224,7 @@ def light_constants(unit: Component, direction: np.ndarray, halfway: np.ndarray)
 
 
 def log_lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndarray:
-    """Lengths of ``count`` spans by their logarithm, the shortest and the longest two among them."""
+    """Lengths of ``count`` spans with a uniform logarithm, among them the two shortest and two longest."""
     lengths = np.floor(least * (4096 / least) ** rng.random(count)).astype(np.int64)
     edges = [least, least + 1, 4094, 4095]
     lengths[: len(edges)] = edges[:count]
@@ -226,12 +232,12 @@ def log_lengths(rng: np.random.Generator, count: int, least: int = 1) -> np.ndar
 
 
 def span_lengths(rng: np.random.Generator, pixels: int, least: int = 1) -> np.ndarray:
-    """Lengths of spans that have about ``pixels`` pixels in all, or a few more, in any order."""
+    """Lengths of at least 16 spans with about ``pixels`` pixels in all, in random order."""
     return rng.permutation(log_lengths(rng, max(pixels // 450, 16), least))
 
 
 def any_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Lengths of ``count`` spans, as many short as long ones."""
+    """Lengths of ``count`` spans with a uniform logarithm. Some spans have the largest length."""
     lengths = np.floor(4096 ** rng.random(count)).astype(np.int64)
     lengths[:: max(count // 4, 1)] = 4095
     return lengths
@@ -257,7 +263,9 @@ def pixel_of(rng: np.random.Generator, length: np.ndarray) -> np.ndarray:
 def setup_spans(
     rng: np.random.Generator, count: int, widest: float, out_of_range: float
 ) -> dict[str, np.ndarray]:
-    """Spans of all lengths for a setup: equal normals, every angle, some out of range, ends of the words.
+    """Spans of all lengths for a setup.
+
+    Some have equal normals, some have angles out of range, and some have components with extreme codes.
 
     Parameters
     ----------
@@ -296,7 +304,7 @@ def curves_of(left: Fixed, right: Fixed) -> tuple[Fixed, Fixed, Fixed]:
 
 
 def any_curves(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
-    """Codes of coefficients G, P, Q by name, anywhere in their words."""
+    """Random codes of the coefficients G, P, Q, by name."""
     formats = {"g": GPQ.G_FORMAT, "p": GPQ.P_FORMAT, "q": GPQ.Q_FORMAT}
     return {name: any_codes(rng, format, count, 3) for name, format in formats.items()}
 
@@ -307,18 +315,21 @@ def any_curves(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
 def highlight_codes(
     rng: np.random.Generator, model: HighlightOperand, count: int, exponent: int
 ) -> np.ndarray:
-    """Operands of a specular unit. Most have a term over 0 or are near its end, some have any angle.
+    """Operands of a specular unit.
 
-    In every fourth operand 1 - cos gamma is drawn by its logarithm. Every third operand is any code. Every
-    twelfth differs from the last lit operand by up to 3 units of any bit. Every sixteenth is the code of cos
-    gamma = 1, 0 or -1, or a code next to it.
+    In most operands 1 - cos gamma is at most 1.25 times the largest value with a term over 0. The others are:
+
+    - every fourth: 1 - cos gamma has a uniform logarithm;
+    - every twelfth: it differs from that largest value by up to 3 units of one of the bits 0 to 11;
+    - every third: a random code;
+    - every sixteenth: the code of cos gamma = 1, 0 or -1, or a code next to it.
     """
     format = model.operand_format
     reach = 1.25 * model.last_lit_arguments[exponent] * 2.0**-25
     distance = rng.uniform(0, min(reach, 2), count)
     distance[1::4] = 10.0 ** rng.uniform(-9, 0.3, len(distance[1::4]))
     border = rng.integers(-3, 4, len(distance[3::12])) << rng.integers(0, 12, len(distance[3::12]))
-    # In the middle of a step, as the cosine has more fraction bits.
+    # Half a step is added, because the cosine has more fraction bits.
     distance[3::12] = (model.last_lit_arguments[exponent] + border + 0.5) * 2.0**-25
     if model.operand == "cosine":
         one = ONE_SQUARED.codes.item()

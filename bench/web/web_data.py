@@ -104,32 +104,32 @@ START = {
 """Settings of the page at its start."""
 
 RIVAL = "linear"
-"""Method for comparison with a frame, in hardware, too."""
+"""Method that the page compares a frame with. It also runs as simulated hardware."""
 
 REFERENCES = {
     "method": {
         "title": "exact normals, same model",
-        "text": "The exact normal of every pixel, perspective-correct, with the same reflection model: the "
-        "error of the method and of its arithmetic.",
+        "text": "The reference has the exact, perspective-correct normal of every pixel and the same "
+        "reflection model. The error is the error of the method and of its arithmetic.",
         "curve": "exact",
         "model": None,
     },
     "arithmetic": {
         "title": "same method and model",
-        "text": "The same method and model in float64: what the words' widths cost. 0.5 LSB is correct "
-        "rounding.",
+        "text": "The reference is the same method and model in float64. The error comes from the limited "
+        "widths of the words. Correct rounding gives up to 0.5 LSB.",
         "curve": None,
         "model": None,
     },
     "total": {
         "title": "exact normals, exact model",
-        "text": "The exact normal of every pixel, with the model that the design stands for: Blinn's power, "
-        "or its own for phong and ggx.",
+        "text": "The reference has the exact normal of every pixel and an exact model. Designs with phong or "
+        "ggx are compared with their own model, all other designs with Blinn's power.",
         "curve": "exact",
         "model": "blinn",
     },
 }
-"""References for comparison with the frame. ``None``: the design's own curve or model."""
+"""References for comparison with the frame. ``None`` stands for the design's own curve or model."""
 
 
 # What is drawn.
@@ -158,7 +158,7 @@ class Body:
 
 
 def _square() -> Mesh:
-    """Two triangles with normals that bend outwards, and spans across all of the square."""
+    """Two triangles with normals that bend outwards. Some spans are as wide as the square."""
     corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
     return Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normalise(corners * 0.3 + (0, 0, 1)))
 
@@ -227,26 +227,33 @@ COLUMNS = (
     ),
     {"name": "ratio", "bytes": 3, "bias": 1 << 23},
 )
-"""Columns of the spans in a file, one for each field: its codes, or their change from the previous span
-(``running``) or from another column (``from``), plus ``bias``, so that none is negative, in a number of
-``bytes``. The ratio is of the lengths of the interpolated normals at the ends, ``round(2^19 log2(m_r /
-m_l))``; it is 0 for a method that takes these normals themselves."""
+"""Columns of the spans in a file, one column for each field.
+
+A column has the codes of its field. With ``running`` it has their change from the previous span, with
+``from`` their difference from another column. ``bias`` is added, so that no number is negative. A number
+takes ``bytes`` bytes.
+
+``ratio`` is ``round(2^19 log2(m_r / m_l))``, where m_l and m_r are the lengths of the interpolated normals at
+the ends. For a method whose own curve is exact, ``ratio`` is 0."""
 
 
 def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -> bytes:
     """Spans of a view, and the visibility of their fragments, as bytes compressed by zlib.
 
-    First the numbers of spans and fragments, 32 bits each; then `COLUMNS`, in each the lowest byte of all
-    codes first; then a bit for each fragment, from the lowest bit of a byte on.
+    The bytes are, in this order:
+
+    - the number of spans and the number of fragments, 32 bits each;
+    - the `COLUMNS`: of each column the lowest byte of all codes, then the next byte of all codes;
+    - a bit for each fragment. A byte is filled from its lowest bit on.
 
     Parameters
     ----------
     spans : Spans
-        With normals.
+        Spans with normals.
     visible : bool array
-        Whether each fragment is visible, in their order.
+        Whether each fragment is visible, in the order of the fragments.
     ratio : array, shape (spans,), optional
-        Length of the interpolated normal at the right end, over that at the left end.
+        Length of the interpolated normal at the right end, divided by its length at the left end.
     """
     logarithm = np.clip(np.log2(np.broadcast_to(ratio, len(spans))), -15, 15)
     codes = {"x": spans.x, "y": spans.y, "length": spans.length, "ratio": np.rint(2**19 * logarithm)}
@@ -266,10 +273,10 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
 
 
 def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tuple[Raster, Spans]:
-    """Spans of a view, before and after the rounding of their normals, for a light that moves.
+    """Spans of a view for a light that moves, as float64 raster and with rounded normals.
 
-    They are cut for the light of `START`. Spans of a method that takes vectors have the ends of the
-    true line, in the scene's frame; see `with_vectors`.
+    The spans are cut for the light of `START`. If the method takes vectors, the spans have the ends of the
+    true line in the scene's frame; see `with_vectors`.
 
     Parameters
     ----------
@@ -290,9 +297,10 @@ def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tu
 
 
 def with_vectors(spans: Spans, scene: Scene, design: ShadingPipeline) -> Spans:
-    """Spans of `spans_of` for the light of a scene. A method that takes vectors gets them.
+    """Spans of `spans_of` for the light of a scene. If the method takes vectors, the vectors are added.
 
-    The page's script computes the same, one product and one sum at a time.
+    The page's script computes the same vectors in JavaScript. The order of products and sums here is the
+    script's order, so that both round alike.
     """
     if design.interpolator.brings_ends:
         return spans
@@ -319,8 +327,9 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``axes``: axes of the camera, to the right, up, and to the viewer; ``streams``: for each method the
-        index into ``data`` for each of the bands; ``data``: results of `encode`, in base 64.
+        - ``axes``: axes of the camera, to the right, up, and to the viewer;
+        - ``streams``: a list for each method, with an index into ``data`` for each of `BANDS`;
+        - ``data``: results of `encode`, in base 64.
     """
     camera = _cameras(mesh)[view]
     found: list[str] = []
@@ -353,10 +362,13 @@ def module_of(method: str, model: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``wasm``, compressed by zlib, in base 64, and its ``bytes``; ``ports``: see `ports_of`;
-        ``probes``: those of `probes_of`; ``stages``: names, titles and ages at which a pixel comes
-        and goes; ``lobe``: see `lobe_of`; ``vectors``: components of the vectors that spans bring, or
-        ``None``.
+        - ``wasm``: the module, compressed by zlib, in base 64;
+        - ``bytes``: its number of bytes before compression;
+        - ``ports``: see `ports_of`;
+        - ``probes``: see `probes_of`;
+        - ``stages``: name and title of each stage, and a pixel's ages at its entry and exit;
+        - ``lobe``: see `lobe_of`;
+        - ``vectors``: components of the vectors that spans bring, or ``None``.
     """
     design = design_of(method, model)
     component = ObservedPipeline(design)
@@ -384,15 +396,16 @@ def module_of(method: str, model: str) -> dict[str, Any]:
 
 
 def lobe_of(design: ShadingPipeline) -> dict[str, Any] | None:
-    """Values for frame constants with a table, which the page makes itself. ``None`` without tables.
+    """Values from which the page makes the table of a lobe. ``None`` if the design loads no table.
 
     Returns
     -------
     dict
-        ``model``: see `model_table`; ``entries`` and ``middles``: cosines at the entries and in the middle of
-        steps; ``border``: entry at which the second part of a table begins, or ``None``; ``parameter``: name
-        of the model's parameter, and ``parameters``, its possible values; ``exponents`` and ``thresholds`` of
-        `FrameConstants` for each of them.
+        - ``model``: see `model_table`;
+        - ``entries`` and ``middles``: cosines at the entries and in the middle of steps;
+        - ``border``: entry at which the second part of a table begins, or ``None``;
+        - ``parameter``: name of the model's parameter, and ``parameters``: its possible values;
+        - ``exponents`` and ``thresholds``: these fields of `FrameConstants` for each possible value.
     """
     if not design.loads_tables:
         return None
@@ -420,7 +433,7 @@ def lobe_of(design: ShadingPipeline) -> dict[str, Any] | None:
 def model_table(model: str) -> dict[str, Any]:
     """Values of a reflection model in float64: its ``kind``, and slopes or scales for exponents 1 to 1000.
 
-    A power has ``mirror``: whether it is one of R·V.
+    A power has ``mirror``: whether its base is R·V.
     """
     exponents = range(1, MAX_EXPONENT + 1)
     unit = (MODELS | LOBES | MIRROR_LOBES)[model]

@@ -39,7 +39,7 @@ class AxiStream(wiring.Signature):
     size : int
         Bytes of TDATA.
     user : int
-        Bits of TUSER. 0: neither TUSER nor TKEEP.
+        Bits of TUSER. If 0, the stream has no TUSER and no TKEEP.
     """
 
     def __init__(self, size: int, user: int = 0):
@@ -58,7 +58,7 @@ class BusUnit(wiring.Component):
     Parameters
     ----------
     design : ShadingPipeline
-        Design of the core; its `Build` says which of `TOPS` the core is, and which of `BUSES` the bus.
+        Design of the core. Its `Build` names the core (see `TOPS`) and the bus (see `BUSES`).
     **options
         Keyword arguments of the core's constructor.
 
@@ -69,7 +69,7 @@ class BusUnit(wiring.Component):
     m_axis : :py:`Out(AxiStream(..., user=2))`
         Pixels or spans.
     s_axil : :py:`In(AxiLite())`
-        Registers; or ``wb``, :py:`In(Wishbone())`.
+        Registers. With Wishbone this member is ``wb``, :py:`In(Wishbone())`.
     memory
         Memory port of the core, if it has one.
 
@@ -136,7 +136,7 @@ class BusUnit(wiring.Component):
         if self.map.picture:
             m.d.comb += copy_fields(framing.constants, registers.picture)
         if self.map.constants:
-            # No frame is inside, so that a write is accepted at once.
+            # The core accepts a write at once, because no frame is inside.
             m.d.comb += [
                 framing.write.valid.eq(registers.load.valid),
                 framing.write.payload.address.eq(registers.load.address),
@@ -148,7 +148,7 @@ class BusUnit(wiring.Component):
 
 
 def core_of(design: ShadingPipeline) -> wiring.Component:
-    """The core of a design's `Build`: one of `TOPS`, with its own streams or on a bus.
+    """The core that a design's `Build` names, with its own streams or on a bus; see `TOPS`.
 
     Raises
     ------

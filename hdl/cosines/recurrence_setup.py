@@ -33,13 +33,15 @@ def recurrence_starts_shape(model: RecurrenceSetup, lights: int) -> data.StructL
 
 
 class RecurrenceSetupUnit(PipelinedUnit):
-    """Start values of the four phases of ``N . L`` and ``N . H`` along a span, for each light.
+    """Start values of ``N . L`` and ``N . H`` along a span, for each light and each phase.
 
-    `RecurrenceSetup`, the bit-accurate model, has equations, formats and the error bound.
+    Pixel k of a span belongs to phase k mod 4. `RecurrenceSetup`, the bit-accurate model, has equations,
+    formats and the error bound.
 
-    The 14 products of a span and the 32 of each light share ``ceil((14 + 32 lights) / I)`` multipliers of
-    18x18 bits, I the initiation interval. 14 of a light's products are the seven steps of the recurrence for
-    L and for H. The 18 shifts of a light share ``ceil(18 lights / I)`` shifters of 48 bits. For one light:
+    A span has 14 products, and 32 more for each light. Let I be the initiation interval. The products share
+    ``ceil((14 + 32 lights) / I)`` multipliers of 18x18 bits. 14 of a light's products are the seven steps of
+    the recurrence for L and for H. The 18 shifts of a light share ``ceil(18 lights / I)`` shifters of 48
+    bits. For one light:
 
     =================== === === === === ===
     initiation interval 1   2   4   8   46
@@ -71,8 +73,8 @@ class RecurrenceSetupUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(span_normals_shape()))`
         Spans of length 1 to 4095.
     o : :py:`Out(stream.Signature(recurrence_starts_shape(model, lights)))`
-        Start values; K of a step of four pixels and its shift; the length. ``out_of_range``: the span is over
-        90 degrees, and its words are invalid.
+        Start values, the coefficient K of a step of four pixels and its shift, and the length. If
+        ``out_of_range`` is 1, the span is over 90 degrees and its words are invalid.
     constants : :py:`In(light_vectors_shape(lights))`
         Unit vectors L and H, constant while beats are inside.
 
@@ -144,7 +146,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return results | self._starts(self._states(firsts, differences, *step))
 
     def _cosines(self, left: Word, right: Word) -> dict[tuple[int, str], list[Word]]:
-        """Words of a and b for L and H of each light."""
+        """Words of the cosines ``a`` and ``b`` at the left and right end, for L and H of each light."""
         return {
             (i, function): [
                 self._cosine(f"{function}_{i}_{side}", n, lambda _, i=i, name=name: self.constants[i][name])
@@ -157,7 +159,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
     def _step_square(
         self, q: Word, q_shift: Word, square: Word, reciprocal_square: Word, square_shift: Word
     ) -> tuple[Word, Word]:
-        """Word of Q/8, 1/2 or more, and the exponent of Q."""
+        """Word of Q/8, which is at least 1/2, and the exponent of Q."""
         g = self._graph
         product = g.multiply("psi_square_product", q, square)
         psi_square = g.register("psi_square_exact", lambda q, product: q + product, q, product)
@@ -222,7 +224,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         Parameters
         ----------
         firsts, differences : dict of Word
-            a, and ``rho (b - a + a q)``.
+            The cosines ``a``, and the products ``rho (b - a + a q)``.
         step_k, step_s : Word
             K of a step d, and its shift.
         """
@@ -293,7 +295,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return FixedValue.constant(r.state_format, 2.0 ** -(r.fraction_bits + 1))
 
     def _short(self, name, word) -> Word:
-        """Word of a value of ``direct``; the half step that the operand has rounds it."""
+        """Word of a start value of ``direct``, truncated. Half a step was added before, so this rounds."""
         format = self.model.recurrence.state_format
         return self._graph.register(name, lambda x: x.truncate(format.fraction_bits), word)
 
@@ -361,7 +363,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return register(FixedValue(self._shifted, Value.cast(coarse) >> fine), "shifted")
 
     def _normalised(self, chord: Word) -> tuple[Word, Word]:
-        """Word in [1/2, 1), or 0, and its left shift."""
+        """Word of a chord, shifted into [1/2, 1) unless the chord is 0, and the left shift."""
         g, p = self._graph, self.model
 
         def shift_of(chord):
@@ -393,7 +395,10 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return g.register(name, lambda v: v.saturate(p.WORD_FORMAT), rounded)
 
     def _under_one(self, name, value) -> tuple[Word, Word]:
-        """Word under 1 of a value of 34 fraction bits, and whether it is half of the value."""
+        """Word under 1 of a value with 34 fraction bits, and a bit.
+
+        The bit is 1 if the value is 1 or more. Then the word is half of the value.
+        """
         g = self._graph
 
         def halved(value, over):
@@ -404,7 +409,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return self._word(name, g.register(f"{name}_halved", halved, value, over)), over
 
     def _looked_up(self, name, tables, bits) -> list[Word]:
-        """Words of the interpolated values of tables at an operand."""
+        """One word for each table: the table's value at an operand, interpolated."""
         g, p = self._graph, self.model
         value_bits, change_bits = p.TABLE_VALUE_FORMAT.width, p.TABLE_CHANGE_FORMAT.width
         width = value_bits + change_bits
@@ -448,7 +453,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return self._word(f"{name}_coefficient", value)
 
     def _steps(self, length: Word) -> tuple[Word, Word, Word, Word]:
-        """Words of ``1/(m-1)`` and its square, and their shifts: six cycles."""
+        """Words of ``1/(m-1)`` and its square, and their shifts. They take six cycles."""
         g, p = self._graph, self.model
         top, bits = LENGTH_BITS - 1, p.WORD_FORMAT.width
 

@@ -270,7 +270,7 @@ def _model_of(component: Component, engine: str, origin: Any, vcd: str | None) -
         except CompilerMissing as error:
             if engine == "cxxrtl":
                 raise
-            warn(f"{error}; using pysim, some hundred times slower", RuntimeWarning, stacklevel=3)
+            warn(f"{error}; using pysim, about a hundred times slower", RuntimeWarning, stacklevel=3)
     return _interpreted(component, vcd), "pysim"
 
 

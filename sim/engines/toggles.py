@@ -91,7 +91,7 @@ def count_toggles(
         Those of `simulate`.
     engine : str
         As for `simulate`. The counters make a build of the compiled engine three times as long, half a minute
-        for a pipeline. For some hundred cycles ``pysim`` is faster.
+        for a pipeline. For a few hundred cycles ``pysim`` is faster.
 
     Returns
     -------

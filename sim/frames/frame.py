@@ -121,7 +121,7 @@ class FrameSimulator:
         # What "auto" stands for: its warning comes once.
         self.engine = run.engine
         if not np.array_equal(_colors(beats), expected.color):
-            raise SimulationError("the simulated pipeline's pixels are not those of its bit-accurate model")
+            raise SimulationError("the pixels of the simulated pipeline differ from its bit-accurate model")
         self.build_seconds = perf_counter() - start
 
     def _run(

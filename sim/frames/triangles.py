@@ -35,7 +35,7 @@ _IN_UNITS = 26
 """Largest number of triangles inside the hardware, except in FIFOs of the throughput style."""
 
 _PAUSE = 10_000
-"""Cycles without a beat at the end of a picture without hidden triangles."""
+"""Cycles without a beat after which a picture counts as finished, if no triangle is hidden."""
 
 
 class _Timed(wiring.Component):
@@ -83,7 +83,8 @@ class SimulatedTriangleFrame:
     engine : {"cxxrtl", "pysim"}
         The simulator.
     seconds : dict
-        Seconds of ``triangles`` (to transform, clip and check them) and of ``simulate``.
+        Seconds of each step. ``triangles``: the triangles are transformed, clipped and checked. ``simulate``:
+        the simulation runs.
     """
 
     image: np.ndarray
@@ -103,7 +104,7 @@ class SimulatedTriangleFrame:
 
     @property
     def pixels(self) -> int:
-        """Number of pixels that were shaded, hidden ones included."""
+        """Number of pixels that were shaded, including hidden pixels."""
         return self.counts["pixels"]
 
 
@@ -129,7 +130,7 @@ def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
         x=corner[..., 0],
         y=corner[..., 1],
         depth=rng.integers(0, DEPTH.max_code, (count, 3)),
-        # No longer than 1, as where vectors are turned into the frames of several lights.
+        # The vectors are at most 1 long. A design with several lights turns them, and needs this.
         normal=most // 3 + rng.integers(-most // 6, most // 6, (count, 3, 3)),
         material=np.arange(count) * renderer.design.materials // count,
         two_sided=np.arange(count) % 2,
@@ -172,7 +173,7 @@ class TriangleSimulator:
         self._check()
 
     def _check(self) -> None:
-        """Compare the pixels of some triangles by the new simulation model with the bit-accurate model."""
+        """Draw some triangles with the new simulation model, and compare with the bit-accurate model."""
         triangles, frame = sample_triangles(self.renderer, self.size), FrameSettings.centred(*self.size)
         constants = sample_constants(self.renderer.design)
         if self.renderer.rows:
@@ -189,13 +190,13 @@ class TriangleSimulator:
             engine=self.engine,
             origin=self._origin,
         )
-        # What "auto" stands for: its warning comes once.
+        # Later runs name the engine that "auto" chose, so the warning comes once.
         self.engine = run.engine
         if not all(np.array_equal(run.beats[name], value) for name, value in expected.beats.items()):
-            raise SimulationError("the simulated hardware's pixels are not those of its bit-accurate model")
+            raise SimulationError("the pixels of the simulated hardware differ from its bit-accurate model")
 
     def _constants(self, frame: FrameSettings) -> dict[str, int]:
-        """Codes of the frame's constants, as they are for the first picture."""
+        """Codes of the frame's constants for the first picture."""
         return frame.codes | ({} if self.renderer.coarse is None else {"picture": 0})
 
     def render(
@@ -211,7 +212,8 @@ class TriangleSimulator:
         scene : Scene
             The scene, of the simulator's size.
         progress : callable, optional
-            Called at times. Both numbers are the pixels written so far, because the total is unknown.
+            Called now and then during the run. Both arguments are the number of pixels written so far,
+            because the total is unknown.
         vcd : str, optional
             File for the waveforms. Only for the engine ``"pysim"``.
 
@@ -257,7 +259,7 @@ class TriangleSimulator:
         )
         counts = {name: int(run.status[name]) for name in STATUS}
         if counts["pixels"] - counts["hidden"] != len(run.beats):
-            raise SimulationError("the hardware counted other pixels than it gave")
+            raise SimulationError("the hardware's counters and its output differ in the number of pixels")
         beats = run.beats
         color = np.stack([beats[channel] for channel in "rgb"], axis=-1)
         return SimulatedTriangleFrame(
@@ -276,7 +278,7 @@ class TriangleSimulator:
         """Upper bound of the cycles without a beat, if all triangles inside the hardware are hidden.
 
         A triangle has at most as many pixels as the sum of its area, half its perimeter and 1. The triangles
-        inside follow one another among the drawn triangles.
+        inside are consecutive drawn triangles.
         """
         geometry, frame, steps = self._render.geometry, sent.frame, self.renderer.geometry.grid.steps
         drawn, _ = VertexSort(geometry.grid).compute(sent.triangles, frame)

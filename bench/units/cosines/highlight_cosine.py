@@ -35,7 +35,7 @@ def _measure(rng, count, unit):
     words = _words({"phase": phase, "step": step, "cos_beta": beta})
     found = unit.compute(*words, np.arange(count), pixel)
     turns = (phase - pixel * step) / 2.0**40
-    # The table's lines, in its words.
+    # Linear interpolation between the table's words, without further rounding.
     quarters = np.abs(turns - np.rint(turns)) * 4
     back = quarters > 1
     position = np.where(back, 2 - quarters, quarters) * 2**unit.address_bits
@@ -64,14 +64,18 @@ def _spans(unit, rng, count):
 
 
 def spans_of(rng: np.random.Generator, length: np.ndarray) -> Case:
-    """Input of spans of given lengths: peaks, ends of each quarter and of words, carries, cos beta to 2."""
+    """Input of spans of given lengths.
+
+    Phases are near a peak, at the ends of each quarter of the wave, and the smallest and largest codes. Steps
+    are extreme codes or give carries. cos beta is up to 2.
+    """
     count = len(length)
     phase = rng.integers(-(1 << 39), 1 << 39, count)
     phase[1::4] = rng.normal(size=len(phase[1::4])) * 2.0**35
     phase[2::8] = rng.choice([-(1 << 39), (1 << 39) - 1, -(1 << 38), 1 << 38, -1, 0, 1], len(phase[2::8]))
     step = np.trunc(2.0 ** rng.uniform(0, 39, count)).astype(np.int64)
     step[::17] = rng.choice([0, (1 << 40) - 1, 1 << 38, 1 << 39], len(step[::17]))
-    # At the second pixel a carry out of the bits below the address decides.
+    # A carry out of the bits below the address changes the address of the second pixel.
     bit = rng.integers(0, 15, len(phase[4::8]))
     phase[4::8] = (phase[4::8] >> 15 << 15) + (1 << bit)
     step[4::8] = (1 << bit) + rng.integers(0, 2, len(bit))
@@ -81,12 +85,12 @@ def spans_of(rng: np.random.Generator, length: np.ndarray) -> Case:
 
 
 def _corners(unit, rng, count):
-    """Short spans with peaks, ends of each quarter of the wave, ends of words, carries, cos beta to 2."""
+    """Short spans with the phases and steps of `spans_of`."""
     return spans_of(rng, rng.integers(0, 40, count // 20))
 
 
 def _last_bits(unit, rng, count):
-    """Every bit of a length, and many spans, because the last bits of products rarely matter."""
+    """Lengths that set every bit, and many short spans. The last bits of products rarely change a result."""
     powers = 1 << np.arange(12)
     return spans_of(rng, np.r_[powers, powers + 1, rng.integers(1, 4, count // 2)])
 
@@ -108,7 +112,7 @@ RECORD = Record(
     title="1 - cos gamma along a great circle by a table of cosines",
     source="docs/theory/interpolation.md#angular-method; [T] 3.2",
     variants={
-        "interpolated": _variant(True, "model: the cosine by the table's lines"),
+        "interpolated": _variant(True, "model: the cosine, interpolated linearly from the table"),
         "table alone": _variant(False, "model: the table"),
         "64 words": Variant(partial(HighlightCosineUnit, HighlightCosine(address_bits=6))),
     },
@@ -121,7 +125,7 @@ RECORD = Record(
     axis="angle, degrees",
     waivers={},
     still={
-        "the table's last value with all of its rise is a step less than 1": "wave.v_6[22]",
-        "a product of a number less than 1 and one up to 1 is less than 2": "wave.term_10[26]",
+        "the table's last value plus its whole rise is a step less than 1": "wave.v_6[22]",
+        "a factor less than 1 times a factor of at most 1 is less than 2": "wave.term_10[26]",
     },
 )

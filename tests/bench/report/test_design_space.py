@@ -88,7 +88,7 @@ def test_quotient_is_swept_with_its_lobes():
     found, impossible = Sweep(methods=("quotient", "renormalise")).candidates()
     quotients = [(one.model, one.style) for one in found if one.method == "quotient"]
     assert quotients == [(model, style) for model in ("blinn", "phong") for style in STYLES]
-    assert impossible["quotient: has tables of lobes, and no circuits of other models"] == 3 * len(STYLES)
+    assert impossible["quotient: serves only models that come from a table"] == 3 * len(STYLES)
     assert any(reason.startswith("renormalise: phong is a lobe of R·V") for reason in impossible)
 
 

@@ -267,7 +267,7 @@ def test_auto_falls_back_to_pysim(monkeypatch):
         raise CompilerMissing("no compiler")
 
     monkeypatch.setattr("blysk.sim.engines.cxxrtl.Compiled", broken)
-    with pytest.warns(RuntimeWarning, match="^no compiler; using pysim, some hundred times slower$"):
+    with pytest.warns(RuntimeWarning, match="^no compiler; using pysim, about a hundred times slower$"):
         run = simulate(Register(), pairs(3), count=3, engine="auto")
     assert run.engine == "pysim"
     np.testing.assert_array_equal(run.beats, Register.model(pairs(3)))

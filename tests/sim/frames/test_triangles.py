@@ -135,5 +135,5 @@ def test_a_wrong_model_is_found(monkeypatch):
         return drawn
 
     monkeypatch.setattr(Renderer, "compute", wrong)
-    with pytest.raises(SimulationError, match="not those of its bit-accurate model"):
+    with pytest.raises(SimulationError, match="differ from its bit-accurate model"):
         TriangleSimulator(renderer, SIZE)
