@@ -130,7 +130,7 @@ def results_of(
         folder.mkdir(mode=0o700, exist_ok=True)
     paths = [folder / f"{task.key}.json" for task in tasks]
     results = [_load(path) for path in paths]
-    # What two sections ask for is measured once.
+    # A measurement that two sections ask for is made once.
     first = {path: index for index, path in reversed([*enumerate(paths)])}
     missing = sorted(index for index in first.values() if results[index] is None)
     for _ in range(len(tasks) - len(missing)):
@@ -153,7 +153,7 @@ def results_of(
             del waiting[done]
     finally:
         for future, index in waiting.items():
-            # Of those that were done together the failed one may have been the first to be looked at.
+            # Several futures may finish together, and the failed future may be the first of them here.
             if not future.cancel() and future.done() and future.exception() is None:
                 keep(index, future.result())
     for index in here:

@@ -48,7 +48,7 @@ def svg(figure: Figure) -> str:
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r' clip-path="url\([^"]*"', "", text)
     text = re.sub(r"<clipPath.*?</clipPath>", "", text, flags=re.DOTALL)
-    # Numbers of strokes and positions, not those that are written.
+    # Numbers of strokes and positions are rounded. Numbers in texts stay.
     text = re.sub(r"<[^>]*>", lambda tag: _NUMBER.sub(_rounded, tag[0]), text)
     text = re.sub(r'"([\d.]+)pt"', lambda m: f'"{float(m[1]) * 4 / 3:.0f}"', text)
     text = _with_classes(text)

@@ -71,7 +71,7 @@ class PixelAssemblerUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Coordinates of spans; from them those of pixels, which meet the colours; a pixel register."""
+        """Coordinates of spans become coordinates of pixels. They meet the colours in a pixel register."""
         m = Module()
         span, color = self.coordinates.payload, self.colors.payload
         x, y = Signal.like(span.x), Signal.like(span.y)

@@ -326,7 +326,7 @@ def _flat(payload: data.View) -> dict[str, Value]:
 
 
 def _nested(payload: data.View) -> dict[str, Value]:
-    """The same of a payload in which those of the span are apart."""
+    """Fields by name, of a payload that has the fields of its span in a member ``span``."""
     return _flat(payload.span) | {name: payload[name] for name in _DEEP}
 
 

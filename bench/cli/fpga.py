@@ -40,7 +40,7 @@ _BUILD = {name: BUILD[name] for name in ("pipes", "top", "setups")}
     multiple=True,
     metavar="NAME",
     help="Place this unit in place of the pipeline. Names are those of blysk blocks. Add a variant to place "
-    "only that, as in 'bisection 1, 45'. Repeat for more.",
+    "only this variant, as in 'bisection 1, 45'. Repeat for more.",
 )
 @click.option(
     "--target",
@@ -90,7 +90,7 @@ def command(
     """Place and route the pipeline on an FPGA, and print its parts and clock rate.
 
     \b
-    LUT     look-up tables of four inputs, also those used as carries and memories
+    LUT     look-up tables of four inputs, with tables used as carries and memories
     FF      flip-flops, without those inside multipliers
     mult    multipliers of 18x18 bits
     BRAM    block RAMs of 18 Kibit

@@ -89,7 +89,7 @@ class Wrapped(Component):
     unit : Component
         The unit.
     **members : Member
-        Members beside those of the unit, or in place of its ``status``.
+        Members beside the unit's members, or in place of its ``status``.
     """
 
     def __init__(self, unit: Component, **members: Member):
@@ -157,7 +157,7 @@ class _Observed(Wrapped):
         for name in ("i", "write"):
             if name in self.signature.members:
                 outer = getattr(self, name)
-                # Not an AND, which the unit may have, too: `opt_merge` would merge the two.
+                # A multiplexer, because `opt_merge` would merge an AND with an equal AND of the unit.
                 m.d.comb += outer.ready.eq(Mux(outer.valid, getattr(self.unit, name).ready, 0))
         return m
 
@@ -199,7 +199,7 @@ opt_clean
 write_rtlil flat.il
 write_json flat.json"""
 
-# Registers of counters of events: those of `count_events`, and of the status of a pipeline; not its flag.
+# Registers of counters of events, from `count_events` and from the status of a pipeline without its flag.
 _COUNTER = re.compile(r"wire<(?:16|32)> (p_\w*_(?:count__\w+|status_5b_\w+));")
 
 _LIST = """\
@@ -243,8 +243,9 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     kept, known = [], {}
     for number, text in enumerate(listed, 1):
         mutant = _described(text, top["cells"], behind)
-        # Left out are faults of clocks, which are not small; of memory contents, which must be constant; and
-        # those where one output bit of a cell inverts another, as a bit might then depend on itself.
+        # Three kinds of faults are left out: of clocks, which are not small; of memory contents, which must
+        # be constant; of cells where an output bit inverts another bit, because a bit might then depend on
+        # itself.
         if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant):
             kept.append(text.replace("mutate", f"mutate -ctrl mutant {width} {number}", 1))
             known[number] = mutant

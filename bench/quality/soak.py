@@ -96,7 +96,8 @@ _PART, _BATCH = 10**7, 250_000
 
 _IDLE_TIMEOUT = 10_000
 
-# Beats of a unit's task, cycles of a simulation, both about; and of how many tasks slow Verilator runs one.
+# Approximate beats of a unit's task, approximate cycles of a simulation. Verilator is slow, so it runs only
+# every `_UNIT_BASELINE`-th task.
 _UNIT_PART, _CLOCKS, _UNIT_BASELINE = 10**5, 500_000, 4
 # A geometry unit takes 4096 cycles for 4096 scanlines without pixels, a compact one 16384, and several such
 # triangles may follow each other: the longest pause in 800,000 triangles was 28,724 cycles.
@@ -382,7 +383,7 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
 
 
 def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> list[Task]:
-    """Tasks of the run of a unit, with the baseline in one of `_UNIT_BASELINE`.
+    """Tasks of the run of a unit. Every `_UNIT_BASELINE`-th task has the baseline.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ _FIGURES = ("max_lsb", "p999_lsb", "rmse_lsb")
 
 
 def _lit(scene: Scene, lights: int) -> Scene:
-    """The scene with several lights in place of one, evenly round an upright axis, together as bright."""
+    """The scene with its light divided into equal lights, which stand evenly round an upright axis."""
     (light,) = scene.lights
     directions = turned(light.direction, (0, 1, 0), lights).tolist()
     return replace(scene, lights=[Light(tuple(one), (1 / lights,) * 3) for one in directions])

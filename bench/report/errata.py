@@ -232,7 +232,7 @@ def wrong_variable() -> Pair:
 
 
 def energy(model: str, exponent: int) -> Pair:
-    """Reflected energy, ideally 1: with the published energy factor, and with the right one."""
+    """Reflected energy, ideally 1: with the published energy factor, and with the right factor."""
     half = 2 if model == "blinn" else 1
     reflected = quad(
         lambda t: math.cos(t / half) ** exponent * math.cos(t) * math.sin(t), 0, math.pi / 2, epsabs=1e-13

@@ -31,7 +31,7 @@ def summaries(
     -------
     list of dict
         ``label``, ``method``, ``group``, ``samples`` (their number); ``is_prepared``, whether spans bring dot
-        products; ``is_mirror``, whether the model is one of R·V; ``method_error`` and ``total_error``, each
+        products; ``is_mirror``, whether the model takes R·V; ``method_error`` and ``total_error``, each
         largest and smallest over the scenes; ``cycles``, smallest, median and largest cycles a pixel;
         ``ns``, the same in nanoseconds over scenes and seeds, or ``None``; ``multipliers``, ``luts``,
         ``fmax_mhz``, ``parts``, spans after cutting over spans before.
@@ -200,7 +200,7 @@ def _costs(of: Mapping[str, Any]) -> str:
 
 def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Drawing:
     """Drawing of both errors against nanoseconds, if most designs and the best are placed, else cycles."""
-    # Where there are several scenes, a design of one is not comparable.
+    # A design with one scene is not comparable with designs of several scenes.
     several = [of for of in found if of["samples"] > 1]
     found = several if len(several) > 2 else found
     placed = [of for of in found if of["ns"]]

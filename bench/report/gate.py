@@ -77,7 +77,7 @@ class Shares:
     dark_pixels : int
         Pixels whose specular term is 0. This is the limit of any gate.
     behind_pixels : int
-        Pixels whose light is behind the surface, which are dark without a gate, too.
+        Pixels whose light is behind the surface. They are dark without a gate, too.
     """
 
     spans: int
@@ -106,7 +106,7 @@ class GateRow:
         Cycles of the throughput and of the compact style, from the first write of a constant to the last
         pixel.
     identical : bool
-        Whether the pixels of all four simulations, hidden ones too, equal those of the bit-accurate model.
+        Whether the pixels of all four simulations equal the bit-accurate model, also hidden pixels.
     """
 
     mesh: str

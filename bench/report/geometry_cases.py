@@ -164,7 +164,7 @@ def _smallest(rng: np.random.Generator) -> Scene:
 
 
 def _crossing() -> Scene:
-    """Two planes that cross, between a near point and a far one that set the range of depths."""
+    """Two planes that cross. A near point and a far point set the range of depths."""
     low, high = -900.0, 900.0
     plate = [(-90, -70, low), (90, -70, high), (90, 70, high), (-90, 70, low)]
     other = [(x, y, low + high - z) for x, y, z in plate]
@@ -188,7 +188,7 @@ def _deep() -> Scene:
 
 
 def _grid(side: int) -> Scene:
-    """A bent sheet of ``side * side`` triangles of half a pixel to one."""
+    """A bent sheet of ``side * side`` triangles, each half a pixel to one pixel large."""
     columns, rows = side, side // 2
     x, y = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1))
     points = np.stack([x - columns / 2 + 0.3, y - rows / 2 + 0.2], axis=-1) * 1.2

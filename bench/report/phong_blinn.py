@@ -142,7 +142,7 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
     Parameters
     ----------
     triangles : int
-        Triangles of the teapot, about.
+        Approximate number of triangles of the teapot.
     width, height : int
         Size of the picture.
     repeats : int
@@ -221,7 +221,7 @@ def exponent_of_width(way: str, degrees: float, exponent: float) -> float:
     Parameters
     ----------
     way : {"along", "across"}
-        Where the normal lies: along the plane of L and V, or across it.
+        Direction in which the normal turns: along the plane of L and V, or across the plane.
     degrees, exponent
         As for `half_angle`.
     """

@@ -40,7 +40,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: pixels a cycle, their limits, and whether the pictures equal those of one pipeline."""
+    """The section: pixels a cycle, their limits, and whether the pictures equal one pipeline's pictures."""
     rates = [pipes.Rate(**fields) for result in results for fields in result]
     same = sum(rate.same for rate in rates)
     settings = tasks[0].settings

@@ -75,8 +75,8 @@ def _words(shape, beats) -> list[int]:
 def stream_patterns(unit: ShadingPipelineUnit) -> Iterator[tuple[str, dict[str, Any]]]:
     """Names and stalls of the runs of `STREAM_GROUP`: options of `simulate`.
 
-    One run has no stalls, three have random ones, and one for each side and cycle of the stream of
-    `measure_stream` has a single stall.
+    One run has no stalls, and three runs have random stalls. For each side and cycle of the stream of
+    `measure_stream` there is a run with a single stall.
 
     Parameters
     ----------

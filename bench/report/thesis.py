@@ -217,7 +217,7 @@ def _parts(name: str) -> dict[str, int]:
 
 
 def hardware(unit: str, baseline: str) -> dict[str, float | None]:
-    """The baseline's cycles for each result, and its parts, divided by those of the unit; both of `UNITS`.
+    """Cycles for each result, and parts, of the baseline divided by the unit. Both are from `UNITS`.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
     Parameters
     ----------
     triangles : int
-        Triangles of the teapot, about.
+        Approximate number of triangles of the teapot.
     width, height : int
         Size of the picture.
     repeats : int
@@ -268,7 +268,7 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     method : str
         One of `METHODS` or `PUBLISHED`.
     triangles : int
-        Triangles of the teapot, about.
+        Approximate number of triangles of the teapot.
     width, height : int
         Size of the picture.
 

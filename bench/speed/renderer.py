@@ -80,7 +80,7 @@ def scene_for(triangles: int, width: int, height: int) -> Scene:
     Parameters
     ----------
     triangles : int
-        Triangles of the teapot, about.
+        Approximate number of triangles of the teapot.
     width, height : int
         The picture in pixels.
     """

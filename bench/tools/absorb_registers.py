@@ -300,7 +300,7 @@ class _Netlist:
         return None if control is None else (control, found)
 
     def absorb_operands(self, cell: str, closes: bool) -> int:
-        """Move the flip-flops before both operands, or before one, into a multiplier. Returns their number.
+        """Move the flip-flops before one operand or both operands into a multiplier. Returns their number.
 
         If only one operand has a register, nextpnr times the multiplier as if it had none. The logic before
         this register is then on a path through the multiplier. So the flip-flops of one operand move only if

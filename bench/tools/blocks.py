@@ -185,7 +185,7 @@ def rows(
             yield _row(entry, samples, seed)
         return
     with local_executor(min(jobs, len(entries))) as pool:
-        # By name: a record need not be one that can be sent to a process.
+        # The name is sent, because some records cannot be sent to a process.
         waiting = [pool.submit(_found, e.record.name, e.name, samples, seed) for e in entries]
         for entry, found in zip(entries, waiting, strict=True):
             yield Row(entry, *found.result())

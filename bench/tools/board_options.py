@@ -11,7 +11,7 @@ COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 _LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
 
 DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
-"""Defaults that differ from those of a rendering."""
+"""Defaults that differ from the defaults of a rendering."""
 
 _METHOD = (
     "Method of interpolation along a span.  [default: quotient; renormalise with a model without a table]"

@@ -21,7 +21,7 @@ def inline(text: str) -> str:
         if k % 2:
             parts[k] = "`" + re.sub(r"^:\w+:", "", part).strip("`") + "`"
         else:
-            # Stars that multiply, not those of emphasis.
+            # Stars that multiply. Stars of emphasis stay.
             part = re.sub(r"([<\\])", r"\\\1", part)
             parts[k] = re.sub(r"(?<=\w)\*(?=\w)|(?<=\s)\*(?=\s)", r"\\*", part)
     return "".join(parts)

@@ -25,9 +25,9 @@ class Parts:
     Parameters
     ----------
     luts : int
-        Look-up tables of four inputs, with those that serve as carries, as distributed RAM and as wires.
+        Look-up tables of four inputs. Tables that serve as carries, distributed RAM or wires count, too.
     flip_flops : int
-        Registers, without those at the ports and those inside multipliers.
+        Registers, without registers at the ports and registers inside multipliers.
     multipliers : int
         Multipliers of 18x18 bits or less.
     block_rams : int
@@ -111,8 +111,8 @@ ECP5 = Family(
         *("--25k", "--package", "CABGA381", "--speed", "6"),
         *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
     ),
-    # The placer brings registers nearer to their multipliers than the default one; with hardly any logic it
-    # does not end. The router takes wires on slow paths up again.
+    # This placer brings registers nearer to their multipliers than the default placer. With hardly any
+    # logic it does not end. The router takes wires on slow paths up again.
     large=("--placer", "static", "--tmg-ripup"),
     # Two registers on either side of a multiplier are for that one: equal ones are not made one. The mapper
     # saves look-up tables where paths are shorter than 2.5 ns, of its estimate of wires of 0.3 ns.

@@ -119,7 +119,7 @@ def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
 
 
 def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """Variants of units, by a unit's name (those of `entries_shown`) or by unit and variant."""
+    """Variants of units by names. A name is a unit (all variants of `entries_shown`), or unit and variant."""
     for name in names:
         entries = [entry for unit in UNITS for entry in entries_shown(unit)]
         found = [entry for entry in entries if name in (entry.title, entry.record.name)]

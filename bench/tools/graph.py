@@ -153,7 +153,7 @@ def layers(graph: Graph) -> tuple[dict[int, int], set[tuple[int, int]]]:
         ahead = [columns[t] for t in targets[number] if (number, t) not in back]
         if graph.nodes[number].kind == "output":
             columns[number] = last
-        # What nothing comes before stands next to where it is used.
+        # A node without a source stands next to the node that uses it.
         elif ahead and not sources[number] - {number} and graph.nodes[number].kind != "input":
             columns[number] = min(ahead) - 1
     return columns, back

@@ -43,7 +43,7 @@ def units_of(netlist: str) -> list[str]:
 def parts_by_unit(
     component: wiring.Component, family: Family = ECP5, absorb: bool = True
 ) -> dict[str, Parts]:
-    """Parts of each unit of a component without those of the units inside it, by its path.
+    """Parts of each unit of a component, by its path. Parts of units inside a unit count only there.
 
     Yosys maps the whole component, so that units may share logic. Shared logic counts for the unit in its
     cell's name. Look-up tables are of the mapped cells. nextpnr adds some at the ends of carries.

@@ -81,7 +81,7 @@ def _drop_idle_choices(graph: Graph) -> None:
 
 
 def _fuse(graph: Graph) -> None:
-    """Put an operation into the box that takes its result, if it is the only one."""
+    """Put an operation into the box that takes its result, if no other box takes the result."""
     changed = True
     while changed:
         changed = False
@@ -98,7 +98,7 @@ def _fuse(graph: Graph) -> None:
                 continue
             loops = (target, target) in graph.edges or (target, number) in graph.edges
             other.operations += node.operations
-            # A choice among the results of choices is one.
+            # A choice among the results of choices counts as one choice.
             if other.operations["mux"]:
                 other.operations["mux"] = 1
             graph.merge([target, number])

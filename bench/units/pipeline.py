@@ -175,7 +175,7 @@ def _spans(unit, rng, count):
 
 
 def _every_setup(unit, rng, count):
-    """Spans of a pixel in a row, which wait for the setup; then long ones."""
+    """Many spans of one pixel, which wait for the setup, and then long spans."""
     design = unit.model
     length = np.r_[np.full(count, 1), rng.integers(1, 12, count), rng.integers(600, 4096, 8), np.full(9, 1)]
     spans = any_spans(rng, design, length)
@@ -298,7 +298,7 @@ def _frames(unit, rng, count):
         frame = any_spans(rng, design, length if 2 < len(length) < 80 else length % 3)
         constants = any_constants(rng, design, frame, rng.choice([1.0, 8.0]))
         if rng.random() < 0.3:
-            # A word like the one that begins a table.
+            # The word has the value that begins a table.
             constants[0].direction[:, 0] = -ONE
         write = [writes_of(constants)]
         if design.loads_tables and rng.random() < 0.2:

@@ -108,7 +108,7 @@ def _tables_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> li
     data = write["data"][write["address"] == LOBE_ADDRESS]
     starts = np.flatnonzero(data >> 17)
     for start, end in zip(starts, [*starts[1:], len(data)], strict=True):
-        # Values for a bank that there is not are lost, and those past the end of a table.
+        # The unit drops values for a bank that does not exist, and values past the end of a table.
         if data[start] - (1 << 17) < lobe.banks:
             loaded = data[start + 1 : end][: values.shape[1]]
             values[data[start] - (1 << 17), : len(loaded)] = loaded
@@ -123,7 +123,7 @@ def constants_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> 
         if design.materials > 1 and address == MATERIAL_ADDRESS:
             index = data
         elif address < words.shape[1]:
-            # L and H are those of the frame.
+            # L and H come from the frame.
             of_frame = address >= LIGHT_STRIDE and address % LIGHT_STRIDE < FIELDS_OF_A_LIGHT["diffuse"][0]
             words[slice(None) if of_frame else index, address] = data
     by_light = words.reshape(design.materials, -1, LIGHT_STRIDE)[:, 1:]
@@ -224,7 +224,7 @@ def joined(rng: np.random.Generator, *kinds: Spans) -> Spans:
 def spans_about(
     rng: np.random.Generator, largest: float, middles: np.ndarray, longest: int, decades: int = 4
 ) -> Spans:
-    """Spans with given middle normals. Angles and lengths are drawn by their logarithm.
+    """Spans with given middle normals. Angles and lengths have a uniform logarithm.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.nda
     border = border[np.argsort(np.abs(away - rises[nearest]))[:600]]
     halves = np.argsort(np.abs((rises & 0xFFFF) - 0x8000))[:40]
     tie.normal_right[:] = tie.normal_left + moves[rng.choice(halves, len(tie))]
-    # Among short ones some are out of range.
+    # Some of the short spans are out of range.
     lit = (
         spans_about(rng, most, normals(count, -0.02, 0.12), longest)
         for most, (count, longest) in zip((largest, 180.0), _LONG_AND_SHORT, strict=True)
@@ -316,7 +316,8 @@ def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarra
 def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.ndarray, exponent: int) -> Spans:
     """Spans inside a highlight, with 1 - N.H up to 2/n.
 
-    Most are in the part with an eighth of the peak or less. Some have any distance, drawn by its logarithm.
+    Most are in the part with an eighth of the peak or less. For some the logarithm of the distance is
+    uniform.
     """
     kinds = []
     for count, longest in _LONG_AND_SHORT:

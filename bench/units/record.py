@@ -97,7 +97,7 @@ class Sample:
 
     @classmethod
     def joined(cls, samples: "Iterator[Sample]") -> "Sample":
-        """Several samples as one. Each may have its own shape."""
+        """Several samples joined into one sample. Their shapes may differ."""
         samples = [
             s if s.at is None else replace(s, at=np.broadcast_to(s.at, np.shape(s.found))) for s in samples
         ]
@@ -224,7 +224,7 @@ class Stimulus:
     count : int
         Beats or pixels of a test.
     stalled : bool
-        Whether it is also sent with the stalls of `STALLS`. Else it is sent only without stalls.
+        Whether the stimulus is sent with the stalls of `STALLS`, too. Else it is sent only without stalls.
     pace : callable, optional
         Function from the component to the cycles from an output beat to the next without stalls, as the
         unit's documentation has them for this input. ``None`` if they depend on the data. Tests then check

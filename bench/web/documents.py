@@ -57,7 +57,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
     for name, folder in folders.items():
         for path in sorted(folder.rglob("*.[sp][vn]g")):
             pictures[f"{name}/{path.relative_to(folder).as_posix()}"] = path
-        # Without a page of its own, the first one is that of the folder.
+        # A folder without a page of its own takes its first page.
         first = "README" if (folder / "README.md").exists() else min(p.stem for p in folder.glob("*.md"))
         for path in sorted(folder.glob("*.md")):
             text = path.read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ from blysk.golden.number.unit_vector import COMPONENT
 __all__ = ["RECURRENCE_FORMS", "Recurrence", "shortcut_cosine"]
 
 RECURRENCE_FORMS = ("reinsch", "direct")
-"""Forms of the recurrence: Reinsch's and the direct one."""
+"""Forms of the recurrence: Reinsch's form and the direct form."""
 
 
 def shortcut_cosine(angle: np.ndarray, steps: np.ndarray) -> np.ndarray:

@@ -187,7 +187,7 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
 
 
 def split_pairs(raster: Raster) -> Raster:
-    """Spans of two pixels as two of one, for a method that takes vectors. Other spans stay."""
+    """Divide each span of two pixels into two spans, for a method that takes vectors. Other spans stay."""
     return _halve(raster, lambda _, first, last: last - first == 1)[0]
 
 
@@ -255,7 +255,7 @@ def _parts(raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarr
 def cut_by_error(
     scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
 ) -> tuple[Raster, int]:
-    """Halve spans until the method's curve is near enough to the exact one for every light.
+    """Halve spans until the method's curve is near enough to the exact curve for every light.
 
     Exact N·L and u along a span are computed from its true normals and from the points of the surface,
     perspective-correct. A span is halved if
@@ -283,7 +283,7 @@ def cut_by_error(
     interpolator : Interpolator
         The method.
     limits : HighlightLimits, optional
-        Tolerances of the materials' highlights; by default those of their exponents.
+        Tolerances of the materials' highlights. By default they follow from the exponents.
 
     Returns
     -------

@@ -182,7 +182,7 @@ class Pieces:
         return found
 
     def _flagged(self, setup: ChordSetup, curves: "Mapping[str, _Quadratic]") -> np.ndarray:
-        """Whether ``chord-local`` may flag a piece; if ``False``, it does not."""
+        """Whether ``chord-local`` may flag a piece. If ``False``, ``chord-local`` does not flag the piece."""
         one = float(ONE_SQUARED.values)
         formats = {"diffuse": setup.DIFFUSE_SLOPE_FORMAT, "highlight": setup.SLOPE_FORMAT}
         formats["factor"] = setup.DIFFUSE_SLOPE_FORMAT
@@ -325,7 +325,7 @@ def _mistakes_sign(
         t = t[:, np.newaxis]
         fit = left[of_pixel] + t * (slope[of_pixel] + t * curvature[of_pixel])
         wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
-        # Nearer to 0 no word tells the sign; the little light of one that fades may be shown or not.
+        # Nearer to 0 no word tells the sign. The little light of a light that fades may be shown or not.
         wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
         wrong &= (exact.factor > LocalChordInterpolator.FACTOR_BUDGET / 255) & lights[of_pixel]
         result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0

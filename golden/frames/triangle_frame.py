@@ -94,7 +94,7 @@ def triangle_constants(scene: Scene, renderer: Renderer) -> list[FrameConstants]
     if not renderer.rows:
         return constants
     if renderer.mirrors:
-        # A first light that is off has its part in q all the same: y cos a and y sin a.
+        # A first light that is off still contributes y cos a and y sin a to q.
         direction = constants[0].direction.copy()
         first = light_frames(scene, 1)[0]
         direction[0] = np.rint(first.direction * QuotientSpans.ONE)

@@ -42,7 +42,7 @@ class DepthTester:
         Returns
         -------
         int64 array, shape (P,)
-            Depths of all pixels, those of a span one after the other.
+            Depths of all pixels. The pixels of a span follow each other.
         """
         span, k = pixels_of(length)
         code = (depth[span] + k * step[span]) >> SPAN_DEPTH.fraction_bits

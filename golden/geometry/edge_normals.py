@@ -117,7 +117,7 @@ class EdgeNormals:
         normals, lost = self.normaliser.compute(Fixed(SPAN_NORMAL, vectors), flip)
         made = pieces.length[:, np.newaxis] > np.arange(2)
         repaired = int((lost & made).sum())
-        # A normal that is lost, or that the piece is too short for, is replaced by the last good one.
+        # The last good normal replaces a normal that is lost, and a normal for which the piece is too short.
         good = np.r_[True, (made & ~lost).ravel()]
         codes = np.vstack([self.FIRST, normals.codes.reshape(-1, 3)])
         codes = codes[np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))][1:].reshape(-1, 2, 3)

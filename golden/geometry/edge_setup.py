@@ -10,7 +10,7 @@ from blysk.golden.geometry.vertex_sort import SortedTriangles
 __all__ = ["EDGES", "FRACTION_BITS", "X_BITS", "EdgeSetup", "Edges"]
 
 EDGES = ((0, 2), (0, 1), (1, 2))
-"""First and last corner of each edge: the long one, the upper, the lower."""
+"""First and last corner of each edge: the long edge, the upper edge, the lower edge."""
 
 X_BITS = PIXEL_BITS + 1
 """Bits of a column or a scanline: -4096 to 4095."""

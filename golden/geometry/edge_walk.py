@@ -110,7 +110,7 @@ class EdgeWalk:
 def _walk(
     edges: Edges, triangle: np.ndarray, edge: int | np.ndarray, row: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Column of an edge ``row`` scanlines below its first one, and whether the next step carries."""
+    """Column of an edge ``row`` scanlines below the edge's first scanline, and the next step's carry."""
     x, error, step, error_step, height = (
         getattr(edges, name)[triangle, edge] for name in ("x", "error", "step", "error_step", "height")
     )

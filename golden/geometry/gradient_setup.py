@@ -128,7 +128,7 @@ class GradientSetup:
         Parameters
         ----------
         first, middle, last : Fixed, shape (T, ...), SQ(1, 23)
-            An attribute's values at the sorted corners, or those of several attributes.
+            Values of an attribute at the sorted corners, or values of several attributes.
         scales : PlaneScales
             Of the triangles, from `PlaneSetup`.
 

@@ -47,7 +47,7 @@ class MirrorAdapter:
         return replace(spans, start=start, step=self._components(spans.step, y * factors))
 
     def _components(self, vector: np.ndarray, products: np.ndarray) -> np.ndarray:
-        """x, rounded ``y cos a``, z, those of further lights, rounded ``y sin a``."""
+        """x, rounded ``y cos a``, z, the components of further lights, rounded ``y sin a``."""
         bits = self.FORMAT.fraction_bits
         along, across = ((products + (1 << (bits - 1))) >> bits).T
         return np.column_stack([vector[:, 0], along, vector[:, 2:], across])

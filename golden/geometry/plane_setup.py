@@ -28,7 +28,7 @@ class PlaneScales:
     height_reciprocal : Fixed, shape (T,), UQ(1, 25)
         Reciprocal of the mantissa d of the height, which is ``d 2^e`` with d from 1 to 2.
     knee : Fixed, shape (T,), UQ(1, 19)
-        Distance from the first corner down to the middle one, over ``2^e``.
+        Distance from the first corner down to the middle corner, divided by ``2^e``.
     width_reciprocal : Fixed, shape (T,), UQ(0, 25)
         Mantissa of the reciprocal of the width; 0 for a sliver.
     row_shift, column_shift : int64 arrays, shape (T,)

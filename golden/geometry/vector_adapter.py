@@ -144,7 +144,7 @@ class VectorAdapter:
 
 
 def _used(codes: np.ndarray) -> np.ndarray:
-    """Bits, without those that repeat the sign, of the components of each vector together."""
+    """Bits that the components of each vector need together, without bits that repeat the sign."""
     used = np.bitwise_or.reduce(np.where(codes < 0, ~codes, codes), axis=-1)
     found: np.ndarray = np.frexp(used.astype(np.float64))[1].astype(np.int64)
     return found

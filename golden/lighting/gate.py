@@ -26,7 +26,7 @@ class Gate:
 
     @property
     def threshold_rule(self) -> str | None:
-        """How the threshold of a table follows from its values; ``None``: by a rule of the model alone."""
+        """Rule by which a table's values give its threshold. ``None``: a rule of the model alone gives it."""
         return None
 
     @cached_property

@@ -138,7 +138,7 @@ class Lobe(HighlightOperand):
         super().__post_init__()
         if self.reflection.MIRROR and not self.SERVES_MIRROR:
             raise ValueError(
-                f"a table holds a lobe of N·H, and {self.reflection.name} is one of R·V; take phong_coplanar"
+                f"a table holds a lobe of N·H, but {self.reflection.name} has R·V; take phong_coplanar"
             )
         if self.steps not in (2**bits for bits in range(1, 9)):
             raise ValueError(f"steps must be a power of two from 2 to 256, not {self.steps}")
@@ -355,7 +355,8 @@ class Lobe(HighlightOperand):
             f.
         """
         code, top = argument.codes, self.fraction_bits - 1
-        # float64 has the exact leading one of a code under 2^34; frexp counts it from 1, and gives 0 for 0.
+        # float64 holds a code under 2^34 exactly. frexp counts the place of its leading 1 from 1, and gives 0
+        # for 0.
         _, length = np.frexp(code.astype(np.float64))
         row = np.maximum(length - self.fraction_bits + self.octaves, 0)
         normal = code << (self.octaves - np.maximum(row, 1))

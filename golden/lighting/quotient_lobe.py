@@ -67,7 +67,7 @@ class QuotientLobe(Lobe):
 
     @property
     def argument_text(self) -> str:
-        """What the first table's argument is."""
+        """Formula of the first table's argument."""
         return "s = (1 - R.V)/2" if self.reflection.MIRROR else "s = 1 - (N.H)^2"
 
     def is_sharp(self, parameter: float | None) -> bool:

@@ -34,7 +34,7 @@ class SpanCutter(Protocol):
         """The spans as they are given."""
 
     def split_pairs(self) -> Raster:
-        """Spans of two pixels as two of one; the others as they are."""
+        """Divide each span of two pixels into two spans of one pixel. The other spans stay."""
 
     def missed(self, cut: Raster) -> int:
         """Number of cut spans that `by_error` would cut further, see `missed_spans`."""

@@ -121,7 +121,7 @@ class Interpolator(ABC):
 
     @property
     def curve_is_exact(self) -> bool:
-        """Whether the curve is the exact one, of perspective-correct normals: spans bring the true line."""
+        """Whether the curve is exact, with perspective-correct normals. Then spans bring the true line."""
         return False
 
     @property
@@ -176,7 +176,7 @@ class Interpolator(ABC):
 
     @property
     def light_meanings(self) -> LightMeanings:
-        """What the vectors of a light among the frame constants are."""
+        """Meaning of the vectors of a light among the frame constants."""
         return NOT_READ
 
     @property

@@ -137,7 +137,7 @@ class QuotientInterpolator(Interpolator):
             "at most ceil(log2(length - 1)) + 3.",
             "Halve a span where |v| at its ends differs by a factor over 2, "
             "or where they are over 90 degrees",
-            "apart. Give a span of two pixels as two spans of one, whose step is 0. "
+            "apart. Divide a span of two pixels into two spans of one pixel, whose step is 0. "
             "A span with a pixel of |v| under",
             "1/128, which these cuts exclude, is wrong, and counted in status_out_of_range_spans.",
             *(constants if highlights else []),
@@ -220,7 +220,7 @@ class QuotientInterpolator(Interpolator):
     def highlight_error(
         self, unit: HighlightOperand, parameter: float | None, length: int, error: float
     ) -> float:
-        """Bound from the words of the worst span, with those of the table, see `QuotientErrors.highlight`."""
+        """Bound from the words of the worst span and of the table, see `QuotientErrors.highlight`."""
         own = QuotientErrors.worst(length, self.mirror).highlight(unit.reflection, parameter)
         return own + unit.line_error(parameter) + unit.error
 

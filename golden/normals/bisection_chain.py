@@ -75,7 +75,7 @@ class BisectionChain:
         for k in range(1, level + 1):
             first = first_step and k == 1
             constant, rest = p.polynomial(first)
-            # Angles of this step: all up to the widest, or those of the first step.
+            # Angles of this step: all angles up to the widest, or the angles of the first step.
             cosines = np.linspace(cosine, np.sqrt(0.5) if first else 1.0, 2001)
             x = one * (cosines if p.reads_cosine(first) else 1 - cosines)
             exact = half_angle_factor(1 - cosines) - 0.5

@@ -153,7 +153,7 @@ class QuadraticEvaluator:
         span : int array, shape (pixels,)
             Span of each pixel.
         index : int array, shape (pixels,)
-            Index of each pixel in its span, 0 to its length less one.
+            Index of each pixel in its span, 0 to the span's length minus 1.
 
         Returns
         -------

@@ -41,7 +41,7 @@ def planes_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def seen_from_behind(scene: Scene, plane: np.ndarray) -> np.ndarray:
-    """Which triangles of a scene, with their `face_normals`, turn away from the camera."""
+    """Whether each triangle of a scene, with its vector of `face_normals`, turns away from the camera."""
     if scene.camera.projection == "perspective":
         towards = scene.camera.position - scene.mesh.vertices[scene.mesh.faces[:, 0]]
         return sum_of_components(plane * towards) < 0

@@ -55,7 +55,7 @@ def light_frame(direction: np.ndarray, viewer: np.ndarray) -> LightFrame:
     direction, viewer = (np.asarray(vector, dtype=np.float64) for vector in (direction, viewer))
     total, difference = direction + viewer, direction - viewer
     cosine, sine = (float(np.linalg.norm(vector)) / 2 for vector in (total, difference))
-    # The longer of the two is exact to rounding; the shorter one is made perpendicular to it.
+    # The longer of the two is exact up to rounding. The shorter is made perpendicular to the longer.
     if cosine >= sine:
         z = normalise(total)
         x = _across(difference, z)

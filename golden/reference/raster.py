@@ -174,7 +174,7 @@ def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tupl
 def _assemble(
     scene: Scene, candidates: np.ndarray, corners: np.ndarray
 ) -> tuple[_Pieces, np.ndarray, np.ndarray]:
-    """Clip, divide and round triangles, and drop those without area, and back faces of a scene that culls.
+    """Clip, divide and round triangles. Drop triangles without area, and back faces if the scene culls.
 
     Also returns the mesh triangles with a part left after clipping, and with an area left after rounding.
     The rounded corners tell a back face: then a closed surface has a front wherever it has a back.
@@ -236,7 +236,7 @@ def _spans(
     a, b, c = pieces.edges()
     # A pixel centre exactly on an edge belongs to the triangle on whose left or top that edge is.
     top_left = (a > 0) | ((a == 0) & (b > 0))
-    # E >= 0 on those edges, E >= 1 on the others.
+    # E >= 0 on top and left edges, E >= 1 on the others.
     biased = c - ~top_left
     scaled = pieces.nearness / pieces.area[:, np.newaxis]
     step = sum_of_components(a * scaled)

@@ -348,7 +348,7 @@ REFLECTION_MODELS: dict[str, ReflectionModel] = {
             a=0.448,
             b=0.099,
         ),
-        # A line through the slope of cosquad_q, in place of the one that [C] prints.
+        # A line through the slope of cosquad_q, in place of the line that [C] prints.
         PolynomialModel(
             "cosquad_lin_refitted",
             "own fit",

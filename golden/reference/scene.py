@@ -106,7 +106,7 @@ class Scene:
         if self.viewer not in VIEWERS:
             raise ValueError(f"viewer must be one of {', '.join(VIEWERS)}, not {self.viewer!r}")
         if self.viewer == "near" and self.camera.projection != "perspective":
-            raise ValueError("a near viewer needs a perspective camera; an orthographic one is distant")
+            raise ValueError("a near viewer needs a perspective camera, not an orthographic camera")
 
     @property
     def local(self) -> bool:
@@ -133,7 +133,7 @@ class Scene:
 
     @property
     def culls(self) -> np.ndarray:
-        """Whether each triangle is left out where it is seen from behind: bool array, shape (faces,)."""
+        """Whether each triangle is left out if it is seen from behind: bool array, shape (faces,)."""
         return (self.back_faces == "cull") & ~self.two_sided
 
     @property

@@ -106,7 +106,7 @@ class Motion:
             If the camera is orthographic, or a coefficient is out of range.
         """
         if camera.projection != "perspective":
-            raise ValueError("turning meshes need a perspective camera, not an orthographic one")
+            raise ValueError("turning meshes need a perspective camera, not an orthographic camera")
         pixels = 1 << (unit or VertexTransform()).scale_bits
         width, height = size
         frame = FrameSettings.centred(width, height)

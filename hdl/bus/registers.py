@@ -121,7 +121,7 @@ class RegistersUnit(wiring.Component):
         return m
 
     def _decide(self, m: Module, access, held) -> tuple[Signal, Signal]:
-        """Why the access in the register is refused, a bit for each cause; and the word that it reads."""
+        """Causes for which the access in the register is refused, a bit for each, and the word to read."""
         cause, word = Signal(len(ERRORS), name="cause"), Signal(WORD_BITS, name="word")
         found, fits = Signal(name="found"), Signal(name="fits")
         readable, writable, clears = (Signal(name=name) for name in ("readable", "writable", "clears"))

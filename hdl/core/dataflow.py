@@ -385,7 +385,7 @@ class _Build:
         self._issued: dict[tuple[FunctionalUnit, int], list[tuple[Value | None, Sequence[Any]]]] = {}
 
     def when(self, stage: int) -> Value | None:
-        """When a register of a stage is written. ``None``: always, because a beat may come on every cycle."""
+        """Condition to write a register of a stage. ``None``: on every cycle, because a beat may come."""
         return self.unit.at(stage) if self.unit.initiation_interval > 1 else None
 
     def at(self, word: Word, stage: int, cycles: int = 1) -> Any:

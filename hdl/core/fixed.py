@@ -225,7 +225,7 @@ class FixedValue(ValueCastable):
         return FixedValue(format, (kept + self._code[dropped - 1])[: format.width])
 
     def saturate(self, format: Format) -> "FixedValue":
-        """Clamp to the range of ``format``, by a test of the bits above those that ``format`` keeps.
+        """Clamp to the range of ``format``, by a test of the bits above the bits of ``format``.
 
         Both formats must have the same fraction bits.
 

@@ -20,7 +20,7 @@ def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> Non
     a, b : ShapeLike
         Shapes.
     path : str
-        What has the shapes, for the message.
+        Name of the value that has the shapes, for the message.
 
     Raises
     ------
@@ -51,9 +51,9 @@ def copy(target, source, path: str = "view"):
     Parameters
     ----------
     target, source : ValueLike
-        Where to, and where from.
+        Target and source of the copy.
     path : str
-        What is copied, for the message.
+        Name of the copied value, for the message.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def copy_fields(target, source, names: Iterable[str] | None = None) -> list:
     Parameters
     ----------
     target, source : View or mapping of str to ValueLike
-        Where to, and where from. Each has the fields.
+        Target and source of the copy. Both have the fields.
     names : iterable of str, optional
         Names of the fields; all of the target without it.
 
@@ -126,7 +126,7 @@ def of_shape(like, bits: Value):
     like : ValueLike
         View, fixed-point value or plain value.
     bits : Value
-        Its bits, or those of a value of the same shape.
+        Bits of the view, or of a value of the same shape.
 
     Returns
     -------

@@ -221,8 +221,8 @@ class QuotientSpansUnit(wiring.Component):
         """Turns, products, sums and shifts, up to the registers of differences and the memory of starts."""
         p, span, moves = self.model, self.i.payload, Signal(name="moves")
         place = {name: index for index, name in enumerate(p.components)}
-        # The turns are starts, second differences, first ones. Registers tell the first and the second turn:
-        # they drive the multiplexers of all operands.
+        # The turns are starts, second differences, first differences. Registers hold the turn, because it
+        # drives the multiplexers of all operands.
         begun, is_second, ends = (Signal(name=name) for name in ("has_begun", "is_second", "ends"))
         valid, is_long = self.i.valid, span.length[1:].any()
         m.d.comb += [
@@ -251,7 +251,7 @@ class QuotientSpansUnit(wiring.Component):
         def product(a, b, name):
             return register(register(a, f"{name}_a") * register(b, f"{name}_b"), name)
 
-        # Which word each stage holds, one bit for each of the three.
+        # The kind of word in each stage. Each of the three kinds has a bit.
         here = [[self.i.valid & turn for turn in (is_second, begun & ~is_second, ~begun)]]
         for stage in range(1, self._SHIFTED):
             held = [Signal(name=f"{name}_at_{stage}") for name in ("second", "first", "start")]
@@ -284,11 +284,11 @@ class QuotientSpansUnit(wiring.Component):
         if p.takes_heights:
             for light, height in enumerate(to_start.payload.heights):
                 m.d.comb += height.eq(delayed(begin[f"z{light}"], f"height_{light}", self._SUMS))
-        # What decides when a start is taken is in a register.
+        # The condition on which a start is taken is in a register.
         few = self._few_of(to_start.payload.length)
         self._few = connect_headed_fifo(m, "starts", to_start, start, few, self.DEPTH)
 
-        # Differences are shifted by their exponent, second ones of squares by twice that.
+        # Differences are shifted by their exponent. Second differences of squares are shifted by twice that.
         at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
         before = delayed(span.exponent, "exponent", self._SUMS - 1)
         exponent = register(before, f"exponent_{self._SUMS}")
@@ -302,7 +302,8 @@ class QuotientSpansUnit(wiring.Component):
         shifted += [
             self._shift(register, total, more, exponent, f"line_{k}") for k, total in enumerate(lines)
         ]
-        # Second differences wait until the first ones before them are taken, and so the second ones before.
+        # Second differences wait until the first differences of the span before are taken. By then the second
+        # differences of that span are taken, too.
         m.d.comb += moves.eq(~((at_coarse[0] & first[1]) | (at_sums[2] & ~to_start.ready)))
         for which, (word, waits) in enumerate((second, first)):
             with m.If(moves & at_coarse[which]):
@@ -326,7 +327,7 @@ class QuotientSpansUnit(wiring.Component):
         lasts = [sum(sizes[: k + 1]) - 1 for k in range(len(sizes))]
         steps = lasts[-1] + 1
 
-        # The turns are second differences, first ones, the start.
+        # The turns are second differences, first differences, the start.
         kinds = data.StructLayout({"second": 1, "first": 1, "start": 1})
         note = data.StructLayout({"turn": kinds, "step": range(steps)})
         busy, made = Signal(kinds, name="busy"), Signal(2, name="made")

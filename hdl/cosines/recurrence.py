@@ -97,7 +97,7 @@ class RecurrenceUnit(wiring.Component):
             load.eq(self.i.valid & self.i.ready),
         ]
         ends = phase == self.cycles_per_pixel - 1
-        # If interleaved: whether the next pixels are the first ones of their phases.
+        # If interleaved: whether the next pixels are the first pixels of their phases.
         starting = Signal(p.interleave - 1)
         starts = load | starting[0] if p.interleave > 1 else load
         coefficient = Signal(FixedShape(p.coefficient_format))

@@ -17,8 +17,8 @@ from blysk.hdl.emit.yosys import run_yosys
 
 __all__ = ["check_name", "emit"]
 
-# Warnings of `verilator -Wall` about any generated netlist, and why the netlist is right. The names are the
-# ones that old releases know too: UNUSED covers UNUSEDSIGNAL, WIDTH covers WIDTHEXPAND and WIDTHTRUNC.
+# Warnings of `verilator -Wall` about any generated netlist, and why the netlist is right. Old releases
+# know these names too: UNUSED covers UNUSEDSIGNAL, and WIDTH covers WIDTHEXPAND and WIDTHTRUNC.
 LINT_EXCEPTIONS = {
     "CASEOVERLAP": "the select lines of a case are one-hot by construction",
     "DECLFILENAME": "one file holds the whole hierarchy",

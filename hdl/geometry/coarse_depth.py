@@ -226,7 +226,7 @@ class CoarseDepthUnit(wiring.Component):
                 block.begins.eq(1),
                 block.ends.eq(~following.left.any()),
                 *copy_fields(block, following, ends),
-                # Where the block begins, which may be before the span.
+                # The depth where the block begins. The block may begin before the span.
                 block.depth.eq(following.depth - following.back),
             ]
         with m.Elif(advance):

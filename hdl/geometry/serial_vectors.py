@@ -78,7 +78,7 @@ class SerialVectorsUnit(wiring.Component):
     def elaborate(self, platform):
         """The rings and their turns; what decides; the pieces of a span; the words."""
         m = Module()
-        # What the turns do; `settles` and a span that does not fit take a cycle without a turn.
+        # The steps of the turns. `settles` takes a cycle without a turn, as does a span that does not fit.
         names = "loads", "settles", "repeats", "tests", "starts", "steps", "renews"
         loads, settles, repeats, tests, starts, steps, renews = (
             Signal(name=name, init=name == "loads") for name in names
@@ -112,7 +112,7 @@ class SerialVectorsUnit(wiring.Component):
                 renews.eq(retries),
             ]
 
-        # How the ends of a piece, or of the rest of a span, follow from the ends before.
+        # The ends of a piece, or of the rest of a span, follow from the ends before.
         odd, renewed = Signal(name="odd"), renews | rest_goes
         heads = self._rings(m, turns, comes, renewed, odd, steps)
         tag, pixels, uncut, words = self._pixels(m, comes & ends, retries, steps & ends, (whole, odd))
@@ -159,7 +159,7 @@ class SerialVectorsUnit(wiring.Component):
         }
 
     def _pixels(self, m: Module, comes, retries, leaves, flags):
-        """Which pixels the piece has: its flags, their number, whether the span is uncut, words that pass."""
+        """The piece's flags, its number of pixels, whether the span is uncut, and the words that pass."""
         (whole, odd), given = flags, self.i.payload
         tag = {
             name: Signal.like(Value.cast(given[name]), name=name, reset_less=True)
@@ -282,7 +282,7 @@ class SerialVectorsUnit(wiring.Component):
         part = Cat(Mux(notes[2].is_start, 0, part[:low]), part[low:]).as_signed()
         small = register((code - part)[:bits].as_signed(), "small")
 
-        # The exponent and the flags stay until those of the next piece come.
+        # The exponent and the flags stay until the next piece brings its own.
         used, exponent = Signal(p.LARGEST_EXPONENT, name="step_used"), Signal(4, name="exponent")
         with m.If(notes[2].finds):
             found = used_bits(p, [code])

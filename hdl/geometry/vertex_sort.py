@@ -129,7 +129,7 @@ class VertexSortUnit(wiring.Component):
     def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> list[Signal]:
         """Take corners in, and exchange neighbours that are in the wrong order.
 
-        Returns the comparisons of `_PAIRS`, which are those of the corners as given on the second cycle.
+        Returns the comparisons of `_PAIRS`. On the second cycle they compare the corners in the given order.
 
         First corners 0 and 1, then 1 and 2, then 0 and 1 again. All three pairs are compared on the first
         cycle, before any exchange; the exchanges so far decide which comparison the next one needs.

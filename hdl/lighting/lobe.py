@@ -211,7 +211,7 @@ class LobeUnit(PipelinedUnit):
         )
 
     def elaborate(self, platform):
-        """The pipeline, and the memory beside it, which is written while the pipeline stands, too."""
+        """The pipeline and the memory beside it. The memory is also written while the pipeline stands."""
         m = super().elaborate(platform)
         m.d.comb += self._read.enable.eq(self.advance)
         if self.shares_memory:
@@ -271,7 +271,7 @@ class LobeUnit(PipelinedUnit):
         bits, top = p.fraction_bits, p.fraction_bits - 1
 
         def limited(wide, lit):
-            # Where lit, u is under 1.
+            # If lit, u is under 1.
             return Mux(lit, Value.cast(wide.saturate(p.argument_format))[:bits], 0)[:bits]
 
         def coarse(argument, zeros):

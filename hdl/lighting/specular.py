@@ -341,7 +341,7 @@ class SpecularUnit(PipelinedUnit):
         product = g.wire("p", lambda product: FixedValue(p.BASE_FORMAT, below_one(product)), product)
         more = self._multiply("more", product, e, right=lambda e: e.truncate(16))
         w = g.register("w", lambda product, more: (product + more).truncate(17), product, more)
-        # Where lit, w is under 1.
+        # If lit, w is under 1.
         code = g.wire("chords_code", lambda w: Value.cast(w)[:17], w)
         return self._interpolate("chords", p.chords, code, lit)
 

@@ -52,8 +52,8 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     i : :py:`In(stream.Signature(StructLayout({"length": 12, "lit": lights})))`
         Lengths of spans, 1 or more, and decisions.
     words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
-        First values of the span that is taken in, and its differences. With factors ``factor_start`` and
-        ``factors``, too.
+        First values of the span that is taken in, and its differences. With factors also ``factor_start`` and
+        ``factors``.
     taken : :py:`Out(1)`
         High for one cycle while the words of the span accepted before are taken in.
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights, ...)))`

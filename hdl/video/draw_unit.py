@@ -247,7 +247,7 @@ class DrawUnit(wiring.Component):
                 m.next = "command"
 
     def _count(self, m: Module, **events) -> None:
-        """Counters of this unit and of those inside."""
+        """Counters of this unit and of the units inside."""
         status = self.status
         count_events(m, status, **events)
         m.d.comb += [

@@ -46,7 +46,7 @@ Progress = Callable[[int, int], object]
 
 @dataclass(frozen=True)
 class Rendering:
-    """A pipeline that is ready to draw its scenes: one, or those of a turntable.
+    """A pipeline that is ready to draw a scene or the scenes of a turntable.
 
     Parameters
     ----------

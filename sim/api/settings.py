@@ -54,7 +54,7 @@ class Settings:
 
     @property
     def lights(self) -> tuple[Light, ...]:
-        """Lights of the scene or of the options, without lights that are off: those need no hardware."""
+        """Lights of the scene or of the options. Lights that are off are left out, and need no hardware."""
         if isinstance(self.source, Scene):
             return self.source.lights
         return tuple(light for light in self["lights"] if light.is_on)

@@ -27,7 +27,7 @@ def _name(flag: str) -> str:
 
 
 def with_options(table: Mapping[str, Option], types: type | None = None) -> Callable[[Function], Function]:
-    """Decorator of a function whose ``**options`` are those of a table: `help` shows each by its name.
+    """Decorator of a function that takes the options of a table. `help` shows each option by its name.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ def example_of(design: ShadingPipeline, renderer: Renderer | None = None) -> lis
         The pipeline. The example has its exponent if that is fixed at build time; there are no lines if its
         tables are fixed for other lobes.
     renderer : Renderer, optional
-        What sends triangles to the pipeline: the axes of its further lights are written, too.
+        Core that sends triangles to the pipeline. The example then also writes the axes of further lights.
     """
     material = Material(
         (AMBIENT,) * 3, (DIFFUSE,) * 3, (SPECULAR,) * 3, exponent=design.build.exponent or EXPONENT

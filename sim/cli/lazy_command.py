@@ -13,7 +13,7 @@ class LazyCommand(click.Command):
     Parameters
     ----------
     line : str
-        What the command does, for the list of commands.
+        Purpose of the command, for the list of commands.
     module : str
         Module with the command, which has the name ``command``.
     """

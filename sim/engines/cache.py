@@ -25,7 +25,7 @@ __all__ = [
 
 
 def _unsafe(folder: Path) -> str | None:
-    """Why no model may be loaded from a folder, or ``None``."""
+    """Reason not to load a model from a folder. ``None`` if a model may be loaded."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.stat()
@@ -60,7 +60,10 @@ def private_folder() -> Path:
 
 
 def _unwritable(folder: Path) -> str | None:
-    """Why no file can be made in a folder, or ``None``; it is tried, as permission bits do not bind root."""
+    """Reason why no file can be made in a folder, or ``None``.
+
+    A file is made as a trial, because permission bits do not bind root.
+    """
     try:
         os.rmdir(tempfile.mkdtemp(prefix=".blysk-", dir=folder))
     except OSError as error:

@@ -102,10 +102,10 @@ class _Block:
             answer.add(register, text, field)
 
     def order(self, buffered: set[str]) -> None:
-        """Order the statements so that those that read a register come before the one that writes it.
+        """Order the statements. All statements that read a register come before the statement that writes it.
 
-        Where that is impossible, as they depend on each other in a cycle, the statement goes first for which
-        the fewest registers must be copied; these are added to ``buffered``.
+        This is impossible if statements depend on each other in a cycle. Then the statement goes first for
+        which the fewest registers must be copied. These registers are added to ``buffered``.
         """
         readers = defaultdict(set)
         for k, item in enumerate(self.items):

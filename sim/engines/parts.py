@@ -25,7 +25,7 @@ _READ = re.compile(rf"({NAME})(?:{_SLICE})?(?!\w)")
 
 
 class _Part(NamedTuple):
-    """Bits ``low`` to ``high`` of a word equal those of ``source`` from bit ``start`` on."""
+    """Bits ``low`` to ``high`` of a word equal the bits of ``source`` from bit ``start`` on."""
 
     low: int
     high: int
@@ -66,7 +66,7 @@ class _Reader:
         stop = part.start + high - low
         if (part.start, stop) == (0, self.width(part.source) - 1):
             return part.source
-        # Where the word stood whole, a slice of its source needs `val()` to be a value.
+        # `val()` makes the slice a value. It is needed where the whole word stood before.
         return f"{part.source}.slice<{stop},{part.start}>()" + (".val()" if last is None else "")
 
     def statements(self, line: str) -> Iterator[str]:
@@ -99,7 +99,7 @@ class _Reader:
         yield f"\t{name}{place} = {value};"
 
     def _sources(self, source: str, start: int, low: int, high: int) -> Iterator[_Part]:
-        """Parts of a word whose bits ``low`` to ``high`` are set to those of ``source`` from ``start`` on."""
+        """Parts of a word, whose bits ``low`` to ``high`` become the bits of ``source`` from ``start`` on."""
         known = self.parts.get(source, ())
         stop = start + high - low
         inside = [part for part in known if part.high >= start and part.low <= stop]

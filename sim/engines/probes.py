@@ -162,7 +162,7 @@ def _registers(fragment: Fragment | None) -> dict[str, Signal]:
 
 
 def _assignments(statements) -> Iterator[tuple[Iterable[Signal], Iterable[Signal]]]:
-    """Signals written and signals read by each assignment, under conditions, too; these are not looked at."""
+    """Signals written and signals read by each assignment, also under conditions. Conditions are ignored."""
     for statement in statements:
         if hasattr(statement, "cases"):
             for _, inner, *_ in statement.cases:

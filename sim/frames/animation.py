@@ -278,7 +278,7 @@ def render_frames(executor: FrameExecutor, cameras: Sequence[Camera]) -> Iterato
             if not pending:
                 return
             done, _ = wait(pending, return_when=FIRST_COMPLETED)
-            # What is finished comes before what failed beside it.
+            # Finished frames come before a frame that failed at the same time.
             for future in sorted(done, key=lambda future: future.exception() is not None):
                 yield pending.pop(future), future.result()
                 del future

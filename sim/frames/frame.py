@@ -118,7 +118,7 @@ class FrameSimulator:
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
         run, beats = self._run(spans, constants, expected.y)
-        # What "auto" stands for: its warning comes once.
+        # Later runs name the engine that "auto" chose, so the warning comes once.
         self.engine = run.engine
         if not np.array_equal(_colors(beats), expected.color):
             raise SimulationError("the pixels of the simulated pipeline differ from its bit-accurate model")
@@ -128,7 +128,7 @@ class FrameSimulator:
         self, spans: Spans, constants: Sequence[FrameConstants], y: np.ndarray, **options
     ) -> tuple[Run, np.ndarray]:
         """A simulation, and its pixels in the order of the spans; ``y`` are the pixels' scanlines."""
-        # How many wide beats come depends on how many pixels leave on a cycle.
+        # The number of wide beats depends on the number of pixels that leave on each cycle.
         ends = {"count": len(y)} if self._pipes == 1 else {"count": None, "idle_timeout": _IDLE}
         run = simulate(
             self._unit,

@@ -99,9 +99,9 @@ def specialise(
     scenes : Scene or sequence of Scene
         One scene, or several that differ in the camera only.
     full : ShadingPipeline, optional
-        Method and model, with as many lights and materials as the scene; by default those of `preset`.
+        Method and model, with as many lights and materials as the scene. By default `preset` gives them.
     exact : bool
-        Whether the pixels must be those of the full pipeline to the bit.
+        Whether the pixels must equal the pixels of the full pipeline to the bit.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def _without_dark_lights(
     constants = _constants(scenes[0], full.lights, full.mirror)
     bright = np.any([of.diffuse | of.specular for of in constants], axis=(0, 2))
     if full.interpolator.lights_cut and bright.any():
-        # Spans are cut by those of every light that is on, whether it shows or not.
+        # Every light that is on cuts spans, whether it lights a pixel or not.
         bright[: len(scenes[0].lights)] |= [light.is_on for light in scenes[0].lights]
     if bright.all() or (exact and full.interpolator.lights_share_words and bright.any()):
         return scenes, []
@@ -234,7 +234,7 @@ def _with_fixed_values(
 
 
 def _with_fewer_bits(full: ShadingPipeline, scene: Scene, longest: int) -> list[Reduction]:
-    """Reductions: coordinates with the bits of the picture's size, lengths with those of the longest span."""
+    """Reductions: fewer bits of coordinates by the picture's size, fewer bits of lengths by the spans."""
     found = []
     for name, side, what in (("x_bits", scene.width, "columns"), ("y_bits", scene.height, "rows")):
         bits = max(int(side - 1).bit_length(), 1)

@@ -102,7 +102,7 @@ def _short(unit, rng, count):
 def _misfits(unit, rng, count):
     """Frames with beats in which a bit of any byte is inverted."""
     case = _frames(unit, rng, count)
-    # Not of the last ones, so that every run ends with a beat.
+    # The last beat of a run is not changed, so that every run ends with a beat.
     data = case.beats["data"]
     chosen = rng.random(len(data)) < 0.3
     chosen[[-1, min(PAUSED, len(data)) - 1]] = False

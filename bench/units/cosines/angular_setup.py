@@ -59,7 +59,7 @@ def _measure(rng, count, unit):
         )
     phases = (pixel / (length - 1) - 0.5) * np.stack([angle, early, late])
     exact, early, late = x * np.cos(phases) + y * np.sin(phases)
-    # At the bound of two segments rounding decides, and the one that the unit took counts.
+    # At the border of two segments rounding chooses the segment. The formula takes the unit's segment.
     formula = np.where(np.abs(found - early) < np.abs(found - late), early, late)
     return Sample(found, exact, formula, degrees_between(left, right)[:, 0])
 
@@ -82,7 +82,7 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Equal, nearly equal, orthogonal and nearly opposite normals; vectors that are N_l; ends of words."""
+    """Equal, nearly equal, orthogonal, nearly opposite normals; H or L equal to N_l; extreme codes."""
     angles = [np.zeros(20), 10.0 ** rng.uniform(-5, 1, count), rng.uniform(0, 180, count), np.full(20, 90)]
     angles = np.concatenate([*angles, 180 - 10.0 ** rng.uniform(-5, 1, count // 5), np.full(20, 180)])
     left, right = (quantise(v) for v in pairs_at(rng, len(angles), rng.permutation(angles)))
@@ -151,7 +151,7 @@ RECORD = Record(
         "an axis is less than 2, and CORDIC makes the distance less than 4": (
             "cordic_x[27-29] cordic_x_*[28-29]"
         ),
-        "the distance and its parts are less than 4, those shifted by 16 than 2^-14, and none is negative": (
+        "the distance and its parts are 0 to 4, and parts shifted by 16 are less than 2^-14": (
             "gain_1_sum*[32-33] gain_16_sum[16-33] cos_beta_rounded[27-29]"
         ),
         "the shifted words end in zeros": "gain_1_sum[0]",

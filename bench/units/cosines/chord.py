@@ -38,7 +38,7 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Components that differ by 1 or by a step less or more, the largest differences, ends of words."""
+    """Components that differ by 1 or by a step less or more, the largest differences, extreme codes."""
     ends = word_ends(rng, count, 6)
     border = [[ONE, 0, 0, ONE - d, 0, 0] for d in (2**17 - 1, 2**17, 2**17 + 1)]
     border.append([COMPONENT.min_code] * 3 + [COMPONENT.max_code] * 3)
@@ -67,7 +67,7 @@ RECORD = Record(
         "multiplier_?_product": (
             "Squares end in 00 or 01, so the last bits of three never carry past the second bit; ten are cut."
         ),
-        "u_aligned": "Bits above the format of u: where one is set, u saturates whatever the others are.",
+        "u_aligned": "If a bit above the format of u is set, u saturates whatever the other bits are.",
         "u": "The value of the saturation is the inverted sign, and a sum of squares is not negative.",
     },
     still={

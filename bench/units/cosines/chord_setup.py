@@ -166,12 +166,12 @@ def _lengths(unit, rng, count):
 
 
 def _spans(unit, rng, count):
-    """Curves of every size; lengths spread by their logarithm. Every eighth span has any codes."""
+    """Curves of every size, lengths with a uniform logarithm. Every eighth span has random codes."""
     return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
 
 
 def _corners(unit, rng, count):
-    """P and G in range, about the ends of their words and beyond. Equal values and ends of words."""
+    """P and G in range, near their extreme codes and beyond. Equal values and extreme codes."""
     values = []
     for format in FORMATS.values():
         start = rng.uniform(format.min_code * 0.9, format.max_code * 0.9, (count, unit.lights))

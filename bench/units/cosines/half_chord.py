@@ -96,7 +96,7 @@ RECORD = Record(
     },
     axis="angle, degrees",
     waivers={
-        "operands": "While the output is stalled, the operands are those of an earlier beat, already read.",
+        "operands": "While the output is stalled, the operands are from an earlier beat that has been read.",
         "multiplier_0_?_0": "The operands that share the multiplier are not negative.",
     },
     still={

@@ -19,7 +19,7 @@ FUNCTIONS = ("diffuse", "highlight")
 def _measure(rng, count, unit, shortcut=False):
     length = log_lengths(rng, max(count // 450, 8), 2)
     psi = np.radians(rng.permutation(spread_angles(rng, len(length), 90.0)))
-    psi[2:4] = np.pi / 2  # The longest spans are the widest, too.
+    psi[2:4] = np.pi / 2  # The longest spans are also the widest.
     step = psi / (length - 1)
     phase = rng.uniform(-np.pi, np.pi, len(length))
     amplitude = rng.uniform(0, 1 - 2.0**-16, len(length))
@@ -80,7 +80,7 @@ def _spans(unit, rng, count):
 
 
 def _words(unit, rng, count):
-    """Cosines of lengths 0 to 39, every third span of arbitrary codes, every fifteenth of ends of words."""
+    """Cosines of lengths 0 to 39. Every third span has random codes, every 15th has extreme codes."""
     beats = spans_of(unit, rng, rng.integers(0, 40, count // 20)).beats
     any_size = np.arange(0, len(beats["length"]), 3)
     p = unit.model
@@ -161,7 +161,7 @@ RECORD = Record(
     axis="pixel of the span",
     logarithmic=True,
     waivers={
-        "result": "A state is not less than -2: beside the sign one of the other two leading bits is set.",
+        "result": "A state is not less than -2. So if the sign is set, one of the next two bits is set.",
         "*_coarse": "While the output is stalled, the register holds a word that has been read, or 0.",
         "*_product": "While the output is stalled, the register holds a word that has been read, or 0.",
     },

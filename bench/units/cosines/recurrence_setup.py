@@ -71,14 +71,14 @@ def _vectors(unit, rng):
 
 
 def _spans(unit, rng, count):
-    """Normals at any distance; lengths spread by their logarithm. Every sixteenth pair has any codes."""
+    """Normals at any distance, lengths with a uniform logarithm. Every 16th pair has random codes."""
     left, right = any_pairs(rng, count)
     beats = {"normal_left": left, "normal_right": right, "length": any_lengths(rng, count)}
     return Case(beats, light_constants(unit, *_vectors(unit, rng)))
 
 
 def _corners(unit, rng, count):
-    """Angles about 90 degrees, ends of words, N at the peak of a highlight, equal normals at the peak."""
+    """Angles about 90 degrees, extreme codes, N at the peak of a highlight, equal normals at the peak."""
     beats = setup_spans(rng, count, 90, 90.1)
     direction, halfway = _vectors(unit, rng)
     beats["normal_left"][:50] = beats["normal_right"][:10] = halfway[0]
@@ -115,8 +115,8 @@ RECORD = Record(
         "last bits": Stimulus(_last_bits, 3000, stalled=False, repeats=2),
     },
     waivers={
-        "*_first": "The bit is below those of a cosine, where the word has zeros; or has been read before.",
-        "*_x_0": "The controlling bit is below those of a cosine, where x has zeros.",
+        "*_first": "The bit is below the bits of a cosine, where the word has zeros; or it has been read.",
+        "*_x_0": "The controlling bit is below the bits of a cosine, where x has zeros.",
         "reciprocal_square": "While the output is stalled, the register holds a word that has been read.",
         "span_aligned": "Three squares, each up to 2^34, by 4 at most, are less than 2^38: the bit is 0.",
         "span_square_total": "While the output is stalled, the register holds a word that has been read.",

@@ -40,7 +40,7 @@ def _far(unit, rng, count):
 
 RECORD = Record(
     name="attribute_serialiser",
-    title="A triangle's attributes one by one, and a bound on its normals' length",
+    title="A triangle's attributes one after the other, and a bound on its normals' length",
     source="docs/theory/geometry.md#normals",
     variants={
         "": Variant(AttributeSerialiserUnit, note="exact"),

@@ -135,7 +135,7 @@ RECORD = Record(
         "edges": Stimulus(_edges, 2000),
     },
     axis="",
-    waivers={"place": "Words are swept in another order, every one in its turn."},
+    waivers={"place": "Words are swept in another order, and each word has its turn."},
     still={
         "what a reset finds is swept": "fresh[0] used[0]",
         "only after a reset all words are swept, and 5 of 30 else": "left[3-4]",

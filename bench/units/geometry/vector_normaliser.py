@@ -49,7 +49,7 @@ def _corners(unit, rng, count):
 
 
 def deciding_vectors(rng: np.random.Generator, draws: int) -> np.ndarray:
-    """Random vectors of length 1 whose unit vector depends on a single bit, about one of 3,000.
+    """Random vectors of length 1 whose unit vector depends on a single bit. About 1 in 3,000 vectors does.
 
     A vector is chosen if a step of the squared length, up or down, changes the factor e. It is also chosen if
     a component of ``v + e v`` is a tie of the rounding, or differs from a tie in one bit.

@@ -103,7 +103,7 @@ def spans_about(rng, halfway, cosine, degrees, spread):
 
 
 def _codes(unit, vectors):
-    """Codes of vectors in the unit's format; those of `quantise` where that is ``SQ(1, 17)``."""
+    """Codes of vectors in the unit's format. For ``SQ(1, 17)`` they equal the codes of `quantise`."""
     return np.floor(vectors * unit.model.component_format.max_code + 0.5).astype(np.int64)
 
 
@@ -120,7 +120,7 @@ def _near(unit, rng, count, exponent, spread, degrees):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Spans of every angle to 90 degrees with a largest N·H about the threshold, and ends of the words."""
+    """Spans of every angle to 90 degrees with a largest N·H about the threshold, and extreme codes."""
     degrees = rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 75, 90], count)
     case = _near(unit, rng, count, exponent, 1e-3, degrees)
     format = unit.model.component_format

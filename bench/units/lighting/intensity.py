@@ -79,9 +79,9 @@ def _halves(unit, rng, count):
     colors = np.repeat([[[8191]], [[6003]]], 3, axis=-1)
     ambient = np.array([3, 100, 40]) * 64 + 5
     wanted = (1 << 22) - np.arange(2)[:, np.newaxis]
-    # For about one in 64 specular terms there is a diffuse term with the wanted sum.
+    # About 1 in 64 specular terms has a diffuse term with which the sum is as wanted.
     specular = rng.integers(0, _TERM.max_code, (2, 40 * count), endpoint=True)
-    # An odd colour's term gives all bits that are wanted below those of the ambient light.
+    # The term of an odd colour can give any bits below the bits of the ambient light.
     diffuse = (wanted - 6003 * specular) * pow(8191, -1, 1 << 17) % (1 << 17)
     chosen = ((5 << 17) + 8191 * diffuse + 6003 * specular) % (1 << 23) == wanted
     terms = np.stack([diffuse[chosen], specular[chosen]])[:, :, np.newaxis]

@@ -154,7 +154,7 @@ RECORD = Record(
         "product": "The slope, n of 10 bits normalised to 17, ends in seven zeros, and so does its product.",
         "argument": "It is for the saturation at 2, which is dark at every exponent.",
         "stages": (
-            "The table is read while the output is stalled, too, and gives the same: the exponent stays."
+            "The table is also read while the output is stalled. As the exponent stays, the word stays."
         ),
         "shifted": (
             "It is for the saturation at 2, over the boundary of every exponent, so that its product is "

@@ -19,7 +19,7 @@ from blysk.hdl.lighting.lobe import LobeUnit
 __all__ = ["RECORD"]
 
 _USUAL = {"exponent": 60, "roughness": 0.4, None: None}
-"""Parameter of a run that needs only one."""
+"""Parameter of a run that needs only one parameter."""
 
 _TENT = TabulatedModel.of_points("tent", [0, 0.3, 0.9, 1], [0.2, 1, 0.1, 0.6])
 _STEP = TabulatedModel("step", function=lambda cosine: (cosine > 0.7).astype(float))
@@ -78,7 +78,7 @@ def _places(model, rng, count):
 
 
 def _case(unit, rng, count, tables):
-    """Beats, a tenth of them dark, for written tables and one of the banks."""
+    """Beats for written tables and one bank. A tenth of the beats is dark."""
     codes = _operands(unit.model, rng, count)
     beats = {"operand": codes, "dark": (rng.random(len(codes)) < 0.1).astype(np.uint8)}
     write = None
@@ -118,10 +118,10 @@ def _tables(unit, rng, count):
         return case
     lost = rng.integers(0, 1 << Lobe.VALUE_FORMAT.width, 700)
     parts = (
-        # A table is replaced by one that is written later.
+        # A table that is written later replaces a table.
         tables[0].writes(),
         case.write,
-        # Values past the end of a table are lost, however many; those of a bank that does not exist, too.
+        # The unit drops all values past the end of a table, and all values for a bank that does not exist.
         {"value": np.r_[lost, p.banks, lost], "begins": np.arange(1401) == 700},
         # Two values make a word, one none.
         {"value": np.r_[0, lost[:1], 0, lost[1:2]], "begins": [1, 0, 1, 0]},

@@ -29,7 +29,7 @@ def _ties(unit, rng, count):
     case = highlights(unit, rng, count, int(rng.integers(1, 1001)))
     operand = Fixed(p.operand_format, case.beats["operand"])
     codes = p.complement(operand, case.beats["dark"], case.constants["exponent"]).codes
-    # Not those in the middle of a highlight, or out of it.
+    # Codes in the middle of a highlight and outside of a highlight are left out.
     kept = ((codes + 4) % (1 << 17) < 8) & (codes > 8) & (codes < p.COMPLEMENT_FORMAT.max_code - 8)
     return replace(case, beats={name: beats[kept] for name, beats in case.beats.items()})
 

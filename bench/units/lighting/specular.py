@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 EXPONENT = 60
-"""Exponent of a run that needs only one."""
+"""Exponent of a run that needs only one exponent."""
 
 HIGHLIGHTS = "n 1 to 1000, N.H 0 to 1"
 

@@ -20,7 +20,7 @@ from blysk.hdl.lighting.value_gate import ValueGateUnit
 __all__ = ["RECORD", "parabolas_near"]
 
 EXPONENT = 60
-"""Exponent of a run that needs only one."""
+"""Exponent of a run that needs only one exponent."""
 
 THRESHOLD = "2 lights, threshold"
 """Variant that takes a threshold in place of the exponent."""
@@ -176,7 +176,7 @@ RECORD = Record(
     logarithmic=True,
     waivers={
         "threshold": "Inverted by its first bit, which no exponent sets: its threshold would be 4 or more.",
-        "least_0": "The bulge has another sign for one of its values, a power of two.",
+        "least_0": "The bulge has another sign for a single value, a power of two.",
     },
     still={
         "the exponent stays for a run, so that what follows from it does not fall": (

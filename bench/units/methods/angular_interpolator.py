@@ -33,7 +33,7 @@ def _longest_words(unit, rng, count):
 
     vector = rounded(np.sqrt(1 / 3))[0]
     about = normalise(vector)
-    # Steps by one in each component: at most one end is the code of a unit vector, but for its last bits.
+    # Each component changes by one step. At most one end is a unit vector up to its last bits.
     step = np.floor(normalise(vector + rng.integers(-100, 101, (200_000, 3))) * ONE).astype(int)
     excess = np.linalg.norm(step, axis=-1) - ONE
     step = step[np.argsort(np.abs(excess + np.sqrt(3) / 2))[:40]]
@@ -75,7 +75,7 @@ RECORD = Record(
     stimuli=STIMULI
     | {"pole": Stimulus(_pole, 200), "longest words": Stimulus(_longest_words, 400, stalled=False)},
     waivers={
-        "cordic_*": "The controlling bit, of 1 and more, is 0: the axes are at most 0.71 and the root of 2.",
+        "cordic_*": "The controlling bit of 1 and more is 0: the axes are at most 0.71 and the root of 2.",
         "minor_operand": "While the output is stalled, the register holds a word that has been read.",
     },
     still={

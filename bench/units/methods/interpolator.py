@@ -179,14 +179,16 @@ def _spans(unit, rng, count):
 
 
 def _angles(unit, rng, count):
-    """Short spans: equal normals, every angle up to the largest and over it, ends of the words."""
+    """Short spans with equal normals, with angles up to the largest and over it, and with extreme codes."""
     largest = min(unit.model.MAX_ANGLE, 179)
     spans = setup_spans(rng, count, largest, largest)
     return case_of(unit, rng, spans["normal_left"], spans["normal_right"], rng.integers(1, 8, count))
 
 
 def long_lengths(rng: np.random.Generator, pixels: int) -> np.ndarray:
-    """Lengths of spans of about ``pixels`` pixels in all. Each of 3000 to 4095 is before a shorter one."""
+    """Lengths of spans of about ``pixels`` pixels in all. Spans of 3000 to 4095 pixels are followed
+    by shorter spans.
+    """
     length = rng.integers(3000, 4096, (pixels // 3800, 2))
     length[:, 1] = np.floor(2000 ** rng.random(len(length)))
     length[:2, 0] = 4095

@@ -25,7 +25,7 @@ def _expect(unit, case):
 
 
 def _normals(unit, rng, count):
-    """Unit normals, some equal or opposite to a light's vectors, ends of words, H = L, no H, an axis."""
+    """Unit normals, some equal or opposite to a light's vectors; extreme codes; H = L; no H; an axis."""
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[0] = direction[0]
     halfway[1:2] = 0
@@ -39,7 +39,7 @@ def _normals(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Vectors and normals of ends of words, so that every difference and product is largest."""
+    """Vectors and normals of extreme codes, so that every difference and product is largest."""
     vectors = (word_ends(rng, unit.lights, 3) for _ in range(2))
     return Case(word_ends(rng, count, 3), light_constants(unit, *vectors))
 

@@ -35,7 +35,7 @@ from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUni
 __all__ = ["RECORD", "gated", "mixed_lengths"]
 
 EXPONENT = 60
-"""Exponent of a run that needs only one."""
+"""Exponent of a run that needs only one exponent."""
 
 _STILL = {
     "twice a number is even": "{diffuse,highlight}_0_second_difference[0]",

@@ -41,7 +41,7 @@ def _case(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Coefficients of any size, with lengths by their logarithm."""
+    """Coefficients of any size, and lengths with a uniform logarithm."""
     length = any_lengths(rng, count) % (1 << unit.length_bits)
     return _case(unit, rng, np.maximum(length, 1))
 

@@ -34,7 +34,7 @@ def _words(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Every combination of ends of words in a and in the first component of b. The rest of b is as in a."""
+    """Every combination of extreme codes in a and in the first component of b. The rest of b is as in a."""
     ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
     a0, a1, a2, b0 = (grid.ravel() for grid in np.meshgrid(ends, ends, ends, ends))
     return Case({"a": np.stack([a0, a1, a2], axis=1), "b": np.stack([b0, a1, a2], axis=1)})

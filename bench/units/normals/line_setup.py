@@ -46,7 +46,7 @@ def _lengths(unit, rng, count):
 
 
 def _lines(unit, rng, count):
-    """Lines of `any_lines`. Numbers of pixels are spread by their logarithm."""
+    """Lines of `any_lines`. Numbers of pixels have a uniform logarithm."""
     left, right = any_lines(rng, count)
     return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
 

@@ -368,7 +368,7 @@ def test_words_and_writes():
     [
         (
             {"reflection": PHONG},
-            r"^a table holds a lobe of N·H, and phong is one of R·V; take phong_coplanar$",
+            r"^a table holds a lobe of N·H, but phong has R·V; take phong_coplanar$",
         ),
         ({"operand": "angle"}, r"^operand must be 'cosine' or 'one_minus_cosine', not 'angle'$"),
         ({"octaves": 0}, r"^octaves must be 1 to 21 with 16 steps and 25 fraction bits, not 0$"),

@@ -108,7 +108,7 @@ def test_every_shading_of_point_lights(shading):
 def test_local_refusals():
     scene = SCENES["orthographic"]
     with pytest.raises(
-        ValueError, match=r"^a near viewer needs a perspective camera; an orthographic one is "
+        ValueError, match=r"^a near viewer needs a perspective camera, not an orthographic camera$"
     ):
         replace(scene, viewer="near")
     with pytest.raises(ValueError, match=r"^viewer must be one of distant, near, not 'far'$"):

@@ -228,7 +228,9 @@ def changed(monkeypatch, field):
 
 def test_simulation_that_is_not_the_model(monkeypatch):
     changed(monkeypatch, "g")
-    with pytest.raises(SimulationError, match="pixels of the simulated pipeline differ from its bit-accurate model"):
+    with pytest.raises(
+        SimulationError, match="pixels of the simulated pipeline differ from its bit-accurate model"
+    ):
         FrameSimulator(preset(), "pysim")
 
 
