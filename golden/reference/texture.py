@@ -17,14 +17,14 @@ LARGEST_TEXTURE = 1024
 """Largest width and height of a texture, in texels."""
 
 
-def wrapped(index: np.ndarray, size: int, wrap: str) -> np.ndarray:
+def wrapped(index: np.ndarray, size: int | np.ndarray, wrap: str) -> np.ndarray:
     """Index of a texel inside the image, for an index outside it.
 
     Parameters
     ----------
     index : int64 array
         Column or row.
-    size : int
+    size : int or int64 array
         Columns or rows of the image.
     wrap : str
         One of `WRAPS`.

@@ -1,0 +1,1 @@
+"""Bit-accurate models of the units that give each pixel its albedo."""

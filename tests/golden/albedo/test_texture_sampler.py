@@ -1,0 +1,103 @@
+"""Texture sampler: address, memory and filter together, against the exact rule in float64."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_filter import TextureFilter
+from blysk.golden.albedo.texture_sampler import TextureSampler
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.reference.texture import WRAPS, Texture
+
+SAMPLER = TextureSampler(TexelMemory(2048))
+SIZES = ((1, 1), (1, 2), (2, 1), (2, 2), (1, 16), (32, 1), (2, 8), (64, 4), (64, 64))
+WHITE = Texture(np.ones((1, 1, 3)))
+
+
+def image(rng, kind, width, height):
+    """Texels: any, a checker of full contrast, or dark ones."""
+    if kind == "checker":
+        return np.repeat((np.indices((height, width)).sum(axis=0) % 2.0)[:, :, np.newaxis], 3, axis=2)
+    return rng.random((height, width, 3)) * (1 if kind == "any" else 0.01)
+
+
+def places(rng, texture, count, share_bits=14):
+    """Levels, and coordinates in texels of them with ``share_bits`` fraction bits, over 6 images each way.
+
+    Every fifth is at the centre or the border of a texel.
+    """
+    height, width, _ = texture.texels.shape
+    level = rng.integers(0, len(texture.levels), count)
+    size = np.maximum(np.array([width, height]) >> level[:, np.newaxis], 1)
+    codes = rng.integers(-3 * size << share_bits, 3 * size << share_bits)
+    codes[::5] &= -1 << (share_bits - 1)
+    return level, codes, size
+
+
+def sampled(sampler, texture, codes, level):
+    """Colours of a texture that is in the memory behind another."""
+    loaded = sampler.memory.load([WHITE, texture])
+    coordinates = Fixed(sampler.address.coordinate_format, codes)
+    return sampler.sample(loaded, loaded.descriptors[1], coordinates, level)
+
+
+@pytest.mark.parametrize("filter", ["bilinear", "nearest"])
+@pytest.mark.parametrize("kind", ["any", "checker", "dark"])
+def test_error_against_the_exact_rule(kind, filter):
+    """All sizes, wraps and levels: the arithmetic and the rounding of texels, and nothing else."""
+    rng = np.random.default_rng(17)
+    quantised = 2.0**-12 if kind == "any" else 2.0**-15
+    for size, *wrap in product(SIZES, WRAPS, WRAPS):
+        texture = Texture(image(rng, kind, *size), tuple(wrap), filter)
+        level, codes, sides = places(rng, texture, 150)
+        found = sampled(SAMPLER, texture, codes, level).values
+        off = np.abs(found - texture.sample(codes * 2.0**-14 / sides, level)).max()
+        assert off <= TextureFilter.ERROR + quantised, (size, wrap)
+
+
+@pytest.mark.parametrize("share_bits", [8, 14])
+def test_error_of_rounded_coordinates_in_proportion_to_contrast(share_bits):
+    rng = np.random.default_rng(18)
+    sampler = TextureSampler(SAMPLER.memory, share_bits)
+    steps = []
+    for contrast in (1, 0.1):
+        texels = 0.05 + contrast * 0.95 * image(rng, "checker", 16, 16)
+        texture = Texture(texels, mipmapped=False)
+        place = rng.uniform(-16, 32, (4000, 2))
+        level = np.zeros(len(place), dtype=np.int64)
+        codes = np.rint(place * 2**share_bits).astype(np.int64)
+        found = sampled(sampler, texture, codes, level).values
+        off = np.abs(found - texture.sample(place / 16, level)).max() - TextureFilter.ERROR - 2.0**-12
+        assert off <= 2 * 2.0 ** -(share_bits + 1) * contrast * 0.95
+        steps.append(off)
+    # With few bits the shares are most of the error.
+    assert share_bits > 8 or steps[0] > 2.0**-9
+
+
+def test_flat_images_are_exact():
+    """Every code, at any place: the same colour, which is the nearest to the texel; 1 is exactly 1."""
+    rng = np.random.default_rng(19)
+    code = np.arange(1 << TexelMemory.CHANNEL_BITS)
+    texels = np.broadcast_to(code[:, np.newaxis, np.newaxis], (len(code), 4, 3))
+    format = SAMPLER.address.weight_format
+    found = [
+        SAMPLER.filter.compute(texels, Fixed(format, rng.integers(0, (1 << 14) + 1, (len(code), 2)))).codes
+        for _ in range(4)
+    ]
+    assert (np.array(found) == found[0][:, :1]).all()
+    assert np.abs(found[0][:, 0] * 2.0**-16 - TexelMemory.linear(code)).max() <= 2.0**-17
+    assert found[0][-1, 0] == 1 << 16
+    assert found[0][0, 0] == 0
+
+
+def test_nearest_alone_is_the_same():
+    """A sampler of ``nearest`` alone, with weights of a bit, gives the same texels."""
+    rng = np.random.default_rng(20)
+    texture = Texture(image(rng, "any", 16, 8), ("mirror", "clamp"), "nearest")
+    level, codes, _ = places(rng, texture, 500)
+    alone = TextureSampler(SAMPLER.memory, bilinear=False)
+    assert alone.address.weight_format.width == 1
+    found = sampled(alone, texture, codes, level)
+    np.testing.assert_array_equal(found.codes, sampled(SAMPLER, texture, codes, level).codes)
