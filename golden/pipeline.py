@@ -17,11 +17,13 @@ from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe, LobeTable
+from blysk.golden.lighting.transfer import Transfer
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.number.fixed import Fixed, Format
 from blysk.golden.number.spans import LENGTH_BITS, pixels_of, runs_of
 from blysk.golden.reference.lighting import Material
+from blysk.golden.reference.transfer import TRANSFERS
 
 __all__ = ["Pixels", "ShadingPipeline", "Spans"]
 
@@ -55,6 +57,8 @@ class ShadingPipeline:
         Indices, in ascending order, of the lights that fade by their distance or as a spot. A factor
         multiplies the specular term of each. For methods that take values, with specular light. Other lights
         need no hardware for a factor.
+    transfer : str
+        Codes of the pixels: ``"linear"`` light, or encoded by the curve of ``"srgb"``, see `Transfer`.
     build : Build
         Build options.
 
@@ -68,7 +72,8 @@ class ShadingPipeline:
         - an exponent is fixed with a lobe;
         - a lobe takes 1 - N·H with other than 25 fraction bits;
         - the method has a scale, and there is no lobe;
-        - factors are not different lights in order, or lack specular light or a method that takes values.
+        - factors are not different lights in order, or lack specular light or a method that takes values;
+        - the transfer is unknown.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -83,6 +88,7 @@ class ShadingPipeline:
     y_bits: int = 12
     length_bits: int = 12
     factors: tuple[int, ...] = ()
+    transfer: str = "linear"
     build: Build = field(default_factory=Build)
 
     def __post_init__(self) -> None:
@@ -101,6 +107,8 @@ class ShadingPipeline:
         for name, least in (("x_bits", 1), ("y_bits", 1), ("length_bits", 2)):
             if not least <= getattr(self, name) <= LENGTH_BITS:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
+        if self.transfer not in TRANSFERS:
+            raise ValueError(f"transfer must be one of {', '.join(TRANSFERS)}, not {self.transfer!r}")
         object.__setattr__(self, "factors", tuple(self.factors))
         if self.factors:
             self._check_factors()
@@ -250,7 +258,7 @@ class ShadingPipeline:
         kept = np.flatnonzero(np.asarray(spans.length) > 0)
         length = np.asarray(spans.length, dtype=np.int64)[kept]
         span, step = pixels_of(length)
-        color = np.empty((len(span), 3), dtype=np.uint8)
+        color = np.empty((len(span), 3), dtype=np.int64)
         out_of_range = 0
         if self.lights:
             lit = self.lit_spans(spans, constants)[kept] if self.gate else None
@@ -272,7 +280,7 @@ class ShadingPipeline:
         return Pixels(
             x=(np.asarray(spans.x)[kept][span] + step) & ((1 << self.x_bits) - 1),
             y=np.asarray(spans.y)[kept][span],
-            color=color,
+            color=self._encoded(color),
             last=step == length[span] - 1,
             out_of_range_spans=out_of_range,
         )
@@ -311,7 +319,7 @@ class ShadingPipeline:
         constants: FrameConstants,
         factor: Fixed | None = None,
     ) -> np.ndarray:
-        """Colours of pixels of one material, shape (pixels, 3), from operands of shape (pixels, lights)."""
+        """Codes of `intensity` for pixels of one material, from operands of shape (pixels, lights)."""
         diffuse_unit = Diffuse(cosine.format)
         dark = dark | diffuse_unit.dark(cosine)
         diffuse = diffuse_unit.compute(cosine)
@@ -326,16 +334,27 @@ class ShadingPipeline:
         return self.intensity.compute(*self._colors(constants), diffuse, specular)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:
-        """Colours of pixels by their materials, without any light."""
+        """Codes of `intensity` for pixels by their materials, without any light."""
         nothing = Fixed(Intensity.TERM_FORMAT, np.zeros((1, 0), dtype=np.int64))
         each = [self.intensity.compute(*self._colors(of), nothing, nothing) for of in constants]
         color: np.ndarray = np.concatenate(each)[material]
         return color
 
+    def _encoded(self, color: np.ndarray) -> np.ndarray:
+        """Codes of pixels from the codes of `intensity`."""
+        if self.transfer == "linear":
+            return color.astype(np.uint8)
+        return Transfer().compute(Fixed(Transfer.OPERAND_FORMAT, color))
+
     @property
     def intensity(self) -> Intensity:
         """Bit-accurate model of the intensity unit."""
-        return Intensity(self.lights, has_specular=self.specular is not None, channels=1 if self.grey else 3)
+        return Intensity(
+            self.lights,
+            has_specular=self.specular is not None,
+            channels=1 if self.grey else 3,
+            fraction_bits=0 if self.transfer == "linear" else Transfer.OPERAND_FORMAT.fraction_bits,
+        )
 
     @staticmethod
     def _colors(constants: FrameConstants) -> tuple[Fixed, Fixed, Fixed]:

@@ -9,7 +9,6 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.frame_constants import LOBE_ADDRESS
 from blysk.golden.lighting.diffuse import Diffuse
-from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.shapes import normal_shape
@@ -20,6 +19,7 @@ from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 from blysk.hdl.lighting.light import LightUnit, kind_of
+from blysk.hdl.lighting.transfer import TransferUnit
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 
@@ -78,9 +78,9 @@ class ShadingPipelineUnit(wiring.Component):
     """Shading pipeline of a design: any method, any reflection model, any number of lights.
 
     An interpolator takes spans to the operands of their pixels. A light unit for each light takes operands to
-    terms, and the intensity unit takes terms to colours. The setup of the next spans overlaps the pixels of
-    this span. A FIFO carries the coordinates of the spans past both. `ShadingPipeline` is the bit-accurate
-    model.
+    terms, and the intensity unit takes terms to colours. For the transfer ``"srgb"`` a transfer unit encodes
+    them. The setup of the next spans overlaps the pixels of this span. A FIFO carries the coordinates of the
+    spans past all of these. `ShadingPipeline` is the bit-accurate model.
 
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
     each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles, and in the
@@ -162,7 +162,12 @@ class ShadingPipelineUnit(wiring.Component):
         )
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
         self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
-        self._tables = None
+        self._tables, self._transfer = None, None
+        if p.transfer != "linear":
+            # Without lights colours are constant, and are encoded all the time.
+            channels = p.intensity.channels
+            interval = channels if p.build.compact and p.lights else 1
+            self._transfer = TransferUnit(channels=channels, initiation_interval=interval)
         self.direction = Signal(normal_shape(), name="first_direction")
         self.setup_interval = self._shortest_interval = self.cycles_per_pixel = 1
         self.latency = LATE_FIFO_LATENCY + self._assembler.coordinates_latency
@@ -197,8 +202,8 @@ class ShadingPipelineUnit(wiring.Component):
         self._lights = self._light_units()
         self._intensity = (CompactIntensityUnit if compact else IntensityUnit)(p.intensity)
         slowest = max(self._lights, key=lambda light: light.latency)
-        chain = (self._interpolator, slowest, self._intensity, self._assembler)
-        self.latency = sum(unit.latency for unit in chain)
+        chain = (self._interpolator, slowest, self._intensity, self._transfer, self._assembler)
+        self.latency = sum(unit.latency for unit in chain if unit is not None)
         if p.gate:
             self._gate = method.gate_beside(p, self.setup_interval)
         if self._gate is not None:
@@ -272,15 +277,33 @@ class ShadingPipelineUnit(wiring.Component):
                 m.d.comb += self.direction.eq(frame.constants.lights[0].direction)
             sinks += self._shade(m, frame)
         else:
-            ambient = frame.constants.ambient
+            colors = self._encode(m)
             for channel, name in enumerate("rgb"):
-                level = ambient[0 if p.grey else channel].round_half_up(0).saturate(Intensity.RESULT_FORMAT)
-                m.d.comb += assembler.colors.payload[name].eq(level.as_value())
+                light = frame.constants.ambient[0 if p.grey else channel]
+                level = light.round_half_up(p.intensity.fraction_bits).saturate(p.intensity.result_format)
+                m.d.comb += colors.payload[name].eq(level.as_value())
             m.d.comb += assembler.colors.valid.eq(1)
         connect(m, assembler.o, wiring.flipped(self.o))
         admit = self._admit(m, frame, sinks)
         self._count(m, admit)
         return m
+
+    def _encode(self, m: Module) -> stream.Interface:
+        """Colours on their way to the assembler, through the transfer unit if there is one."""
+        transfer, colors = self._transfer, self._assembler.colors
+        if transfer is None:
+            return colors
+        m.submodules.transfer = transfer
+        if self.model.lights:
+            connect(m, transfer.o, colors)
+        else:
+            # Constant colours never wait. They are encoded before the first span after a write reaches them.
+            m.d.comb += [
+                copy(colors.payload, transfer.o.payload),
+                transfer.i.valid.eq(1),
+                transfer.o.ready.eq(1),
+            ]
+        return transfer.i
 
     def _carry_coordinates(self, m: Module) -> tuple[Value, Value]:
         """FIFO of the coordinates of spans, from the input to the assembler; valid and ready of its input."""
@@ -422,7 +445,7 @@ class ShadingPipelineUnit(wiring.Component):
                 word = frame.constants[self._kind.constant]
                 m.d.comb += Value.cast(light.constants).eq(word)
         m.d.comb += copy(intensity.constants.ambient, frame.constants.ambient)
-        connect(m, intensity.o, self._assembler.colors)
+        connect(m, intensity.o, self._encode(m))
         return sinks
 
     def _connect_tables(self, m: Module) -> None:

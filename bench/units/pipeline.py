@@ -346,6 +346,8 @@ DESIGNS: dict[str, ShadingPipeline] = {
     "values, the second of 2 lights fades": preset("chord-local", "blinn", 2, factors=(1,)),
     "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
     "without lights": preset(model="cosquad", lights=0, materials=2),
+    "srgb": preset(transfer="srgb"),
+    "srgb, without lights": preset(lights=0, materials=2, transfer="srgb"),
 }
 """Further pipelines by name, with other numbers of lights and materials, styles, gates or formats."""
 
@@ -376,6 +378,9 @@ LONG_DESIGNS: dict[str, ShadingPipeline] = {
     "gate, compact, power": preset("quadratic-horner", "blinn_product", gate=True, style="compact"),
     "gate, exponent": replace(_FULL, build=Build(exponent=20)),
     "grey": preset("renormalise", None, grey=True),
+    "srgb, compact": preset(style="compact", transfer="srgb"),
+    "srgb, grey, compact": preset(style="compact", grey=True, transfer="srgb"),
+    "srgb, without lights, grey, compact": preset(lights=0, grey=True, style="compact", transfer="srgb"),
     "few bits": replace(_FULL, **_LESS),
 }
 """Further pipelines by name, for the long run."""
@@ -428,7 +433,7 @@ RECORD = Record(
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 3000, repeats=3),
-        "frames": Stimulus(_frames, 400, variants=_ALL),
+        "frames": Stimulus(_frames, 400, variants=(*_ALL, "srgb, without lights")),
         "setups": Stimulus(_every_setup, 60, stalled=False, variants=_ALL),
         "terminator": Stimulus(_terminator, variants=_BOTH),
         "roundings": Stimulus(_roundings, variants=_BOTH),

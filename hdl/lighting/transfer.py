@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from amaranth.hdl import Cat, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Signal, Value, unsigned
 from amaranth.lib.memory import Memory
 
 from blysk.golden.lighting.transfer import Transfer
@@ -18,10 +18,10 @@ __all__ = ["TransferUnit"]
 class TransferUnit(PipelinedUnit):
     """The sRGB codes of a pixel's channels. `Transfer` is the bit-accurate model.
 
-    With an initiation interval of 1 the latency is 5 cycles: operand, place, two for the word, sum. The table
-    has a read port for each channel. On an ECP5 three ports take two block RAMs of 1024 by 18 bits, and a
-    single port takes one. With an interval of 3 a single port serves the channels one after the other, and
-    the latency is 8 cycles. There is no multiplier.
+    With an initiation interval of 1 the latency is 4 cycles: address, two for the word, sum. The table has a
+    read port for each channel. On an ECP5 three ports take two block RAMs of 1024 by 18 bits, and a single
+    port takes one. With an interval of 3 a single port serves the channels one after the other, and the
+    latency is 8 cycles. There is no multiplier.
 
     Parameters
     ----------
@@ -52,18 +52,23 @@ class TransferUnit(PipelinedUnit):
             raise ValueError(f"channels must be 1 or 3, not {channels}")
         self.model = model or Transfer()
         self.channels = channels
-        self._graph = g = Dataflow(initiation_interval)
-        table = g.share("transfer", (unsigned(Transfer.OPERAND_FORMAT.width),), 4, self._look_up)
+        self._graph = g = Dataflow(initiation_interval, spaced=True)
+        # A shared table has the light as operand, so that there is one set of multiplexers before it.
+        shares, bits = initiation_interval > 1, Transfer.OPERAND_FORMAT.width
+        shape = unsigned(bits) if shares else unsigned(len(_placed(Const(0, bits))))
+        table = g.share("transfer", (shape,), 3 + shares, self._look_up)
         self._codes = []
         for name in "rgb"[:channels]:
             light = g.input(f"light_{name}", lambda operands, name=name: Value.cast(operands[name]), name)
-            code = g.use(table, name, (light,), lambda x: (x,), formula=f"sRGB of {name}")
+            given = (lambda x: (x,)) if shares else (lambda x: (_placed(x),))
+            code = g.use(table, name, (light,), given, formula=f"sRGB of {name}")
             self._codes.append(code)
         super().__init__(
             pixel_color_shape(Transfer.OPERAND_FORMAT.fraction_bits),
             pixel_color_shape(),
             latency=max(code.stage for code in self._codes),
             initiation_interval=initiation_interval,
+            spaced=True,
         )
 
     def datapath(self, m, operands):
@@ -79,18 +84,24 @@ class TransferUnit(PipelinedUnit):
             m.d.comb += result[name].eq(code)
         return result
 
-    def _look_up(self, register: Callable[[Any, str], Any], light: Value) -> Value:
-        """Code of a channel: the address of its part, the word, and the sum of word and place."""
-        parts, fraction_bits = Transfer.PART_BITS, Transfer.WORD_FORMAT.fraction_bits
-        # Seven minus the leading zeros: 0 where each input is a part of its own.
-        octave = ~leading_zeros(light[parts:])
-        shifts = [max(k - 1, 0) for k in range(len(light) - parts + 1)]
-        part = select([light[shift : shift + parts] for shift in shifts], octave)
-        # Bit k belongs to the place if the leading one stands more than `parts` bits above it.
-        place = Cat(light[k] & light[parts + 1 + k :].any() for k in range(fraction_bits))
+    def _look_up(self, register: Callable[[Any, str], Any], operand: Value) -> Value:
+        """Code of a channel: the word of the part, and the sum of the word and the place."""
+        placed = register(_placed(operand), "placed") if self.initiation_interval > 1 else operand
+        fraction_bits = Transfer.WORD_FORMAT.fraction_bits
         port = self._table.read_port()
-        self._module.d.comb += port.addr.eq(register(Cat(part, octave), "address"))
-        for stage in ("place", "place_read", "place_late"):
-            place = register(place, stage)
+        self._module.d.comb += port.addr.eq(placed[fraction_bits:])
+        place = register(register(placed[:fraction_bits], "place_read"), "place")
         total = register(port.data, "word") + place
         return register(total[fraction_bits : fraction_bits + Transfer.RESULT_FORMAT.width], "code")
+
+
+def _placed(light: Value) -> Value:
+    """Place in its part of a channel's light, and above it the address of the part."""
+    parts, fraction_bits = Transfer.PART_BITS, Transfer.WORD_FORMAT.fraction_bits
+    # Seven minus the leading zeros: 0 where each input is a part of its own.
+    octave = ~leading_zeros(light[parts:])
+    shifts = [max(k - 1, 0) for k in range(len(light) - parts + 1)]
+    part = select([light[shift : shift + parts] for shift in shifts], octave)
+    # Bit k belongs to the place if the leading one stands more than `parts` bits above it.
+    place = Cat(light[k] & light[parts + 1 + k :].any() for k in range(fraction_bits))
+    return Cat(place, part, octave)

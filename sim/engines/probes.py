@@ -256,7 +256,12 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
     ):
         age = light.latency + ages[own]
         yield number(name, title, "intensity", words[own], age, name, format=format)
-    age = light.latency + intensity.latency + _unit(fragment, "pixel_assembler").latency
+    ends = (
+        ("intensity", "pixel_assembler")
+        if design.transfer == "linear"
+        else ("intensity", "transfer", "pixel_assembler")
+    )
+    age = light.latency + sum(_unit(fragment, name).latency for name in ends)
     pixel = unit.o.payload
     for name, title in (("r", "red"), ("g", "green"), ("b", "blue")):
         value = pixel[name]

@@ -13,6 +13,7 @@ from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import halfway_vector
+from blysk.golden.reference.transfer import encode
 
 AMBIENT = 0.1
 UP = np.array([0.0, 0.0, 1.0])
@@ -112,6 +113,27 @@ def test_ambient_only():
         np.testing.assert_array_equal(shade(UP, tilted(20), 5, constants).color, expected)
 
 
+def test_encoded_pixels():
+    """Ambient light alone, with and without lights, and lit spans: each code by the curve in float64."""
+    for lights, ambient in ((0, 0.001), (1, 0.02), (0, 0.3), (1, 8.0)):
+        constants = constants_of([(UP, 0.0, 0.0)], ambient=ambient)
+        if not lights:
+            constants = FrameConstants(1, constants.ambient, *np.zeros((4, 0, 3), dtype=int))
+        vectors = quantise(np.array([UP])), quantise(tilted(20)[None])
+        spans = Spans(*(np.array([value]) for value in (7, 9, 5)), *vectors)
+        design = preset("quadratic", "cosquad", lights=lights, transfer="srgb")
+        expected = np.floor(255 * encode(Intensity.color(ambient) / 64 / 255) + 0.5)
+        np.testing.assert_array_equal(design.compute(spans, constants).color, expected)
+    lit = constants_of([(UP, 0.6, 0.2)])
+    spans = Spans(*(np.array([value]) for value in (0, 0, 400)), quantise(tilted(-80)[None]), vectors[1])
+    linear, encoded = (
+        preset("quadratic", "cosquad", transfer=of).compute(spans, lit).color for of in ("linear", "srgb")
+    )
+    low, high = (255 * encode((linear + half) / 255) for half in (-0.51, 0.51))
+    assert np.all((encoded >= low - 0.51) & (encoded <= high + 0.51))
+    assert len(np.unique(encoded)) > 80
+
+
 @pytest.mark.parametrize(("angle", "out_of_range"), [(0, 0), (1e-4, 0), (45, 0), (45.01, 1), (180, 1)])
 def test_spans_out_of_range_are_counted(angle, out_of_range):
     assert shade(UP, tilted(angle), 5, constants_of([(UP, 0.5, 0.5)])).out_of_range_spans == out_of_range
@@ -156,6 +178,7 @@ def test_bad_arguments_are_refused():
         ({"x_bits": 0}, "x_bits must be 1 to 12, not 0"),
         ({"y_bits": 13}, "y_bits must be 1 to 12, not 13"),
         ({"length_bits": 1}, "length_bits must be 2 to 12, not 1"),
+        ({"transfer": "gamma"}, "transfer must be one of srgb, linear, not 'gamma'"),
     ],
 )
 def test_parameters_that_no_pipeline_has(given, message):

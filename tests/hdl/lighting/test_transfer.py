@@ -16,7 +16,7 @@ def test_a_table_and_no_multiplier():
         assert cost.multiplier_count == 0
         assert cost.rom_bits == 1024 * 14
         times.append((unit.latency, unit.initiation_interval))
-    assert times == [(5, 1), (8, 3), (5, 1)]
+    assert times == [(4, 1), (8, 3), (4, 1)]
 
 
 def test_other_channels_are_refused():
