@@ -15,7 +15,15 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.stream import skid_buffer
 
-__all__ = ["CompactIntensityUnit", "IntensityUnit", "color_shape", "pixel_color_shape"]
+__all__ = [
+    "CompactIntensityUnit",
+    "IntensityUnit",
+    "color_shape",
+    "of_channel",
+    "one_at_most",
+    "pixel_color_shape",
+    "selected",
+]
 
 _COLOR, _TERM = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
 
@@ -38,13 +46,16 @@ def _kinds(model: Intensity) -> tuple[str, ...]:
 def _term_shape(model: Intensity) -> data.StructLayout:
     """Shape of an input beat."""
     terms = data.ArrayLayout(FixedShape(_TERM), model.lights)
-    return data.StructLayout(dict.fromkeys(_kinds(model), terms))
+    albedo = {"albedo": data.ArrayLayout(FixedShape(model.ALBEDO_FORMAT), 3)} if model.has_albedo else {}
+    return data.StructLayout(dict.fromkeys(_kinds(model), terms) | albedo)
 
 
 def _constants_shape(model: Intensity) -> data.StructLayout:
     """Shape of the colour operands."""
     colors = data.ArrayLayout(color_shape(), model.lights)
-    return data.StructLayout({"ambient": color_shape(), "diffuse": colors, "specular": colors})
+    members = {"ambient": color_shape(), "diffuse": colors, "specular": colors}
+    members |= {"emission": color_shape()} if model.has_albedo else {}
+    return data.StructLayout(members | ({"tinted": 1} if model.tints else {}))
 
 
 class IntensityUnit(PipelinedUnit):
@@ -91,45 +102,65 @@ class IntensityUnit(PipelinedUnit):
     def __init__(self, model: Intensity | None = None):
         self.model = p = model or Intensity()
         self.kinds = _kinds(p)
-        terms = len(self.kinds) * p.lights
         super().__init__(
             _term_shape(p),
             pixel_color_shape(p.fraction_bits),
-            latency=5 + terms.bit_length(),
+            latency=self._latency_to_sum(p) + 2,
             constants=_constants_shape(p),
         )
+
+    def _latency_to_sum(self, model: Intensity) -> int:
+        """Registers to the sum of a channel."""
+        terms = len(self.kinds) * model.lights
+        return 3 + terms.bit_length()
 
     def datapath(self, m, operands):
         """Terms, products, a binary tree of sums, rounding, saturation."""
         register = self.register
         result = Signal(self.o.payload.shape())
         channels = "rgb"[: self.model.channels]
-        operands = register(m, operands, "terms")
+        operands = self.staged(m, operands)
         for channel, name in enumerate(channels):
-            terms = []
-            for light in range(self.model.lights):
-                for kind in self.kinds:
-                    factor = register(m, operands[kind][light], f"factor_{kind}_{light}_{name}")
-                    color = register(m, self.constants[kind][light][channel], f"color_{kind}_{light}_{name}")
-                    terms.append(register(m, factor * color, f"{kind}_{light}_{name}"))
-            # A constant needs no registers that delay it to the other terms.
-            constant = self.constants.ambient[channel]
-            terms.append(constant)
-            level = 0
-            while len(terms) > 1:
-                pairs = [terms[k : k + 2] for k in range(0, len(terms), 2)]
-                terms = [
-                    constant
-                    if pair[0] is constant
-                    else register(m, reduce(add, pair), f"sum_{level}_{k}_{name}")
-                    for k, pair in enumerate(pairs)
-                ]
-                level += 1
-            rounded = register(m, terms[0].round_half_up(self.model.fraction_bits), f"rounded_{name}")
+            total = self.total(m, operands, channel, name)
+            rounded = register(m, total.round_half_up(self.model.fraction_bits), f"rounded_{name}")
             code = register(m, rounded.saturate(self.model.result_format), name).as_value()
             of_channel = name if len(channels) > 1 else "rgb"
             m.d.comb += [result[each].eq(code) for each in of_channel]
         return result
+
+    def staged(self, m, operands):
+        """Registers of an input beat."""
+        return self.register(m, operands, "terms")
+
+    def total(self, m, operands, channel: int, name: str) -> FixedValue:
+        """Sum of a channel, before it is rounded."""
+        products = self.products(m, operands, self.kinds, channel, name)
+        return self.sum_of(m, products, self.constants.ambient[channel], f"sum_{{}}_{{}}_{name}")
+
+    def products(self, m, terms, kinds: Sequence[str], channel: int, name: str) -> list[FixedValue]:
+        """Products of the terms of some kinds with their colours, two registers after the terms."""
+        register, found = self.register, []
+        for light in range(self.model.lights):
+            for kind in kinds:
+                factor = register(m, terms[kind][light], f"factor_{kind}_{light}_{name}")
+                color = register(m, self.constants[kind][light][channel], f"color_{kind}_{light}_{name}")
+                found.append(register(m, factor * color, f"{kind}_{light}_{name}"))
+        return found
+
+    def sum_of(self, m, terms, constant, name: str, levels: int = 0) -> FixedValue:
+        """Sum of terms and a constant, or ``None``, by a tree of registers of at least as many levels."""
+        # A constant needs no registers that delay it to the other terms.
+        terms, level = [*terms, *([] if constant is None else [constant])], 0
+        while len(terms) > 1 or level < levels:
+            pairs = [terms[k : k + 2] for k in range(0, len(terms), 2)]
+            terms = [
+                constant
+                if pair[0] is constant
+                else self.register(m, reduce(add, pair), name.format(level, k))
+                for k, pair in enumerate(pairs)
+            ]
+            level += 1
+        return terms[0]
 
 
 class CompactIntensityUnit(wiring.Component):
@@ -167,7 +198,7 @@ class CompactIntensityUnit(wiring.Component):
         self.model = p = model or Intensity()
         self.kinds = _kinds(p)
         self._terms = len(self.kinds) * p.lights
-        self.initiation_interval = p.channels * self._terms
+        self.initiation_interval = p.most_cycles
         self.latency = self.initiation_interval + 5
         super().__init__(
             {
@@ -194,7 +225,7 @@ class CompactIntensityUnit(wiring.Component):
         ]
         product = Signal(FixedShape(_TERM * _COLOR), reset_less=True)
         total = Signal(FixedShape(UQ(11 + self._terms.bit_length(), 23)))
-        start = FixedValue(_COLOR, _of_channel(self.constants.ambient, multiplied.channel))
+        start = FixedValue(_COLOR, of_channel(self.constants.ambient, multiplied.channel))
         before = Mux(multiplied.first, Value.cast(start.extend(total.format)), Value.cast(total))
         fraction_bits, result_format = self.model.fraction_bits, self.model.result_format
         rounded = Signal.like(Value.cast(total.round_half_up(fraction_bits)))
@@ -267,31 +298,32 @@ class CompactIntensityUnit(wiring.Component):
         nonzero, last_channel = Cat(Value.cast(term).any() for term in terms), self.model.channels - 1
         with m.If(accept):
             m.d.sync += [busy.eq(1), channel.eq(0), used.eq(nonzero), left.eq(nonzero)]
-            m.d.comb += following.eq(_one_at_most(nonzero) if last_channel == 0 else 0)
+            m.d.comb += following.eq(one_at_most(nonzero) if last_channel == 0 else 0)
             m.d.sync += [register.eq(Value.cast(term)) for register, term in zip(held, terms, strict=True)]
         with m.Elif(advance & busy):
             remain = Mux(ends_channel, used, rest)
             m.d.sync += left.eq(remain)
-            ends = _one_at_most(remain) & (channel + ends_channel == last_channel)
+            ends = one_at_most(remain) & (channel + ends_channel == last_channel)
             m.d.comb += following.eq(ends_pixel | ends)
             with m.If(ends_channel):
                 m.d.sync += channel.eq(channel + 1)
             with m.If(ends_pixel):
                 m.d.sync += busy.eq(0)
-        of_channel = [_of_channel(color, channel) for color in colors]
-        return busy, channel, (_selected(chosen, held), _selected(chosen, of_channel)), first, ends_channel
+        words = [of_channel(color, channel) for color in colors]
+        return busy, channel, (selected(chosen, held), selected(chosen, words)), first, ends_channel
 
 
-def _one_at_most(bits: Value) -> Value:
+def one_at_most(bits: Value) -> Value:
+    """Whether at most one bit is set."""
     return ~(bits & (bits - 1)[: len(bits)]).any()
 
 
-def _selected(one_hot: Value, words: Sequence[Value]) -> Value:
+def selected(one_hot: Value, words: Sequence[Value]) -> Value:
     """The word whose bit is set; 0 if no bit is set."""
     return reduce(or_, (Mux(one_hot[k], Value.cast(word), 0) for k, word in enumerate(words)))
 
 
-def _of_channel(color: data.View, channel: Value) -> Value:
+def of_channel(color: data.View, channel: Value) -> Value:
     """Red, green or blue."""
     red, green, blue = (Value.cast(part) for part in color)
     return Mux(channel[1], blue, Mux(channel[0], green, red))

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.prove
 FURTHER = {
     "arccos": ("refitted, sequential",),
     "local_chord_interpolator": ("gated",),
-    "intensity": ("2 lights, compact",),
+    "intensity": ("2 lights, compact", "albedo, compact"),
     "light": ("cosquad, interval 3",),
     "light_products": ("cosines, 2 lights, interval 3",),
     "pipeline": ("linear, cosquad", "compact", "gate"),

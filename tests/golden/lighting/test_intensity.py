@@ -129,3 +129,106 @@ def test_clocks_of_the_compact_style():
     specular = Fixed(TERM, [[0, 0], [0, 5], [0, 0], [1, 0], [3, TERM.max_code], [2, 2]])
     assert Intensity().cycles(diffuse, specular).tolist() == [3, 3, 3, 6, 12, 6]
     assert Intensity(channels=1).cycles(diffuse, specular).tolist() == [1, 1, 1, 2, 4, 2]
+
+
+# Albedo.
+
+
+def exact_colored(operands, albedo, emission, tinted):
+    """Python integers: the light on the surface in 64ths of an LSB; the sum in units of 2^-23 LSB."""
+    ambient, diffuse_color, specular_color, diffuse, specular, albedo, emission = (
+        np.asarray(x).astype(object) for x in (*operands, albedo, emission)
+    )
+    light, shine = ambient * 2**17 + diffuse.dot(diffuse_color), specular.dot(specular_color)
+    light = np.minimum(((light + shine if tinted else light) + 2**16) // 2**17, 2**18 - 1)
+    total = light * albedo * 2 + emission * 2**17 + (0 if tinted else shine)
+    return np.minimum((total + 2**22) // 2**23, 255).astype(np.uint8)
+
+
+def colored(operands, albedo, emission, tinted=False, **options):
+    *colors, diffuse, specular = operands
+    unit = Intensity(len(colors[1]), has_albedo=True, **options)
+    return unit.compute(
+        *(Fixed(COLOR, color) for color in colors),
+        *(Fixed(TERM, term) for term in (diffuse, specular)),
+        Fixed(unit.ALBEDO_FORMAT, albedo),
+        Fixed(COLOR, emission),
+        tinted,
+    )
+
+
+def any_operands(rng, lights, largest, pixels=2000):
+    return (
+        rng.integers(0, largest // 2 + 1, 3),
+        *rng.integers(0, largest + 1, (2, lights, 3)),
+        *rng.integers(0, TERM.max_code + 1, (2, pixels, lights)),
+    )
+
+
+@pytest.mark.parametrize("tinted", [False, True])
+@pytest.mark.parametrize(("lights", "brightness"), [(0, 8.0), (1, 1.0), (2, 0.5), (16, 8.0)])
+def test_albedo_is_exact_to_both_roundings(lights, brightness, tinted):
+    """At 16 lights of 8 full channels the light on the surface reaches its limit."""
+    rng = np.random.default_rng([lights, tinted])
+    operands = any_operands(rng, lights, int(brightness * 255 * 64))
+    # The light beside the albedo leaves room for that of the surface.
+    operands[2][...] >>= 8
+    albedo = rng.integers(0, 1 << 16, (2000, 3), endpoint=True) >> rng.integers(0, 8, (2000, 1))
+    emission = rng.integers(0, 64 * 64, 3)
+    found = colored(operands, albedo, emission, tinted, tints=True)
+    np.testing.assert_array_equal(found, exact_colored(operands, albedo, emission, tinted))
+    assert len(np.unique(found)) > 30
+
+
+@pytest.mark.parametrize("tinted", [False, True])
+def test_error_of_a_colored_pixel(tinted):
+    """Against float64: half an LSB, and 2^-7 LSB of the light on the surface."""
+    rng = np.random.default_rng(5)
+    operands = any_operands(rng, 2, 40 * 64, 20_000)
+    albedo, emission = rng.integers(0, 1 << 16, (20_000, 3), endpoint=True), rng.integers(0, 20 * 64, 3)
+    ambient, diffuse_color, specular_color, diffuse, specular = (np.asarray(x, float) for x in operands)
+    shine, light = specular @ specular_color / 2**23, ambient / 64 + diffuse @ diffuse_color / 2**23
+    light, beside = (light + shine, 0) if tinted else (light, shine)
+    exact = albedo / 65536 * light + beside + emission / 64
+    error = np.abs(colored(operands, albedo, emission, tinted, tints=True) - exact).max()
+    assert 0.5 < error <= 0.5 + 2.0**-7
+
+
+def test_white_albedo_changes_a_rounding_only():
+    """Of a white surface the sum is that of a unit without albedo, rounded to 2^-6 LSB before."""
+    rng = np.random.default_rng(6)
+    operands = any_operands(rng, 1, 120 * 64)
+    found = colored(operands, np.full((2000, 3), 1 << 16), np.zeros(3, int))
+    differs = np.abs(found.astype(int) - compute(*operands))
+    assert differs.max() <= 1
+    assert np.mean(differs) < 2.0**-6
+
+
+def test_cycles_of_the_compact_style_with_albedo():
+    """A cycle a channel for the albedo and each term; two for the sum of a single channel; by hand."""
+    diffuse = Fixed(TERM, [[0, 0], [0, 0], [1, 0], [1, 0], [7, TERM.max_code], [0, 0]])
+    specular = Fixed(TERM, [[0, 0], [0, 5], [0, 0], [1, 0], [3, TERM.max_code], [2, 2]])
+    assert Intensity(2, has_albedo=True).cycles(diffuse, specular).tolist() == [3, 6, 6, 9, 15, 9]
+    single = Intensity(2, channels=1, has_albedo=True, tints=True)
+    assert single.cycles(diffuse, specular).tolist() == [1, 2, 4, 5, 7, 3]
+    assert single.cycles(diffuse, specular, tinted=True).tolist() == [1, 4, 4, 5, 7, 5]
+
+
+def test_bad_arguments_of_an_albedo_are_refused():
+    for options in ({"has_albedo": False}, {"has_albedo": True, "has_specular": False}):
+        with pytest.raises(ValueError, match=r"^tints need an albedo and specular terms$"):
+            Intensity(tints=True, **options)
+    operands = any_operands(np.random.default_rng(1), 1, 100, 1)
+    fixed = [Fixed(COLOR, color) for color in operands[:3]] + [Fixed(TERM, term) for term in operands[3:]]
+    albedo, emission = Fixed(Intensity.ALBEDO_FORMAT, [[0, 0, 0]]), Fixed(COLOR, [0, 0, 0])
+    for unit, further in (
+        (Intensity(), (albedo,)),
+        (Intensity(), (None, emission)),
+        (Intensity(has_albedo=True), ()),
+    ):
+        with pytest.raises(ValueError, match=r"^the unit has (an|no) albedo, its operands"):
+            unit.compute(*fixed, *further)
+    with pytest.raises(ValueError, match=r"^the albedo must be UQ\(1, 16\), not UQ\(11, 6\)$"):
+        Intensity(has_albedo=True).compute(*fixed, emission)
+    with pytest.raises(ValueError, match=r"^the unit has no tints, and the material is tinted$"):
+        Intensity(has_albedo=True).compute(*fixed, albedo, emission, True)
