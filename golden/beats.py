@@ -25,7 +25,7 @@ class Spans:
         Unit normals at the first and last pixel centre, codes of ``SQ(1, 17)``; or the vectors that the
         method takes, codes of its `Interpolator.END_FORMAT`.
     material : int array, shape (spans,), optional
-        Index of the material; empty: 0 for all.
+        Index of the material. Empty: 0 for all.
     values : SpanValues, optional
         Values of each light, for methods that read no normals, see `LocalChordInterpolator`.
     factors : int64 array, shape (spans, factors, 3), optional
@@ -33,6 +33,11 @@ class Spans:
     vectors : SpanVectors, optional
         Vectors at the first pixel and their step, for methods that read no normals, see
         `QuotientInterpolator`.
+
+    Raises
+    ------
+    ValueError
+        If ``material`` has another number of entries than there are spans.
     """
 
     x: np.ndarray
@@ -46,8 +51,12 @@ class Spans:
     vectors: SpanVectors | None = None
 
     def __post_init__(self) -> None:
-        if not self.material.size:
-            object.__setattr__(self, "material", np.zeros(len(self.length), dtype=np.int64))
+        material = np.asarray(self.material)
+        if not material.size:
+            material = np.zeros(len(self.length), dtype=np.int64)
+        if material.shape != (len(self.length),):
+            raise ValueError(f"material must be an index for each of the {len(self.length)} spans, or empty")
+        object.__setattr__(self, "material", material)
 
     def __len__(self) -> int:
         return len(self.length)

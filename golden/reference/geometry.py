@@ -60,11 +60,13 @@ class Mesh:
             raise ValueError(f"faces must index the {len(self.vertices)} vertices")
         if not (np.isfinite(self.vertices).all() and np.isfinite(self.normals).all()):
             raise ValueError("vertices and normals must be finite")
-        if not self.material.size:
-            object.__setattr__(self, "material", np.zeros(len(self.faces), dtype=np.int64))
-        if self.material.shape != (len(self.faces),) or (self.material.size and self.material.min() < 0):
+        material = np.asarray(self.material)
+        if not material.size:
+            material = np.zeros(len(self.faces), dtype=np.int64)
+        object.__setattr__(self, "material", material)
+        if material.shape != (len(self.faces),) or (material.size and material.min() < 0):
             raise ValueError(
-                f"material must be an index of 0 or more for each of the {len(self.faces)} faces"
+                f"material must be an index of 0 or more for each of the {len(self.faces)} faces, or empty"
             )
         self._check_looks()
 

@@ -6,7 +6,7 @@ import pytest
 from blysk.golden.reference.geometry import Mesh
 
 VERTICES = np.eye(3)
-NO_MATERIAL = "material must be an index of 0 or more for each of the 1 faces"
+NO_MATERIAL = "material must be an index of 0 or more for each of the 1 faces, or empty"
 
 
 @pytest.mark.parametrize(
@@ -22,6 +22,7 @@ NO_MATERIAL = "material must be an index of 0 or more for each of the 1 faces"
         ({"material": np.zeros(2, int)}, NO_MATERIAL),
         ({"material": np.zeros((1, 1), int)}, NO_MATERIAL),
         ({"material": np.array([-1])}, NO_MATERIAL),
+        ({"material": None}, NO_MATERIAL),
         ({"colors": np.zeros((2, 3))}, r"colors must have shape \(3, 3\), not \(2, 3\)"),
         ({"colors": np.full((3, 3), 1.5)}, "colors must be 0 to 1"),
         ({"colors": np.full((3, 3), np.nan)}, "colors must be 0 to 1"),
