@@ -21,13 +21,21 @@ def _cases(groups: Mapping[str, Sequence[dict]]) -> Iterator[dict]:
         yield from found
 
 
-def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str]:
-    """Largest error, with its case, in spans without a flag inside the range, cut or served whole."""
+def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str, str]:
+    """Largest error in spans without a flag inside the range, cut or served whole; its case and grade."""
     errors = [
-        *((of["prepared"]["silent"], of["case"]) for of in _cases(groups) if of["prepared"]),
-        *((of["given"]["safe"], of["case"]) for of in _cases(groups) if of["inside"]),
+        *(
+            (of["prepared"]["silent"], of["case"], of["prepared"]["grade"])
+            for of in _cases(groups)
+            if of["prepared"]
+        ),
+        *(
+            (of["given"]["safe"], of["case"], of["given"]["safe_grade"])
+            for of in _cases(groups)
+            if of["inside"]
+        ),
     ]
-    return max(errors, default=(0.0, ""))
+    return max(errors, default=(0.0, "", ""))
 
 
 def _lit(groups: Mapping[str, Sequence[dict]]) -> Mapping[str, Sequence[dict]]:
@@ -76,10 +84,9 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
     if elsewhere:
         said = ", ".join(f"`{method}` ({lit[method][0]:.2f})" for method in elsewhere)
         sentence += f". These methods do so in all cases without a terminator: {said}"
-    sentence += (
-        f". The largest error inside a range is {worst[most][0]:.0f} LSB (`{most}`, {worst[most][1]}). The "
-        "documentation of this method states an error of this size."
-    )
+    error, case, grade = worst[most]
+    sentence += f". The largest error inside a range is {_figure(error)} LSB (`{most}`, {case})."
+    sentence += _STATED.get(grade, "")
     if "quotient" in ranges:
         end = min(ranges["quotient"]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS)
         sentence += (
@@ -87,6 +94,17 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
             "ends differ by at most 2:1. Other spans are halved before the pipeline."
         )
     return Conclusion("In which range is a method exact?", sentence, _drawing(cases, ranges, worst, lit))
+
+
+_STATED = {
+    "fair": " The documentation of this method states an error of this size.",
+    "bad": " The documentation of this method states no error of this size.",
+}
+"""What the documentation says about the largest error, by the grade of its case (`measure_case`)."""
+
+
+def _figure(error: float) -> str:
+    return f"{error:.0f}" if error >= 9.95 else f"{error:.2g}"
 
 
 def _listed(methods: Sequence[str]) -> str:
@@ -106,8 +124,9 @@ def _drawing(
         left.plot(error, y, marker="|", markersize=8, color=style.color)
         left.plot(lit[method][0], y, marker=style.marker, markersize=6, color=style.color)
         for value in {error, lit[method][0] if lit[method][0] < error / 1.4 else error}:
-            text = f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
-            left.text(value, y - 0.42, text, fontsize=6.5, ha="center", va="center", color=style.color)
+            left.text(
+                value, y - 0.42, _figure(value), fontsize=6.5, ha="center", va="center", color=style.color
+            )
         widest = (
             [ranges[method]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS]
             if method in ranges

@@ -21,6 +21,7 @@ from blysk.bench.report.stability_cases import (
     arcs,
     cases_of,
 )
+from blysk.bench.report.stability_conclusion import conclusion
 from blysk.bench.report.stability_errors import (
     GOOD,
     RANGE_EXPONENTS,
@@ -299,6 +300,22 @@ def test_section():
     assert max(error for angle, error in errors.items() if angle <= up_to) <= 1
     wider = [angle for angle in SWEEP if angle > up_to]
     assert not wider or errors[wider[0]] > 1
+
+
+@pytest.mark.parametrize(
+    ("error", "grade", "end"),
+    [
+        (0.9, "good", "a range is 0.9 LSB (`linear`, wide)."),
+        (12.3, "fair", "The documentation of this method states an error of this size."),
+        (12.3, "bad", "The documentation of this method states no error of this size."),
+    ],
+)
+def test_conclusion_follows_the_grade_of_the_largest_error(error, grade, end):
+    narrow = {"case": "narrow", "inside": 1, "prepared": {"silent": 0.5, "grade": "good"}}
+    wide = {"case": "wide", "inside": 1, "prepared": {"silent": error, "grade": grade}}
+    given = {"silent": 0.5, "safe": 0.5, "safe_grade": "good"}
+    cases = {"linear": {"1": [narrow | {"given": given}, wide | {"given": given}]}}
+    assert conclusion(cases, {}).sentence.endswith(end)
 
 
 def test_tasks():
