@@ -70,14 +70,14 @@ class AngularSetup:
     ============ ============ ====================================================================
 
     `error` bounds the error of cos gamma(t) at any pixel, against the formula above in exact arithmetic on
-    the same codes. The largest errors found are 5e-7 up to 0.1 degrees, 9e-7 at 1, 3e-6 at 10, 1.3e-5 at 45,
-    3.3e-5 from 90 degrees on.
+    the same codes. The largest errors found in 20,000 random spans of 2 to 4095 pixels, for each angle of the
+    span, are 6.4e-7 up to 0.1 degrees, 7.4e-7 at 1, 3.8e-6 at 10, 1.3e-5 at 45, 3.3e-5 from 90 to 150.
 
     **By arccos**, as published: ``angle="arccos"`` takes psi from `Arccos` of ``r = N_l.N_r``, divided by
     `ONE_SQUARED` as ``r + r/2^16`` and rounded to SQ(2, 16). psi is rounded to UQ(2, 15) radians. A product
     with ``1/(2 pi)`` in UQ(-2, 19) converts it to turns. ``psi/(m-1)`` reads the first 17 bits of the
     product. x and y are as above, so only the error of arccos is added: `arccos_error`. The largest errors of
-    cos gamma found are, by the span angle in degrees:
+    cos gamma found in the same spans are, by the angle of the span in degrees:
 
     ==================== ====== ====== ====== ======
     psi from             1e-4   1      10     45

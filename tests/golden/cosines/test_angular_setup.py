@@ -99,6 +99,14 @@ def test_error_by_the_source_of_psi(unit, stated):
         assert error_of(unit, degrees, 20_000) == pytest.approx(largest, rel=0.06)
 
 
+@pytest.mark.parametrize(("degrees", "largest"), [(0.1, 6.4e-7), (90, 3.3e-5)])
+def test_stated_errors_of_the_half_chord(degrees, largest):
+    """The further figures of the docstring; the figure at 90 degrees holds up to 150."""
+    assert error_of(UNIT, degrees, 20_000) == pytest.approx(largest, rel=0.06)
+    if degrees == 90:
+        assert error_of(UNIT, 120, 20_000) < largest > error_of(UNIT, 150, 20_000)
+
+
 @pytest.mark.parametrize("degrees", [1e-4, 1, 45, 90, 150])
 @pytest.mark.parametrize("unit", [UNIT, BY_ARCCOS["refitted"]], ids=["half_chord", "arccos"])
 def test_stiff_peaks(degrees, unit):
