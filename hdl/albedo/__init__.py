@@ -1,0 +1,1 @@
+"""Units that give each pixel its albedo."""
