@@ -1,4 +1,7 @@
-"""Errors of a frame against its method in float64, exact interpolation and exact shading."""
+"""Errors of a frame against its method in float64, exact interpolation and exact shading.
+
+Frames are compared as they are encoded: in the space of the codes of the design's transfer.
+"""
 
 import math
 from collections.abc import Callable
@@ -12,6 +15,7 @@ from blysk.golden.frames.frame import Picture
 from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.lighting.transfer import Transfer
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.lighting import distant_cosine, halfway_vector
@@ -27,6 +31,7 @@ from blysk.golden.reference.renderer import (
     visible_mask,
 )
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import encode_frame, slope
 from blysk.golden.render import Renderer
 
 __all__ = [
@@ -37,6 +42,7 @@ __all__ = [
     "compare",
     "compare_image",
     "compare_triangles",
+    "encoded_bound",
     "error_bound",
     "highlight_step",
     "method_in_float64",
@@ -50,6 +56,8 @@ BORDER = 0.002
 @dataclass(frozen=True)
 class FrameErrors(ErrorFigures):
     """Errors of a frame: `ErrorFigures` of all shown pixels, and the largest error off and at the border.
+
+    An LSB is a step of the codes of the frame, which are encoded by the transfer of its design.
 
     Parameters
     ----------
@@ -67,15 +75,15 @@ class FrameErrors(ErrorFigures):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Errors of a frame over the pixels that show the surface.
+    """Errors of a frame over the pixels that show the surface, in the space of the frame's codes.
 
-    Off the border of every light the method error has a bound, see `error_bound`.
+    Off the border of every light the method error has a bound, see `error_bound` and `encoded_bound`.
 
     Parameters
     ----------
     golden : float64 array, shape (height, width, 3)
-        The exact frame with the frame's model, in [0, 1]: per-pixel normals, perspective-correct and
-        normalised, of the triangles as rasterised.
+        The exact frame with the frame's model, in [0, 1], encoded by the transfer: per-pixel normals,
+        perspective-correct and normalised, of the triangles as rasterised.
     arithmetic_error : FrameErrors
         Against the same method and model in float64; NaN if the spans are unknown.
     method_error : FrameErrors
@@ -84,14 +92,16 @@ class Comparison:
         Against the exact frame with the model ``target``.
     target : str
         Name of this model, see `target_of`.
+    transfer : str
+        Transfer of the frame's design; `SPACES` names the space of its codes.
     bound_lsb : float or None
-        Bound of ``method_error.steady_lsb``, see `error_bound`; ``None`` if the spans are unknown.
+        Bound of ``method_error.steady_lsb``, see `encoded_bound`; ``None`` if the spans are unknown.
     visible_pixels : int
         Pixels that show the surface.
     border : str
         Cosines near 0 at a border: ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see `highlight_step`.
     step_lsb : float
-        See `highlight_step`.
+        See `highlight_step`; in LSB of linear light.
     border_pixels : int
         Visible pixels at the border of a light.
     nmse : float
@@ -107,6 +117,7 @@ class Comparison:
     method_error: FrameErrors
     total_error: FrameErrors
     target: str
+    transfer: str
     bound_lsb: float | None
     visible_pixels: int
     border: str
@@ -119,7 +130,7 @@ class Comparison:
 
 
 def method_in_float64(scene: Scene, design: ShadingPipeline, raster: Raster) -> np.ndarray:
-    """A frame by the method and the model of a pipeline, in exact arithmetic.
+    """A frame by the method, the model and the transfer of a pipeline, in exact arithmetic.
 
     Parameters
     ----------
@@ -133,7 +144,7 @@ def method_in_float64(scene: Scene, design: ShadingPipeline, raster: Raster) -> 
     float64 array, shape (height, width, 3)
         In [0, 1].
     """
-    return design.interpolator.exact_frame(_Shading(scene, design, raster))
+    return encode_frame(design.interpolator.exact_frame(_Shading(scene, design, raster)), design.transfer)
 
 
 @dataclass(frozen=True)
@@ -180,7 +191,7 @@ def target_of(design: ShadingPipeline) -> ReflectionModel:
 
 
 def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None) -> float | None:
-    """Bound of the error against exact normals of every pixel with the same model, in LSB.
+    """Bound of the error against exact normals of every pixel with the same model, in LSB of linear light.
 
     For each material that is not unlit, multiply each light's colour by the sum of diffuse and specular
     reflection, and add these products of all lights. Let c be the largest channel of these sums; 1 is the
@@ -217,6 +228,30 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
     if design.specular is None or scene.has_albedo:
         return None
     return design.interpolator.bound(_Bounds(scene, design, cut))
+
+
+def encoded_bound(bound: float, least: float, transfer: str) -> float:
+    """Bound in LSB of a transfer's codes, from a bound in LSB of linear light.
+
+    Before the transfer a colour is at most ``e`` off, the bound without the half LSB of its own rounding, but
+    with 1/128 LSB of the rounding of the transfer's input. The slope of the transfer never rises. So the
+    bound is the slope at the least colour that may occur, times e, plus the half LSB of the code.
+
+    Parameters
+    ----------
+    bound : float
+        Bound of `error_bound`.
+    least : float
+        The least exact channel of the frame, in [0, 1], linear light.
+    transfer : str
+        One of `TRANSFERS`.
+
+    Source: docs/theory/textures.md#transfer.
+    """
+    if transfer == "linear":
+        return bound
+    error = bound - 0.5 + Transfer.OPERAND_FORMAT.step / 2
+    return slope(max(least - error / 255, 0), transfer) * error + 0.5
 
 
 @dataclass(frozen=True)
@@ -279,7 +314,7 @@ def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
 
 
 def highlight_step(scene: Scene, model: ReflectionModel) -> float:
-    """Largest step of a light's highlight at N·H = 0 in LSB; 0 if it is a quarter or less.
+    """Largest step of a light's highlight at N·H = 0 in LSB of linear light; 0 if it is a quarter or less.
 
     ``ggx`` at a large roughness does not end in 0 there, and a curve of a file may not. Polynomials of a
     small exponent go on behind, so they have no step.
@@ -400,7 +435,8 @@ def _compare(
     nothing = FrameErrors(*[math.nan] * len(fields(FrameErrors)))
     mask, model = visible_mask(scene, raster), _model_of(design)
     target = target_of(design)
-    figures: dict[str, Any] = {"target": target.name, "bound_lsb": bound, "arithmetic_error": nothing}
+    transfer = design.transfer
+    figures: dict[str, Any] = {"target": target.name, "transfer": transfer, "arithmetic_error": nothing}
     figures["step_lsb"] = highlight_step(scene, model)
     figures["border"] = "|N.L| or |N.H|" if figures["step_lsb"] else "|N.L|"
     seconds = 0.0
@@ -422,11 +458,15 @@ def _compare(
         figures["arithmetic_error"] = _errors(image, same_method.reshape(-1, 3)[pixels], border)
         del same_method
     if target != model and mask.any():
-        exact = timed(render, scene, "phong", target, raster).image.reshape(-1, 3)[pixels]
+        exact = encode_frame(timed(render, scene, "phong", target, raster).image, transfer)
+        exact = exact.reshape(-1, 3)[pixels]
         figures["total_error"] = _errors(image, exact, border)
         figures |= _mean_squares(image, exact)
         del exact
     golden = timed(render, scene, "phong", model, raster).image
+    least = float(golden.reshape(-1, 3)[pixels].min(initial=1))
+    figures["bound_lsb"] = None if bound is None else encoded_bound(bound, least, transfer)
+    golden = encode_frame(golden, transfer)
     if not mask.any():
         figures |= dict.fromkeys(("method_error", "total_error"), nothing)
         figures |= dict.fromkeys(("nmse", "mnse_published", "mnse_published_share"), math.nan)

@@ -9,8 +9,9 @@ from blysk.golden.frames.prepare import PreparedFrame, prepare
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import encode
 
-__all__ = ["Picture", "frame_buffer", "model_frame"]
+__all__ = ["Picture", "background_code", "frame_buffer", "model_frame"]
 
 
 @dataclass(frozen=True)
@@ -55,25 +56,32 @@ class Picture:
         return len(self.cut_raster.span)
 
 
-def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray) -> np.ndarray:
+def background_code(scene: Scene, transfer: str) -> np.ndarray:
+    """Codes of a scene's background, uint8, shape (3,): encoded, and rounded to the nearest code, half up."""
+    codes: np.ndarray = np.floor(255 * encode(scene.background, transfer) + 0.5).astype(np.uint8)
+    return codes
+
+
+def frame_buffer(scene: Scene, raster: Raster, colors: np.ndarray, transfer: str) -> np.ndarray:
     """Frame buffer with the colours of the visible fragments over the background.
 
     Parameters
     ----------
     scene : Scene
-        Size and background; the background colour is rounded to the nearest code, half up.
+        Size and background.
     raster : Raster
         Fragments, with flags of the visible fragments.
     colors : uint8 array, shape (fragments, 3)
         Red, green, blue of each fragment.
+    transfer : str
+        Transfer of the colours, by which the background is encoded, see `background_code`.
 
     Returns
     -------
     uint8 array, shape (height, width, 3)
     """
     image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
-    image[0] = np.floor(np.multiply(scene.background, 255) + 0.5)
-    image[1:] = image[0]
+    image[...] = background_code(scene, transfer)
     image.reshape(-1, 3)[raster.pixel[raster.visible]] = colors[raster.visible]
     return image
 
@@ -98,7 +106,7 @@ def model_frame(scene: Scene, design: ShadingPipeline) -> Picture:
     rastered = perf_counter()
     pixels = design.compute(prepared.spans, prepared.constants)
     return Picture(
-        image=frame_buffer(scene, prepared.cut_raster, pixels.color),
+        image=frame_buffer(scene, prepared.cut_raster, pixels.color, design.transfer),
         prepared=prepared,
         out_of_range_spans=pixels.out_of_range_spans,
         seconds={"raster": rastered - start, "model": perf_counter() - rastered},

@@ -7,6 +7,7 @@ import numpy as np
 
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.frames.frame import background_code
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.vector_axes import further_axes, triangle_axes
 from blysk.golden.geometry.light_adapter import LightAdapter
@@ -103,24 +104,28 @@ def triangle_constants(scene: Scene, renderer: Renderer) -> list[FrameConstants]
     return [replace(constants[0], axes=axes), *constants[1:]]
 
 
-def frame_of_pixels(scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarray) -> np.ndarray:
+def frame_of_pixels(
+    scene: Scene, x: np.ndarray, y: np.ndarray, color: np.ndarray, transfer: str
+) -> np.ndarray:
     """Frame buffer after pixels are written in their order over the background.
 
     Parameters
     ----------
     scene : Scene
-        Size and background; the background colour is rounded to the nearest code, half up.
+        Size and background.
     x, y : int arrays, shape (P,)
         Column and row of each pixel.
     color : uint8 array, shape (P, 3)
         Red, green, blue.
+    transfer : str
+        Transfer of the colours, by which the background is encoded, see `background_code`.
 
     Returns
     -------
     uint8 array, shape (height, width, 3)
     """
     image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
-    image[...] = np.floor(np.multiply(scene.background, 255) + 0.5)
+    image[...] = background_code(scene, transfer)
     # Of several writes to a place the last counts, as in hardware.
     image[y, x] = color
     return image
@@ -147,4 +152,5 @@ def triangle_frame(scene: Scene, renderer: Renderer, angle: float | None = None)
     drawn = renderer.compute(sent.triangles, sent.frame, triangle_constants(scene, renderer))
     owner = np.full((scene.height, scene.width), -1, dtype=np.int64)
     owner[drawn.y, drawn.x] = sent.source[drawn.triangle]
-    return TriangleFrame(frame_of_pixels(scene, drawn.x, drawn.y, drawn.color), sent, owner, drawn.counts)
+    image = frame_of_pixels(scene, drawn.x, drawn.y, drawn.color, renderer.design.transfer)
+    return TriangleFrame(image, sent, owner, drawn.counts)

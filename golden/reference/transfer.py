@@ -3,10 +3,14 @@
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["LARGEST_SLOPE", "TRANSFERS", "decode", "encode", "slope"]
+__all__ = ["LARGEST_SLOPE", "SPACES", "TRANSFERS", "decode", "encode", "encode_frame", "slope"]
 
-TRANSFERS = ("srgb", "linear")
-"""Output transfers: the curve of sRGB, or linear light as it is."""
+SPACES = {"srgb": "sRGB", "linear": "linear light"}
+"""Output transfers, and the names of the spaces of their codes, for texts: the curve of sRGB, or light as it
+is."""
+
+TRANSFERS = tuple(SPACES)
+"""Output transfers."""
 
 LARGEST_SLOPE = 12.92
 """Slope of the curve of sRGB at black, its largest."""
@@ -48,6 +52,27 @@ def encode(light: npt.ArrayLike, transfer: str = "srgb") -> np.ndarray:
     curve = power + _OFFSET * (power - 1)
     found: np.ndarray = np.where(light <= _LAST_LINEAR, LARGEST_SLOPE * light, curve)
     return found
+
+
+def encode_frame(frame: np.ndarray, transfer: str) -> np.ndarray:
+    """`encode` in place, row by row, as a large frame has 400 MB.
+
+    Parameters
+    ----------
+    frame : float64 array, shape (height, width, 3)
+        Linear light in [0, 1], which is overwritten.
+    transfer : str
+        One of `TRANSFERS`.
+
+    Returns
+    -------
+    float64 array
+        ``frame``.
+    """
+    if not _is_linear(transfer):
+        for row in frame:
+            row[...] = encode(row, transfer)
+    return frame
 
 
 def decode(encoded: npt.ArrayLike, transfer: str = "srgb") -> np.ndarray:

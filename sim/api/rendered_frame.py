@@ -16,6 +16,7 @@ from blysk.golden.frames.compare import Comparison, FrameErrors, compare, compar
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.metrics import error_map
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import SPACES
 from blysk.golden.render import Renderer
 from blysk.sim.frames.figures import frame_figures, triangle_figures
 from blysk.sim.frames.frame import SimulatedFrame
@@ -61,7 +62,10 @@ class RenderedFrame:
 
     @property
     def error(self) -> FrameErrors:
-        """Errors against exact normals at every pixel with the same reflection model, in LSB and dB."""
+        """Errors against exact normals at every pixel with the same reflection model, in LSB and dB.
+
+        An LSB is a step of the picture's codes, of sRGB or of linear light (``comparison.transfer``).
+        """
         return self.comparison.method_error
 
     @property
@@ -140,11 +144,13 @@ class RenderedFrame:
         if self.figures["visible_pixels"]:
             subtitle = (
                 "simulated RTL beside exact normals of every pixel, same model, in float64: largest error "
-                f"{self.error.max_lsb:.2f} LSB, {self.cycles:,} cycles for {self.pixels:,} pixels"
+                f"{self.error.max_lsb:.2f} LSB of {SPACES[self.comparison.transfer]}, "
+                f"{self.cycles:,} cycles for {self.pixels:,} pixels"
             )
         title = f"{self.name}: {self.design.method}, {self.design.model}{highlight}"
         with self.files.active():
-            write_comparison(path, self.image, self.comparison.golden, title=title, subtitle=subtitle)
+            golden, transfer = self.comparison.golden, self.comparison.transfer
+            write_comparison(path, self.image, golden, title=title, subtitle=subtitle, transfer=transfer)
 
     def lines(self) -> Iterator[str]:
         """The figures as the command line prints them."""
@@ -174,7 +180,9 @@ class RenderedFrame:
             "cycles": f"{self.cycles:,}",
             "spans": f"{self.spans:,}",
             "pixels": f"{self.pixels:,}",
-            "largest error, exact normals, same model": f"{self.error.max_lsb:.3f} LSB",
+            "largest error, exact normals, same model": (
+                f"{self.error.max_lsb:.3f} LSB of {SPACES[self.comparison.transfer]}"
+            ),
             "PSNR": f"{self.error.psnr_db:.2f} dB",
         }
         table = "".join(

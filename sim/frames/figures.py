@@ -154,6 +154,7 @@ def _errors(comparison: Comparison, names: Iterable[str]) -> dict[str, Any]:
     return {
         **{f"{name}_error": dataclasses.asdict(getattr(comparison, f"{name}_error")) for name in names},
         "target": comparison.target,
+        "transfer": comparison.transfer,
         "bound_lsb": comparison.bound_lsb,
         "border": f"{comparison.border} at most {BORDER:g}",
         "step_lsb": comparison.step_lsb,
@@ -174,7 +175,7 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         result is the largest number of a frame.
     """
     same = ("method", "model", "exponent", "roughness", "lights", "materials", "style", "gate", "engine")
-    same += ("width", "height", "target", "border", "step_lsb")
+    same += ("width", "height", "target", "transfer", "border", "step_lsb")
     same += tuple(key for key in ("pipes", "geometry", "setups", "coarse") if key in frames[0])
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
     bounds = [frame["bound_lsb"] for frame in frames]

@@ -178,7 +178,7 @@ class FrameSimulator:
         if not np.array_equal(pixel, raster.pixel):
             raise SimulationError("the simulated pipeline answered with other pixels than it was asked for")
         return SimulatedFrame(
-            image=frame_buffer(scene, raster, _colors(beats)),
+            image=frame_buffer(scene, raster, _colors(beats), self.design.transfer),
             prepared=prepared,
             out_of_range_spans=int(run.status["out_of_range_spans"]),
             seconds={"raster": rastered - start, "simulate": perf_counter() - rastered},

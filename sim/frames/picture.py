@@ -10,6 +10,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from blysk.golden.reference.metrics import error_map
+from blysk.golden.reference.transfer import SPACES
 from blysk.sim.errors import InputError
 from blysk.sim.output import atomic_writer, check_writable
 from blysk.sim.run_files import MARK
@@ -94,7 +95,13 @@ def write_image(path: str | os.PathLike, image: np.ndarray) -> None:
 
 
 def write_comparison(
-    path: str | os.PathLike, simulated: np.ndarray, golden: np.ndarray, *, title: str, subtitle: str = ""
+    path: str | os.PathLike,
+    simulated: np.ndarray,
+    golden: np.ndarray,
+    *,
+    title: str,
+    subtitle: str = "",
+    transfer: str = "linear",
 ) -> None:
     """Write one picture of three panels: simulated frame, golden frame, and error map with its scale.
 
@@ -114,9 +121,11 @@ def write_comparison(
     simulated : uint8 array, shape (height, width, 3)
         Frame of the simulated hardware.
     golden : float64 array, shape (height, width, 3)
-        Frame of the golden renderer, in [0, 1].
+        Frame of the golden renderer, in [0, 1], encoded as the simulated frame.
     title, subtitle : str
         One line each, above the panels.
+    transfer : str
+        Transfer of both frames, for the label of the errors' scale.
 
     Raises
     ------
@@ -168,7 +177,7 @@ def write_comparison(
         ScalarMappable(Normalize(0, largest), _COLOR_MAP), cax=bar, orientation="horizontal"
     )
     scale.ax.tick_params(labelsize=text, length=text / 3, width=text / 14, pad=text / 5)
-    scale.set_label("largest channel error, LSB of 8 bits", fontsize=text)
+    scale.set_label(f"largest channel error, LSB of 8-bit {SPACES[transfer]}", fontsize=text)
     canvas.draw()
     around = np.asarray(canvas.buffer_rgba())[..., :3]
 

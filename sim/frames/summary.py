@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from blysk.golden.reference.transfer import SPACES
 from blysk.hdl.port_descriptions import COUNTER_TEXTS
 from blysk.sim.frames.error_names import ERRORS, reference_of
 
@@ -105,7 +106,7 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("cycles", f"{figures['cycles']:,} for {figures['pixels']:,} shaded pixels{rate}{hidden}")
     if figures["visible_pixels"]:
         total, method = (figures[f"{name}_error"]["steady_lsb"] for name in ("total", "method"))
-        found = f"largest {total:.2f} LSB of 8 bits from exact {figures['target']} shading"
+        found = f"largest {total:.2f} {_unit(figures)} from exact {figures['target']} shading"
         if figures["target"] != figures["model"]:
             found += f", {method:.2f} from exact normals with this model"
         yield _line("error", f"{found}; {_bound(figures)}")
@@ -171,6 +172,11 @@ def _pixel_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("cycles", f"{figures['cycles']:,}{rate}{pipes}")
 
 
+def _unit(figures: Mapping[str, Any]) -> str:
+    """Unit of the errors, with the space of the codes."""
+    return f"LSB of 8-bit {SPACES[figures['transfer']]}"
+
+
 def _bound(figures: Mapping[str, Any]) -> str:
     bound = figures["bound_lsb"]
     if bound is None:
@@ -188,7 +194,8 @@ def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:
         pixels = f"{count:,} pixel{'s' * (count != 1)} with {figures['border']}"
         where = "where a light begins"
         if figures["step_lsb"]:
-            where += f", or where a highlight ends in a step of {figures['step_lsb']:.1f} LSB"
+            step = f"{figures['step_lsb']:.1f} LSB of {SPACES['linear']}"
+            where += f", or where a highlight ends in a step of {step}"
         yield _line("left out", f"{pixels}, {where}: largest {most:.2f} LSB")
 
 
@@ -196,7 +203,8 @@ def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     if not figures["visible_pixels"]:
         yield _line("error", "none, no pixel shows the surface")
         return
-    yield _line("error, LSB", f"{'largest':>9}{'99.9 %':>9}{'RMSE':>9}{'PSNR, dB':>10}   against")
+    heads = f"{'largest':>9}{'99.9 %':>9}{'RMSE':>9}{'PSNR, dB':>10}"
+    yield _line("error, LSB", f"{heads}   in {_unit(figures)}, against")
     for name in ERRORS:
         error = figures.get(f"{name}_error")
         if error is None:

@@ -232,7 +232,8 @@ class TriangleSimulator:
         missed = missed_pieces(scene, self.renderer, sent)
         ready = perf_counter()
         if not len(sent.triangles):
-            image = frame_of_pixels(scene, *np.zeros((2, 0), dtype=int), np.zeros((0, 3), dtype=np.uint8))
+            none = *np.zeros((2, 0), dtype=int), np.zeros((0, 3), dtype=np.uint8)
+            image = frame_of_pixels(scene, *none, self.renderer.design.transfer)
             seconds = {"triangles": ready - start, "simulate": 0.0}
             return SimulatedTriangleFrame(
                 image,
@@ -263,7 +264,7 @@ class TriangleSimulator:
         beats = run.beats
         color = np.stack([beats[channel] for channel in "rgb"], axis=-1)
         return SimulatedTriangleFrame(
-            image=frame_of_pixels(scene, beats["x"], beats["y"], color),
+            image=frame_of_pixels(scene, beats["x"], beats["y"], color, self.renderer.design.transfer),
             sent=sent,
             counts=counts | missed,
             written=len(beats),

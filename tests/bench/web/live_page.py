@@ -104,13 +104,13 @@ def natively(state):
         engine="auto",
     )
     colors = np.stack([run.beats[name] for name in "rgb"], axis=-1)
-    return frame_buffer(scene, frame.cut_raster, colors), run
+    return frame_buffer(scene, frame.cut_raster, colors, design.transfer), run
 
 
 def by_model(state):
     scene, design, frame = prepared(state)
     pixels = design.compute(frame.spans, constants_of(scene, design))
-    return frame_buffer(scene, frame.cut_raster, pixels.color)
+    return frame_buffer(scene, frame.cut_raster, pixels.color, design.transfer)
 
 
 def figure(page, name):

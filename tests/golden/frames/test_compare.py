@@ -11,6 +11,7 @@ from blysk.golden.frames.compare import (
     border_mask,
     compare,
     compare_image,
+    encoded_bound,
     error_bound,
     highlight_step,
     target_of,
@@ -24,19 +25,21 @@ from blysk.golden.reference.lobes import BECKMANN, COPLANAR_PHONG, GGX, Tabulate
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import BLINN, COSQUAD, REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import encode
 from blysk.sim.meshes.teapot import teapot
 
 METHODS = ("chord-local", "renormalise")
 GREY = Material((0.05,) * 3, (0.02,) * 3, (0.98,) * 3, 20)
 
 
-def facing(normals, light=(0.3, 0.4, 1), depths=(0, 0, 0), **material):
+def facing(normals, light=(0.3, 0.4, 1), depths=(0, 0, 0), background=(0, 0, 0), **material):
     """One triangle, seen from the front, with given normals at its corners."""
     corners = np.array([[-1, -1, depths[0]], [1, -0.8, depths[1]], [0.1, 1, depths[2]]], dtype=float)
     normals = np.asarray(normals, dtype=float)
     mesh = Mesh(corners, np.array([[0, 1, 2]]), normals / np.linalg.norm(normals, axis=1, keepdims=True))
     camera = Camera.framing(corners, (0, 0, 1), "perspective", 4 / 3)
-    return Scene(mesh, camera, 128, 96, material=replace(GREY, **material), lights=[Light(light)])
+    surface = replace(GREY, **material)
+    return Scene(mesh, camera, 128, 96, material=surface, lights=[Light(light)], background=background)
 
 
 def made(method, model, scene):
@@ -124,6 +127,40 @@ def test_an_unlit_surface_has_no_border(method, model):
     assert (found.border_pixels, found.step_lsb) == (0, 0)
     assert 0.507 < found.method_error.steady_lsb <= found.bound_lsb
     assert found.bound_lsb == pytest.approx(0.5 + (3 if method == "quotient" else 1) / 128)
+
+
+@pytest.mark.parametrize("ambient", [0.0, 0.02, 0.3])
+def test_errors_of_srgb_are_of_its_codes(ambient):
+    """Against the curve written here again; the bound is the slope's at the least colour."""
+    scene = facing([[1, 0, 0.2], [-1, 0, 0.1], [0, 0.1, 1]], ambient=(ambient,) * 3, background=(0.2, 0, 1))
+    linear, design = (replace(made("quotient", "blinn", scene), transfer=of) for of in ("linear", "srgb"))
+    own = compare(scene, linear, model_frame(scene, linear))
+    frame = model_frame(scene, design)
+    found = compare(scene, design, frame)
+    light = own.golden
+    curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(found.golden, curve, atol=1e-12)
+    assert frame.image[0, 0].tolist() == [124, 0, 255]
+    assert (own.transfer, found.transfer) == ("linear", "srgb")
+    shown = ~border_mask(scene, frame.raster, BLINN).reshape(-1)[frame.raster.pixel]
+    pixels = frame.raster.pixel[frame.raster.visible & shown]
+    error = np.abs(frame.image - 255 * curve).reshape(-1, 3)[pixels].max()
+    assert found.method_error.steady_lsb == pytest.approx(error)
+    assert 0.45 < error <= found.bound_lsb
+    steepest = {0.0: 12.92, 0.02: 4.3064, 0.3: 0.8872}[ambient]
+    assert found.bound_lsb == pytest.approx(0.5 + steepest * (own.bound_lsb - 0.5 + 1 / 128), rel=0.02)
+
+
+def test_the_bound_of_encoded_colours_is_reached():
+    """Every dark colour, and one off by all that the linear bound allows; it may not be exceeded."""
+    light, bound = np.linspace(0, 30, 3001), 0.6
+    for shift in (-0.1, 0.1):
+        found = np.round((light + shift) * 64) / 64
+        off = np.abs(np.round(255 * encode(found / 255)) - 255 * encode(light / 255))
+        limits = np.array([encoded_bound(bound, of / 255, "srgb") for of in light])
+        assert np.all(off <= limits)
+        assert (off / limits).max() > 0.9
+    assert encoded_bound(bound, 0.0, "linear") == bound
 
 
 def test_no_bound_where_none_is_known():

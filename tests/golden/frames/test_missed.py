@@ -67,7 +67,7 @@ def by_hardware(scene, design):
     sent = sent_triangles(scene, renderer)
     drawn = renderer.compute(sent.triangles, sent.frame, constants_of(scene, design))
     counts = missed_pieces(scene, renderer, sent) | {"out_of_range": drawn.out_of_range_spans}
-    image = frame_of_pixels(scene, drawn.x, drawn.y, drawn.color)
+    image = frame_of_pixels(scene, drawn.x, drawn.y, drawn.color, renderer.design.transfer)
     return errors(scene, design, image), counts
 
 

@@ -42,7 +42,13 @@ def figures(model, target, bound=0.92, border=3):
         **{"mesh": "teapot", "triangles": 9, "width": 16, "height": 12, "lights": 1, "materials": 1},
         **{"method": "quadratic", "model": model, "exponent": 50, "roughness": None, "engine": "cxxrtl"},
         **{"cycles": 9, "pixels": 9, "cycles_per_pixel": 1.0, "visible_pixels": 9, "spans": 3},
-        **{"target": target, "bound_lsb": bound, "border": "|N.L| at most 0.002", "border_pixels": border},
+        **{
+            "target": target,
+            "transfer": "srgb",
+            "bound_lsb": bound,
+            "border": "|N.L| at most 0.002",
+            "border_pixels": border,
+        },
         "step_lsb": 0.0,
         **{"nmse": 0.1, "mnse_published": 0.1, "mnse_published_share": 1.0, "counts": {}},
         **{"simulated_pixels_per_second": 9.0, "seconds": {"total": 1.0}},
@@ -66,6 +72,13 @@ def test_the_reference_is_the_one_that_was_used(model):
     assert line(full, " " * 2 + "total").endswith(f"exact normals of every pixel, model {target}")
     if target != "blinn":
         assert "blinn" not in "\n".join([*short, *full]).lower()
+
+
+@pytest.mark.parametrize("lines", [short_lines, frame_lines])
+@pytest.mark.parametrize(("transfer", "space"), [("srgb", "sRGB"), ("linear", "linear light")])
+def test_errors_say_their_space(lines, transfer, space):
+    told = list(lines({**figures("blinn", "blinn"), "transfer": transfer}))
+    assert f"LSB of 8-bit {space}" in "\n".join(told)
 
 
 @pytest.mark.parametrize("lines", [short_lines, frame_lines])
