@@ -31,7 +31,7 @@ def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Ra
     """Spans cut for the method of a pipeline, and the number of given spans that were cut.
 
     The normal at a cut is the true normal of the surface, ``normalise((1-t) m_l N_l + t m_r N_r)`` along the
-    given span, with the lengths m of the rasteriser. An odd pixel goes to the right half. The fragments and
+    given span. The rasteriser gives the lengths m. An odd pixel goes to the right half. The fragments and
     their order do not change.
 
     Parameters
@@ -90,7 +90,7 @@ class _Cutter:
 
 
 def cutter_of(scene: Scene, raster: Raster, design: ShadingPipeline) -> SpanCutter:
-    """Ways to cut the spans of a scene for a design, among which its method chooses."""
+    """Ways to cut the spans of a scene for a design. The design's method chooses a way."""
     return _Cutter(scene, raster, design)
 
 
@@ -120,7 +120,7 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
 
 
 def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
-    """Halve spans until no pixel's N/W is too short compared with that of the longer end.
+    """Halve spans until no pixel's N/W is too short compared with the longer end's N/W.
 
     N/W is short if W differs much along a span, or if the ends are nearly opposite.
 
@@ -144,7 +144,7 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         square = np.einsum("sk,sk->s", change, change)
         t = -np.einsum("sk,sk->s", left, change) / np.where(square, square, 1.0)
         nearest = first + np.clip(t, 0, 1) * (last - first)
-        # The pixels before and behind the line's place nearest to 0.
+        # The last pixel before the line's nearest place to 0, and the first pixel after this place.
         places = np.floor(nearest), np.ceil(nearest)
         least = [np.linalg.norm(lines_along(raster, origin, place / steps), axis=1) for place in places]
         longest = np.maximum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))
@@ -199,7 +199,10 @@ def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def _halve(raster: Raster, is_wide: Callable[..., np.ndarray]) -> tuple[Raster, int]:
-    """Spans, halved while ``is_wide(span, first pixel, last pixel)``; and how many spans were halved."""
+    """Halve spans while ``is_wide(span, first pixel, last pixel)``.
+
+    Also returns the number of halved spans.
+    """
     origin = np.arange(len(raster.length))
     first = np.zeros(len(origin), dtype=np.int64)
     last = raster.length.astype(np.int64) - 1
@@ -265,14 +268,14 @@ def cut_by_error(
     - it has pixels between the places of the method's curve, and vectors turn farther than
       `LocalChordInterpolator` allows;
     - it has pixels between these places, and the error of N·L or u is over its tolerance;
-    - N·L of a light changes its sign, or nearly, where its highlight shows, so that N·L of a pixel might have
+    - where its highlight shows, N·L of a light changes its sign or comes near 0, so N·L of a pixel might have
       the wrong sign. Exact values within 2^-25 of 0 are left out;
     - the errors of a light that fades, with N·L times its factor, are over the budgets of
       `LocalChordInterpolator` at any pixel. Here every pixel is checked.
 
     The tolerance of u depends on the exponent of the span's material. It also depends on the least u of the
-    span, because dark spans may have larger errors. For a light that is behind the surface along the whole
-    span only the turn counts. A light that is off has no effect.
+    span, because dark spans may have larger errors. If a light is behind the surface along the whole span,
+    only the angle of the span counts. A light that is off has no effect.
 
     Parameters
     ----------

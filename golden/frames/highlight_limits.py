@@ -26,7 +26,7 @@ class _Curve:
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Arguments u in ascending order; the steepest ``|dS/du|`` and the largest S from each u on."""
+        """Arguments u, ascending; and for each u the steepest ``|dS/du|`` and the largest S from it on."""
         u, value, slope = curve_lines(self.reflection, self.parameter)
         u, slope = np.ldexp(u, self.scale), np.ldexp(slope, -self.scale)
         return u, *(np.maximum.accumulate(of[::-1])[::-1] for of in (slope, value))
@@ -44,7 +44,7 @@ class _Curve:
     def turn(self) -> float:
         """As of `HighlightLimits`, for one material."""
         u, _, slope = curve_lines(self.reflection, self.parameter)
-        # Each slope counts up to the next argument.
+        # A slope belongs to the interval up to the next argument.
         steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slope)).max()
         found: float = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
         return found
@@ -78,7 +78,10 @@ class HighlightLimits:
 
     @classmethod
     def of(cls, materials: Sequence[Material], design: ShadingPipeline | None = None) -> "HighlightLimits":
-        """Limits of materials with the specular unit of a design. Without a design, by their exponents."""
+        """Limits of materials with the specular unit of a design.
+
+        Without a design the exponents give the limits.
+        """
         if design is None or design.specular is None:
             exponents = [float(material.exponent) for material in materials]
         else:
@@ -128,7 +131,7 @@ class HighlightLimits:
         return found
 
     def is_lit(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
+        """Whether a highlight may be over a quarter of an LSB, for this u or any larger u.
 
         Parameters are those of `tolerance`.
         """

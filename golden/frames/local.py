@@ -110,7 +110,7 @@ class SurfacePoints:
         return replace(self, normal=normal, diffuse=diffuse, highlight=highlight)
 
     def turned(self, other: "SurfacePoints", method: LocalChordInterpolator) -> np.ndarray:
-        """Whether N, V or an L changes by more than the method allows from here to ``other``; (count,)."""
+        """Whether N, V or an L differs from ``other`` by more than the method allows; (count,)."""
         least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
         result = np.einsum("sk,sk->s", self.normal, other.normal) < least
         result |= np.einsum("sk,sk->s", self.viewer, other.viewer) < least
@@ -177,7 +177,7 @@ def local_operands(
     on = np.array([light.is_on for light in scene.lights], dtype=bool)
     spans = np.arange(len(raster.length))
     operands = np.zeros((3, len(spans), count, 3))
-    # In a span of one pixel all three values are the first; a span of two pixels has none in the middle.
+    # In a span of one pixel all three values equal the first. A span of two pixels has no middle pixel.
     for place, t, pixels in ((0, 0.0, 1), (2, 1.0, 2), (1, 0.5, 3)):
         has = spans[raster.length >= pixels]
         lacks = spans[raster.length < pixels]

@@ -74,7 +74,7 @@ def _missed(
 
 
 def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dict[str, int]:
-    """Numbers of the pieces that are off by more than the tolerances of `LocalChordInterpolator`.
+    """Numbers of pieces whose errors are over the tolerances of `LocalChordInterpolator`, by cause.
 
     Geometry cuts a span by an angle. The angle bounds the error of a method's curve only if N/W has the same
     length at both ends of a piece. So N·L and u of the curve are compared with their values on the piece's
@@ -140,7 +140,7 @@ def _turn(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) ->
         error += longest * (2 * np.sqrt(3) * LineAdapter.ERROR + LineSetup.ERROR)
     elif renderer.geometry.vectors:
         change = np.linalg.norm(right - left, axis=1)
-        # Vectors that are to be turned may be half as long in their words, and are rounded again.
+        # If vectors are turned, their words may be half as long, and are rounded again.
         factor = 4 if renderer.geometry.rotates else 1
         shortest = np.maximum(longest, VectorAdapter.SHORTEST)
         error += factor * np.sqrt(3) * (shortest + change) * VectorAdapter.ERROR
@@ -168,7 +168,7 @@ def _raster(pieces: HardwarePieces, source: np.ndarray, axes: np.ndarray) -> Ras
         magnitude = np.linalg.norm(end, axis=1)
         fields[f"normal_{side}"] = sign * end / np.where(magnitude, magnitude, 1.0)[:, np.newaxis]
         fields[f"magnitude_{side}"] = magnitude
-        # Without point lights nothing asks where a pixel is on the surface.
+        # Without point lights the positions of pixels on the surface are not used.
         fields[f"weights_{side}"] = np.full((len(pieces), 3), 1 / 3)
     none = np.zeros(0, dtype=np.int64)
     counts = ("triangles", "degenerate", "culled", "outside", "uncovered", "hidden_spans", "repaired_normals")

@@ -47,7 +47,7 @@ class Pieces:
     def off(
         self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray, turn: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Whether the curve with its words, and the words alone, are too far off; see `missed_pieces`."""
+        """Whether the curve with its words is too far off, and whether the words are; see `missed_pieces`."""
         turn = turn[:, np.newaxis]
         curves = {name: _Quadratic.of(self.places, name) for name in ("diffuse", "highlight")}
         words = {
@@ -86,7 +86,7 @@ class Pieces:
         """Result of `miss`; u of the places has the scale of the method's words."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
         setup = interpolator.value_setup
-        # From so many pixels on there are pixels between the three, or two, values of the curve.
+        # Least number of pixels with which a span has pixels between the three (or two) values of its curve.
         between = pixels > (3 if setup else 2)
         fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
         names = ("diffuse", "highlight", "factor") if fading.any() else ("diffuse", "highlight")
@@ -133,7 +133,7 @@ class Pieces:
         highlight_share: np.ndarray,
         lit: np.ndarray,
     ) -> np.ndarray:
-        """Whether the factor of a light, or its product with N·L, is too far off at any pixel of a piece.
+        """Whether a light's factor, or the factor times N·L, is too far off at any pixel of a piece.
 
         Parameters
         ----------
@@ -169,8 +169,9 @@ class Pieces:
     def _margin(self) -> np.ndarray:
         """Bound of the largest error on each piece, as a multiple of the error at its quarters.
 
-        The largest of `LocalChordInterpolator.MARGIN`, the ratio of the interpolated normals' lengths at the
-        two ends, and the ratio of the weights there: a large ratio moves all change near to one end.
+        This is the largest of three numbers: `LocalChordInterpolator.MARGIN`, the ratio of the interpolated
+        normals' lengths at the two ends, and the ratio of the weights there. If a ratio is large, nearly all
+        change is near one end.
         """
         ends, steps = [], np.maximum(self.raster.length[self.origin] - 1, 1)
         for place in (self.first, self.last):

@@ -47,8 +47,8 @@ class PreparedFrame:
     constants : list of FrameConstants
         Frame constants of each material, see `constants_of`.
     missed_spans : int
-        For a method whose spans are cut by their angle alone: number of spans in which its curve is off by
-        more than a quarter of an LSB.
+        Number of spans in which the method's curve is off by more than a quarter of an LSB. Only for methods
+        whose spans are cut by their angle alone.
     """
 
     raster: Raster
@@ -131,7 +131,7 @@ class _Filler:
 
 
 def _true_ends(scene: Scene, cut: Raster) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the true line. Where both vanish, the normal of the face, as in `fragment_normals`."""
+    """Ends of the true line. If both are 0, the face's normal takes their place, as in `fragment_normals`."""
     left, right = line_ends(cut)
     lost = np.ones(len(left), dtype=bool)
     for end, weights in ((left, cut.weights_left), (right, cut.weights_right)):

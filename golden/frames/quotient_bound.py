@@ -49,7 +49,7 @@ def quotient_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> float:
 
 
 def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
-    """The same bound of a frame by triangles, in LSB, where it shows the triangle of exact shading.
+    """Bound of a frame by triangles, in LSB, for pixels where exact shading shows the same triangle.
 
     - A component of N/W is off by `component_error`, times the shift.
     - The words of `VectorAdapter` add half a step for the start, the rounding of the step, and an eighth of a
@@ -82,7 +82,7 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     steps = np.ldexp(2.0**17 * (1 - 2.0**-adapter.margin_shift), adapter.shift(pieces))
     last = pieces.length - 1.0
     difference = np.abs(right - left).max(axis=1) * steps
-    # Of the step, whose word is a bit shorter where it is to be turned; and its cuts.
+    # Error of the step and its cuts. If the step is turned, its word is a bit shorter.
     of_step = np.maximum(difference * 2.0**-17, 1 / 16) * (1 + adapter.rotates)
     rounding = np.where(last > 0, of_step + 1 / 8, 0)
     error = component_error(drawn, pieces, renderer) + _across_slivers(drawn, renderer)[pieces.triangle]
@@ -106,7 +106,7 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
 
 
 def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
-    """Largest difference of a component of N/W across each triangle that is a sliver; 0 of the others."""
+    """Largest difference of a component of N/W across each sliver, and 0 for other triangles."""
     y, normal = drawn.triangles.y, drawn.triangles.normal * ATTRIBUTE.step
     height = y[:, 2] - y[:, 0]
     share = ((y[:, 1] - y[:, 0]) / height)[:, np.newaxis]

@@ -126,7 +126,7 @@ def frame_of_pixels(
     """
     image = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
     image[...] = background_code(scene, transfer)
-    # Of several writes to a place the last counts, as in hardware.
+    # If several pixels are written to the same place, the last pixel counts, as in hardware.
     image[y, x] = color
     return image
 

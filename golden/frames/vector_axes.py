@@ -10,7 +10,7 @@ __all__ = ["further_axes", "triangle_axes", "vector_axes"]
 
 
 def vector_axes(scene: Scene, design: ShadingPipeline) -> np.ndarray:
-    """Axes, by rows, in the scene's frame of the components of ``N/W`` that a method takes.
+    """Axes, as rows in the scene's frame, of the components of ``N/W`` that a method takes.
 
     Without highlights z is along each light.
 

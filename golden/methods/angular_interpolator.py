@@ -63,7 +63,7 @@ class AngularInterpolator(EndNormalInterpolator):
         return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """Sum of the errors of setup and cosine, of the code of length 1 in place of 1, and half a step."""
+        """Sum of four errors: setup, cosine, the code of length 1 in place of 1, and half a step."""
         return float(AngularSetup.error(np.asarray(degrees))) + HighlightCosine.ERROR + 2.0**-16 + 2.0**-26
 
     def compute(

@@ -46,7 +46,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     ORIGIN = "documents"
     MAX_ANGLE = 90.0
-    # None of these is an end of a straight line, which lie at multiples of 1/2^k.
+    # The ends of the straight lines lie at multiples of 1/2^k. None of these places is an end.
     CHECKED_AT = (0.09, 0.31, 0.45, 0.64, 0.82)
 
     def __post_init__(self) -> None:
@@ -92,7 +92,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     @property
     def shortest_length(self) -> float:
-        """1 minus the threshold and the rounding error of the error block."""
+        """1 minus the threshold, minus the rounding error of the error block."""
         return 1 - self.threshold - 2.0**-18
 
     def operand_error(self, length: int, degrees: float) -> float:

@@ -25,7 +25,7 @@ class SpanCutter(Protocol):
         """Until no span is wider than `Interpolator.widest_span`, see `cut_by_angle`."""
 
     def by_length(self, largest_ratio: float) -> tuple[Raster, int]:
-        """Until no pixel's N/W is too short compared with that of the longer end, see `cut_by_length`."""
+        """Until no pixel's N/W is too short compared with the longer end's N/W, see `cut_by_length`."""
 
     def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
         """Until the two ends are alike, see `cut_by_ends`."""

@@ -41,7 +41,8 @@ class Operands(NamedTuple):
     highlight : Fixed, shape (pixels, lights)
         N·H, 1 - N·H, or the place in a lobe's table.
     out_of_range : bool array, shape (spans,)
-        Whether the angle of the span is larger than the method serves. Its operands are then without meaning.
+        Whether the angle of the span is larger than the method serves. Then the operands of the span have no
+        meaning.
     factor : Fixed, shape (pixels, fading lights), optional
         Factor of each light that fades, of methods with `Interpolator.serves_local`.
     """
@@ -126,7 +127,7 @@ class Interpolator(ABC):
 
     @property
     def lights_cut(self) -> bool:
-        """Whether each light that is on may cut spans, one without effect too: the curve has an error."""
+        """Whether each light that is on may cut spans, even without effect, as the curve has an error."""
         return False
 
     @property
@@ -141,7 +142,7 @@ class Interpolator(ABC):
 
     @property
     def given_values(self) -> bool:
-        """Whether spans bring values of each light: to compute them is no work of the pipeline."""
+        """Whether spans bring values of each light. Then the pipeline does not compute these values."""
         return False
 
     @property
@@ -215,11 +216,14 @@ class Interpolator(ABC):
         raise ValueError(f"method {self.name} has no choice of words")
 
     def shortest_words(self, longest: int) -> int | None:
-        """Fraction bits that serve spans up to a length, if fewer than the method has; else ``None``."""
+        """Fraction bits that are enough for spans up to a length.
+
+        ``None`` if the method has no more than these.
+        """
         return None
 
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
-        """Lines for the header of the Verilog: they tell a user the contents of a span.
+        """Lines for the header of the Verilog, which describe the contents of a span.
 
         Parameters
         ----------
@@ -350,9 +354,9 @@ class Interpolator(ABC):
         return cutter.uncut()
 
     def missed(self, cutter: SpanCutter, cut: Raster) -> int:
-        """Of cut spans, how many have a curve that is off by more than a quarter of an LSB, as `cut` left it.
+        """Number of spans after `cut` whose curve is off by more than a quarter of an LSB.
 
-        0 of a method whose `cut` looks at the error, or whose curve is exact.
+        It is 0 for a method whose `cut` looks at the error, or whose curve is exact.
         """
         return 0
 

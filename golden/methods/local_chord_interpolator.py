@@ -49,9 +49,10 @@ class LocalChordInterpolator(Interpolator):
       were found by search. With equal lengths the largest error at any t was 1.31 times the error at 1/4 and
       3/4. With lengths in the ratio g it was up to ``1.03 max(4/3, g)`` times.
 
-    Fit and arithmetic together have a budget against exactly normalised interpolation, at full reflection:
-    0.4 LSB in the specular term and 0.12 in the diffuse term. The budget is checked at these places; a proof
-    for every pixel is missing. `blysk.golden.frames.compare.error_bound` has the bound of a frame.
+    Fit and arithmetic together have a budget of error, at full reflection: 0.4 LSB in the specular term and
+    0.12 in the diffuse term. The reference is exactly normalised interpolation. The budget is checked at
+    these places; a proof for every pixel is missing. `blysk.golden.frames.compare.error_bound` has the bound
+    of a frame.
 
     Where N·L changes its sign the highlight ends at any brightness. A pixel whose N·L is within the error of
     0 may have the highlight or not. Where `is_lit`, cut a span with these pixels further.
@@ -321,7 +322,7 @@ class LocalChordInterpolator(Interpolator):
         Returns
         -------
         cosine, one_minus_cosine : float64 arrays, shape (pixels, lights)
-            1 - N·H without the scale. Because of the scale it is good only up to ``2^-s``.
+            1 - N·H without the scale. The scale limits the values to ``2^-s``.
         factor : float64 array, shape (pixels, fading lights)
             Only if ``factors`` are given.
         """
@@ -340,7 +341,7 @@ class LocalChordInterpolator(Interpolator):
         return tuple(results)
 
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Largest error of u that keeps `HIGHLIGHT_BUDGET`, where no smaller u occurs.
+        """Largest error of u that keeps `HIGHLIGHT_BUDGET`, for this u and every larger u.
 
         The slope ``|dS/du|`` of a term is about n at the peak, and smaller farther off. It is
         ``n (1 - n u/2)`` for the cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With
@@ -360,7 +361,7 @@ class LocalChordInterpolator(Interpolator):
 
     @staticmethod
     def is_lit(exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Whether a highlight may be over a quarter of an LSB, where no smaller u occurs.
+        """Whether a highlight may be over a quarter of an LSB, for this u or any larger u.
 
         Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``. From ``x = 7`` on this is under a quarter of
         an LSB. The other models reach 0 earlier, or decrease as fast.

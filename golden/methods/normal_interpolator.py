@@ -68,7 +68,10 @@ class EndNormalInterpolator(Interpolator):
 
     @property
     def shortest_normal(self) -> float:
-        """Least length of a normal on the curve, for spans up to `gate_angle`; 1 without chords to H."""
+        """Least length of a normal on the curve, for spans up to `gate_angle`.
+
+        It is 1 if no chords to H are used.
+        """
         return 1.0
 
     @property

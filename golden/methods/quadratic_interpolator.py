@@ -112,7 +112,7 @@ class QuadraticInterpolator(NormalInterpolator):
         return float(np.sqrt(1 - (1 - np.cos(np.radians(self.gate_angle / 2))) ** 2 / 4))
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """The sum of `normal_error`, at the last pixel of the span."""
+        """The errors of `normal_error`, at the last pixel of the span."""
         middle = np.sqrt(3) * self.middle_normal.error
         if self.form != "differences":
             return float(middle + np.sqrt(3) * QuadraticEvaluator(self.form).error)

@@ -270,7 +270,7 @@ class QuotientErrors:
     def of(
         cls, vectors: SpanVectors, length: np.ndarray, mirror: bool = False, further: bool = False
     ) -> "QuotientErrors":
-        """The largest bounds of some spans, one at least.
+        """The largest bounds of some spans. At least one span is needed.
 
         Parameters
         ----------
@@ -300,7 +300,7 @@ class QuotientErrors:
 
     @classmethod
     def worst(cls, length: int, mirror: bool = False) -> "QuotientErrors":
-        """The bounds of every span up to a length that is cut for the method.
+        """Bounds that hold for every span up to a length, if the span is cut for the method.
 
         Parameters
         ----------
@@ -322,7 +322,7 @@ class QuotientErrors:
         mirror: bool = False,
         first: np.ndarray | None = None,
     ) -> "QuotientErrors":
-        """The largest bounds of spans whose words are off by more than their rounding.
+        """The largest bounds of spans whose words have further errors besides their rounding.
 
         Parameters
         ----------
@@ -338,19 +338,19 @@ class QuotientErrors:
             For a further light: ``component`` of the first light, whose words make q.
         """
         angle = np.arcsin(np.minimum(np.sqrt(3) * component / shortest, 1))
-        # Of R and V the angle turns twice as fast, and y cos a is rounded once more.
+        # The angle between R and V changes twice as fast. The word of y cos a is rounded once more.
         turn = 2 * angle + 2 * np.sqrt(2) * (component + 0.5) / shortest if mirror else angle
         drift = 2 * (last + last**2 / 2) * 2.0**-13 / shortest**2
         mismatch = np.zeros(1)
         if first is not None:
-            # Of the first light's y cos a and y sin a both are rounded.
+            # Both y cos a and y sin a of the first light are rounded.
             longer = shortest + np.sqrt(3) * first + np.sqrt(0.5) * mirror
             mismatch = (longer / np.maximum(shortest - np.sqrt(3) * component, 1)) ** 2 - 1
         return cls(*(float(bound.max(initial=0)) for bound in (angle, turn, drift, mismatch)))
 
     @property
     def cosine(self) -> float:
-        """Largest error of N·L, by the normal, the codes of L, and the words of a pixel."""
+        """Largest error of N·L, from the normal, the codes of L, and the words of a pixel."""
         words = 2.0**-16 + 2.0**-17.5 + Quotient.COSINE_ERROR
         found: float = self.angle + self.drift + self.mismatch / 2 + words
         return found
@@ -362,7 +362,7 @@ class QuotientErrors:
 
         - the lobe's steepest slope a radian times the error of its angle;
         - its largest ``|dS/ds|`` times the drift, but at most the error by the angle ``asin(sqrt(drift))``;
-        - the part by the relative error of s;
+        - the part from the relative error of s;
         - for a further light, the change by the error of q.
 
         Parameters
@@ -372,13 +372,13 @@ class QuotientErrors:
         parameter : float or None
             Its exponent or roughness.
         """
-        # Dense near the peak; the lobe ends at a right angle.
+        # The angles are dense near the peak. The lobe ends at a right angle.
         angle = np.linspace(0, 1, 1 << 16)[:-1] ** 2 * np.pi / 2
         value = model.reflect(np.cos(angle), parameter)
         sine = np.sin(angle / 2 if model.MIRROR else angle) ** 2
         rise = np.abs(np.diff(value))
         slope, steepness = (rise / np.diff(angle)).max(), (rise / np.diff(sine)).max()
-        # Errors of 1 - s serve where s is over 1/2.
+        # If s is over 1/2, errors of 1 - s take the place of errors of s.
         relative = (rise / np.diff(sine) * np.minimum(sine, 1 - sine)[1:]).max()
         by_drift = min(steepness * self.drift, slope * (1 + model.MIRROR) * np.arcsin(np.sqrt(self.drift)))
         by_square = 0.0

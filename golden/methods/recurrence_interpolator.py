@@ -66,7 +66,10 @@ class RecurrenceInterpolator(EndNormalInterpolator):
 
     @property
     def highlight_excess(self) -> float:
-        """Error of setup and recurrence, largest for spans of two pixels, plus length errors and cut."""
+        """Error of setup and recurrence, plus errors of lengths and of the cut.
+
+        It is largest for spans of two pixels.
+        """
         if self.form == "direct":
             return 2.0
         length = np.arange(2, 1 << LENGTH_BITS)
@@ -90,7 +93,7 @@ class RecurrenceInterpolator(EndNormalInterpolator):
         shape = (len(span), len(direction.codes))
         results = np.zeros((2, *shape), dtype=np.int64)
         out_of_range = np.zeros(len(length), dtype=bool)
-        # A call takes as many steps as its longest span, so spans of similar length are computed together.
+        # A call takes as many steps as its longest span has pixels. So spans of similar length share a call.
         size = np.frexp(length)[1]
         for group in np.unique(size):
             inside = size == group

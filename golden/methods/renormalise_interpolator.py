@@ -114,7 +114,8 @@ class RenormaliseInterpolator(NormalInterpolator):
     def operand_error(self, length: int, degrees: float) -> float:
         """Bound for ends of unit length.
 
-        It is the error of the line divided by the line's shortest length, plus the error of the renormaliser.
+        The bound is the error of the line divided by the line's shortest length, plus the renormaliser's
+        error.
         """
         shortest = np.cos(np.radians(min(degrees, 170.0)) / 2)
         line = LineSetup.ERROR + np.sqrt(3) * self.END_FORMAT.step
