@@ -20,7 +20,7 @@ from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.api.signature import with_options
 from blysk.sim.frames.animation import equal_distance, turned, turntable
 from blysk.sim.meshes.materials import surfaces
-from blysk.sim.meshes.mesh import LoadedMesh, given_mesh, load_mesh
+from blysk.sim.meshes.mesh import LoadedMesh, given_mesh, load_mesh, merged
 
 __all__ = ["load", "scene", "scenes_of"]
 
@@ -107,12 +107,34 @@ def load(settings: Settings) -> LoadedMesh:
     if not isinstance(source, str | os.PathLike):
         return given_mesh(source, settings["crease"])
     with settings.mesh_located():
-        return load_mesh(
+        loaded = load_mesh(
             os.fspath(source),
             triangles=settings["triangles"],
             crease_angle=settings["crease"],
             materials=settings["materials"] == "file",
         )
+    return _without_albedo(loaded)
+
+
+def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
+    """A mesh as pipelines without an albedo draw it. What they leave out is told."""
+    materials, mesh = loaded.materials, loaded.mesh
+    counts = {
+        "texture": len({id(material.texture) for material in materials if material.texture is not None}),
+        "emission": sum(material.emission is not None for material in materials),
+        "unlit material": sum(material.unlit for material in materials),
+    }
+    told = ["vertex colours"] if len(mesh.colors) else []
+    told += [f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items() if count]
+    if not told and not any(material.colored for material in materials):
+        return loaded
+    plain = {"texture": None, "emission": None, "unlit": False, "metallic": None, "colored": False}
+    loaded = replace(
+        loaded,
+        mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2))),
+        ignored=(*loaded.ignored, *told),
+    )
+    return merged(loaded, {number: replace(of, **plain) for number, of in enumerate(materials)})
 
 
 def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:

@@ -2,15 +2,20 @@
 
 import importlib.util
 import json
+import math
 import re
 import struct
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from blysk.golden.reference.light import Triple
 from blysk.golden.text import plain_text
 from blysk.sim.installation import install_extra
-from blysk.sim.meshes.gltf_arrays import MESHOPT, check_arrays
+from blysk.sim.meshes.gltf_arrays import check_arrays
+from blysk.sim.meshes.gltf_parts import MESHOPT, extension_of, has_extension
+from blysk.sim.meshes.gltf_textures import GLOSSY, GltfTextures, color_texture
 from blysk.sim.meshes.materials import FileMaterial, Found, color_of
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused, shown
 
@@ -25,17 +30,23 @@ __all__ = [
 
 # Extensions that are read, those that change nothing that is read, and those that a picture does without.
 _READ = {"KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
-_READ |= {"KHR_node_visibility"}
-_SILENT = {"KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif"}
-_SILENT |= {"MSFT_texture_dds", "KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer"}
+_UNLIT, _STRENGTH = "KHR_materials_unlit", "KHR_materials_emissive_strength"
+_READ |= {"KHR_node_visibility", "KHR_texture_transform", "EXT_texture_webp", GLOSSY, _UNLIT, _STRENGTH}
+_SILENT = {
+    "KHR_texture_basisu",
+    "EXT_texture_avif",
+    "MSFT_texture_dds",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+    "KHR_animation_pointer",
+}
 _SILENT |= {"KHR_materials_variants", "KHR_node_hoverability", "KHR_node_selectability", "EXT_mesh_manifold"}
 _TOLD = {"KHR_lights_punctual", "EXT_lights_image_based", "EXT_lights_ies"}
 _TOLD |= {
     f"KHR_materials_{name}"
     for name in (
-        *("anisotropy", "clearcoat", "diffuse_transmission", "dispersion", "emissive_strength", "ior"),
-        *("iridescence", "pbrSpecularGlossiness", "sheen", "specular", "transmission", "unlit", "volume"),
-        "volume_scatter",
+        *("anisotropy", "clearcoat", "diffuse_transmission", "dispersion", "ior", "iridescence", "sheen"),
+        *("specular", "transmission", "volume", "volume_scatter"),
     )
 }
 # Keys that are read, those of what is counted, and those that say nothing of the look.
@@ -49,10 +60,11 @@ _KNOWN = {
     "primitives": {"attributes", "indices", "material", "mode", "targets"},
     "materials": {"pbrMetallicRoughness", "doubleSided", "alphaMode", "alphaCutoff", "emissiveFactor"}
     | {"normalTexture", "occlusionTexture", "emissiveTexture"},
-    "pbrMetallicRoughness": {"baseColorFactor", "metallicFactor", "roughnessFactor", "baseColorTexture"}
-    | {"metallicRoughnessTexture"},
+    "factors": {"baseColorFactor", "metallicFactor", "roughnessFactor", "baseColorTexture"}
+    | {"metallicRoughnessTexture", "diffuseFactor", "specularFactor", "glossinessFactor", "diffuseTexture"}
+    | {"specularGlossinessTexture"},
 }
-_ATTRIBUTES = re.compile("POSITION|NORMAL|TANGENT|(TEXCOORD|JOINTS|WEIGHTS|COLOR)_[0-9]+|_.*")
+_ATTRIBUTES = re.compile("POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_[0-9]+|_.*")
 
 
 def gltf_document(data: bytes, suffix: str, found: Found) -> dict:
@@ -147,85 +159,124 @@ def complete_scene(document: dict, found: Found) -> None:
     elif "scene" not in document:
         found.tell("scene after the first", "scenes after the first", len(document["scenes"]) - 1)
     document.setdefault("scene", 0)
-    hidden = [node for node in nodes if _extension(node, "KHR_node_visibility").get("visible") is False]
+    hidden = [node for node in nodes if extension_of(node, "KHR_node_visibility").get("visible") is False]
     for node in hidden:
         node.pop("mesh", None)
         hidden += [nodes[child] for child in node.get("children", [])]
 
 
-def _extension(part: dict, name: str) -> dict:
-    """An extension of a part of a document; empty if it has none."""
-    return part.get("extensions", {}).get(name, {})
+def find_gltf_materials(
+    document: dict, materials: bool, textures: GltfTextures, found: Found
+) -> list[dict] | None:
+    """Take the materials out of a document; ``None`` if they are not asked for.
 
-
-def find_gltf_materials(document: dict, materials: bool, found: Found) -> None:
-    """Replace a document's materials by their numbers, and remove textures and vertex colours.
-
-    Then trimesh gives the number of each part's material, and looks for no image file.
+    A material, and its texture, is read if a face uses it.
     """
     texts = document.pop("materials", None) or []
-    for unread in ("images", "textures", "samplers"):
-        document.pop(unread, None)
-    colored = False
+    if not materials:
+        return None
+    if not isinstance(texts, list) or not all(isinstance(text, dict) for text in texts):
+        raise Refused("its materials are not a list of objects", ONE_MATERIAL)
     for mesh in document.get("meshes", []):
         for primitive in mesh["primitives"]:
-            colored |= any(name.startswith("COLOR_") for name in primitive["attributes"])
-            index = primitive.pop("material", None)
-            if index is None or not materials:
-                continue
-            if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(texts):
+            index = primitive.get("material", 0)
+            if "material" in primitive and (
+                isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(texts)
+            ):
                 raise Refused(
                     f"a mesh refers to material {shown(str(index))} (from 0), but there are {len(texts)}",
                     ONE_MATERIAL,
                 )
-            primitive["material"] = index
-    if colored:
-        found.tell("vertex colours")
-    if materials and texts:
-        if not isinstance(texts, list) or not all(isinstance(text, dict) for text in texts):
-            raise Refused("its materials are not a list of objects", ONE_MATERIAL)
-        found.names += [str(text.get("name", "")) for text in texts]
-        for number, (name, text) in enumerate(zip(found.names[-len(texts) :], texts, strict=True)):
-            given = shown(name)
-            found.readers.append(partial(_gltf_material, text, given or f"number {number}", given, found))
-        document["materials"] = [{"name": str(number)} for number in range(1, len(texts) + 1)]
+    found.names += [str(text.get("name", "")) for text in texts]
+    for number, (name, text) in enumerate(zip(found.names[1:], texts, strict=True)):
+        given = shown(name)
+        read = partial(_gltf_material, text, given or f"number {number}", given, textures, found)
+        found.readers.append(read)
+    return texts
 
 
-def _gltf_material(text: dict, name: str, given_name: str, found: Found) -> FileMaterial:
+def _gltf_material(
+    text: dict, name: str, given_name: str, textures: GltfTextures, found: Found
+) -> FileMaterial:
     """A material of a glTF document; what else changes its look is told.
 
-    Missing factors are 1, as glTF defines. Metallic and roughness factors of a texture do not count, as
-    textures are not read.
+    Missing factors are 1, as glTF defines. Factors that a texture multiplies do not count if the texture is
+    not read: metallic factor and roughness, specular factor and glossiness, emission.
     """
-    look = text.get("pbrMetallicRoughness", {})
-    factor = look.get("baseColorFactor", [1, 1, 1, 1]) if isinstance(look, dict) else look
-    numbers = factor if isinstance(factor, list) and len(factor) == 4 else []
-    usable = all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers)
-    color = color_of(numbers[:3] if usable else [], "baseColorFactor", name, str(factor))
-    _tell_look(text, look, numbers[3], found)
-    two_sided = text.get("doubleSided") is True
-    if "metallicRoughnessTexture" in look:
-        return FileMaterial(given_name, color, two_sided=two_sided)
-    factors = [_factor(look, key, name) for key in ("metallicFactor", "roughnessFactor")]
-    return FileMaterial.of_metallic_roughness(given_name, color, *factors, two_sided)
+    glossy = has_extension(text, GLOSSY)
+    look = extension_of(text, GLOSSY) if glossy else text.get("pbrMetallicRoughness", {})
+    if not isinstance(look, dict):
+        raise Refused(
+            f"material {name!r} has pbrMetallicRoughness {shown(str(look))!r}, not an object", ONE_MATERIAL
+        )
+    key = "diffuseFactor" if glossy else "baseColorFactor"
+    color, alpha = _color(look, key, 4, name), look.get(key, [1] * 4)[3]
+    two_sided, unlit = text.get("doubleSided") is True, has_extension(text, _UNLIT)
+    if unlit or {"metallicRoughnessTexture", "specularGlossinessTexture"} & look.keys():
+        made = FileMaterial(given_name, color, two_sided=two_sided, unlit=unlit)
+    elif glossy:
+        specular = _color(look, "specularFactor", 3, name)
+        glossiness = _factor(look, "glossinessFactor", name)
+        made = FileMaterial.of_specular_glossiness(given_name, color, specular, glossiness, two_sided)
+    else:
+        factors = [_factor(look, key, name) for key in ("metallicFactor", "roughnessFactor")]
+        made = FileMaterial.of_metallic_roughness(given_name, color, *factors, two_sided)
+    info = color_texture(text)
+    _tell_look(text, look, info, alpha, found)
+    if info is not None:
+        made = replace(made, texture=textures.read(info, text.get("alphaMode", "OPAQUE") == "OPAQUE"))
+    if "emissiveTexture" not in text and not unlit:
+        made = replace(made, emission=_emission(text, name))
+    return made
 
 
-def _tell_look(text: dict, look: dict, alpha: float, found: Found) -> None:
+def _color(look: dict, key: str, count: int, name: str) -> Triple:
+    """A colour of a material, perhaps with alpha after it."""
+    given = look.get(key, [1] * count)
+    return color_of(given[:3] if _are_numbers(given, count) else [], key, name, str(given))
+
+
+def _are_numbers(given: Any, count: int) -> bool:
+    """Whether there is a list of so many numbers."""
+    kinds = [type(number) in (int, float) for number in given] if isinstance(given, list) else []
+    return len(kinds) == count and all(kinds)
+
+
+def _emission(text: dict, name: str) -> Triple | None:
+    """Light of a material itself; ``None`` if there is none."""
+    given, strength = text.get("emissiveFactor", [0, 0, 0]), extension_of(text, _STRENGTH)
+    factor = strength.get("emissiveStrength", 1)
+    for key, value, numbers in (
+        ("emissiveFactor", given, given),
+        ("emissiveStrength", factor, [factor] * 3),
+    ):
+        if not _are_numbers(numbers, 3) or not all(0 <= number < math.inf for number in numbers):
+            what = "three numbers" if numbers is given else "a number"
+            raise Refused(
+                f"material {name!r} has {key} {shown(str(value))!r}, not {what} from 0", ONE_MATERIAL
+            )
+    red, green, blue = (float(channel) * float(factor) for channel in given)
+    return (red, green, blue) if red or green or blue else None
+
+
+def _tell_look(text: dict, look: dict, info: dict | None, alpha: float, found: Found) -> None:
     """Tell what changes the look of a material and is not read."""
+    if has_extension(text, GLOSSY):
+        # The other factors are for programs that do not know the extension.
+        text = {key: value for key, value in text.items() if key != "pbrMetallicRoughness"}
     extensions = list(_extension_names(text))
-    found.tell("texture", "textures", sum(key.endswith("Texture") for part in _parts(text) for key in part))
+    textures = (
+        key for part in _parts(text) for key in part if key.endswith("Texture") and part[key] is not info
+    )
+    found.tell_names("textures", textures)
     mode, cutoff = text.get("alphaMode", "OPAQUE"), text.get("alphaCutoff", 0.5)
     least = 1.0 if mode == "BLEND" else cutoff
     kind = "of materials"
-    if mode != "OPAQUE" and (
-        "baseColorTexture" in look or not isinstance(least, int | float) or alpha < least
-    ):
+    if mode != "OPAQUE" and (not isinstance(least, int | float) or alpha < least):
         found.tell_names(kind, [f"alpha (alphaMode {mode})"])
-    if text.get("emissiveFactor", [0, 0, 0]) != [0, 0, 0]:
-        found.tell_names(kind, ["emission (emissiveFactor)"])
-    found.tell_names(kind, extensions, _SILENT)
+    found.tell_names(kind, extensions, _SILENT | _READ)
     found.tell_names(kind, text, _KNOWN["materials"] | _ANY)
-    found.tell_names(kind, look, _KNOWN["pbrMetallicRoughness"] | _ANY)
+    found.tell_names(kind, look, _KNOWN["factors"] | _ANY)
 
 
 def _parts(part: Any) -> Iterator[dict]:
@@ -273,7 +324,7 @@ def tell_contents(document: dict, found: Found) -> None:
     found.tell("skin", "skins", len(skins))
     found.tell("animation", "animations", len(document.get("animations", [])))
     found.tell("camera", "cameras", sum("camera" in node for node in nodes))
-    lights = sum("light" in _extension(node, "KHR_lights_punctual") for node in nodes)
+    lights = sum("light" in extension_of(node, "KHR_lights_punctual") for node in nodes)
     found.tell("light (KHR_lights_punctual)", "lights (KHR_lights_punctual)", lights)
     primitives = [primitive for mesh in meshes for primitive in mesh["primitives"]]
     attributes = {name for primitive in primitives for name in primitive["attributes"]}

@@ -1,7 +1,5 @@
 """Arrays of glTF files: quantised arrays as floats, fans as triangles, instances as nodes."""
 
-import base64
-import binascii
 import math
 import os
 import struct
@@ -11,12 +9,14 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from blysk.sim.meshes.gltf_parts import MESHOPT, data_of_uri, listed, view_bytes, whole
+from blysk.sim.meshes.gltf_textures import color_texture, texture_coordinates, texture_set
 from blysk.sim.meshes.materials import Found
-from blysk.sim.meshes.refusal import REEXPORT, Refused, inside, shown
+from blysk.sim.meshes.refusal import ONE_MATERIAL, REEXPORT, Refused, inside, shown
 from blysk.sim.meshes.strips import strip_triangles
 from blysk.sim.run_files import reads
 
-__all__ = ["MESHOPT", "check_arrays", "gltf_buffers", "plain_arrays"]
+__all__ = ["check_arrays", "gltf_buffers", "plain_arrays"]
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _FLOAT, _INDEX = 5126, (5121, 5123, 5125)
@@ -28,64 +28,47 @@ _MAX_INSTANCES = 100_000
 _DRACO = "KHR_draco_mesh_compression"
 _LINES, _STRIP, _FAN, _MODES = 3, 5, 6, 7
 _READ = ("POSITION", "NORMAL")
-MESHOPT = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
-"""Extensions of compressed views without a decoder. A view is read if the plain data is there, too."""
-
-
-def _listed(document: dict, name: str) -> list[dict]:
-    """An array of objects of a document."""
-    rows = document.get(name, [])
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise Refused(f"its {name} are not a list of objects")
-    return rows
-
-
-def _whole(value: Any, what: str, below: float = math.inf) -> int:
-    """Check a whole number: 0 or more, as Python would count a negative index from the end."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise Refused(f"it has {what} {shown(str(value))}, not a whole number from 0")
-    if value >= below:
-        raise Refused(f"it has {what} {value} (from 0), but there are {below}")
-    return value
+# Types of numbers of COLOR_0 and of texture coordinates, the latter with KHR_mesh_quantization.
+_COLORS, _COORDINATES = (5121, 5123, _FLOAT), (5120, 5121, 5122, 5123, _FLOAT)
 
 
 def check_arrays(document: dict) -> None:
     """Refuse references between the parts of a document that are negative or lead nowhere."""
     lists = {
-        name: _listed(document, name)
+        name: listed(document, name)
         for name in ("accessors", "bufferViews", "buffers", "meshes", "nodes", "scenes", "skins")
     }
     counts = {name: len(rows) for name, rows in lists.items()}
     for view in lists["bufferViews"]:
-        _whole(view["buffer"], "a view of buffer", counts["buffers"])
+        whole(view["buffer"], "a view of buffer", counts["buffers"])
         for name in ("byteOffset", "byteStride"):
-            _whole(view.get(name, 0), f"the {name}")
-        _whole(view["byteLength"], "the byteLength")
+            whole(view.get(name, 0), f"the {name}")
+        whole(view["byteLength"], "the byteLength")
     for accessor in lists["accessors"]:
-        _whole(accessor["count"], "an array of the count")
-        _whole(accessor.get("byteOffset", 0), "the byteOffset")
+        whole(accessor["count"], "an array of the count")
+        whole(accessor.get("byteOffset", 0), "the byteOffset")
         if "bufferView" in accessor:
-            _whole(accessor["bufferView"], "an array in the view", counts["bufferViews"])
+            whole(accessor["bufferView"], "an array in the view", counts["bufferViews"])
     for mesh in lists["meshes"]:
-        for primitive in _listed(mesh, "primitives"):
-            _whole(primitive.get("mode", 4), "the primitive mode", _MODES)
+        for primitive in listed(mesh, "primitives"):
+            whole(primitive.get("mode", 4), "the primitive mode", _MODES)
             for index in primitive["attributes"].values():
-                _whole(index, "a mesh with the accessor", counts["accessors"])
+                whole(index, "a mesh with the accessor", counts["accessors"])
             if "indices" in primitive:
-                _whole(primitive["indices"], "a mesh with the indices' accessor", counts["accessors"])
+                whole(primitive["indices"], "a mesh with the indices' accessor", counts["accessors"])
     for node in lists["nodes"]:
         if "mesh" in node:
-            _whole(node["mesh"], "a node with the mesh", counts["meshes"])
+            whole(node["mesh"], "a node with the mesh", counts["meshes"])
     if "scene" in document:
-        _whole(document["scene"], "the scene", counts["scenes"])
+        whole(document["scene"], "the scene", counts["scenes"])
 
 
 def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list[bytes]:
     """Bytes of a document's buffers, from the document, the GLB file, or files of its folder."""
     buffers = []
-    for number, buffer in enumerate(_listed(document, "buffers")):
+    for number, buffer in enumerate(listed(document, "buffers")):
         uri = buffer.get("uri")
-        length = _whole(buffer.get("byteLength", 0), "the byteLength")
+        length = whole(buffer.get("byteLength", 0), "the byteLength")
         if uri is None and any(
             buffer.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT
         ):
@@ -96,10 +79,7 @@ def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list
         elif not isinstance(uri, str):
             raise Refused(f"its buffer {number} has no data")
         elif uri.startswith("data:"):
-            try:
-                found = base64.b64decode(uri.partition("base64,")[2])
-            except (binascii.Error, ValueError):
-                raise Refused(f"the text of its buffer {number} is not base64") from None
+            found = data_of_uri(uri, f"its buffer {number}")
         else:
             found = _beside(folder, uri)
         if len(found) < length:
@@ -130,6 +110,12 @@ def _glb_chunk(data: bytes) -> bytes:
     return b""
 
 
+def _normalised(values: np.ndarray, kind: np.dtype) -> np.ndarray:
+    """Whole numbers of a kind as glTF scales them, to 1 at most."""
+    scaled: np.ndarray = np.maximum(values / np.iinfo(kind).max, -1.0)
+    return scaled
+
+
 class _Arrays:
     """The accessors of a document, and the arrays that are put in their place."""
 
@@ -146,7 +132,7 @@ class _Arrays:
         if "bufferView" in accessor:
             values = self._rows(accessor, count, kind, width)
         if sparse := accessor.get("sparse"):
-            few = _whole(sparse["count"], "the count of a sparse array", count + 1)
+            few = whole(sparse["count"], "the count of a sparse array", count + 1)
             where = sparse["indices"]
             places = self._rows(where, few, np.dtype(_TYPES[where["componentType"]]), 1)[:, 0]
             if few and not 0 <= places.min() <= places.max() < count:
@@ -154,32 +140,21 @@ class _Arrays:
             values = values.copy()
             values[places.astype(np.int64)] = self._rows(sparse["values"], few, kind, width)
         if accessor.get("normalized") and kind.kind != "f":
-            return np.maximum(values / np.iinfo(kind).max, -1.0)
+            return _normalised(values, kind)
         return values.astype(np.float64 if kind.kind == "f" else np.int64)
 
     def _rows(self, part: dict, count: int, kind: np.dtype, width: int) -> np.ndarray:
         """Rows of the view that a part of the document names."""
         views = self.document.get("bufferViews", [])
-        view = views[_whole(part["bufferView"], "an array in the view", len(views))]
-        data = self._bytes(view)
+        view = views[whole(part["bufferView"], "an array in the view", len(views))]
+        data = view_bytes(view, self.buffers)
         step = view.get("byteStride") or kind.itemsize * width
-        start = _whole(part.get("byteOffset", 0), "the byteOffset")
+        start = whole(part.get("byteOffset", 0), "the byteOffset")
         if count == 0:
             return np.zeros((0, width), kind)
         if start + (count - 1) * step + kind.itemsize * width > len(data) or step < kind.itemsize * width:
             raise Refused(f"an array of {count} elements does not fit into its view")
         return np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
-
-    def _bytes(self, view: dict) -> bytes:
-        """Bytes of a view."""
-        data = self.buffers[view["buffer"]][view.get("byteOffset", 0) :][: view["byteLength"]]
-        compressed = sorted(MESHOPT.intersection(view.get("extensions", {})))
-        if len(data) < view["byteLength"] and compressed:
-            raise Refused(
-                f"it is compressed with {compressed[0]}, for which there is no decoder",
-                "export it uncompressed",
-            )
-        return data
 
     def decoded(self, primitive: dict) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Attributes and corners of Draco-compressed data; `Refused` if its decoder refuses it."""
@@ -187,7 +162,8 @@ class _Arrays:
 
         compressed = primitive["extensions"][_DRACO]
         views = self.document.get("bufferViews", [])
-        data = self._bytes(views[_whole(compressed.get("bufferView"), "Draco-compressed data", len(views))])
+        place = whole(compressed.get("bufferView"), "Draco-compressed data", len(views))
+        data = view_bytes(views[place], self.buffers)
         try:
             mesh = DracoPy.decode(data)
             names = {number: name for name, number in compressed["attributes"].items()}
@@ -227,6 +203,26 @@ class _Arrays:
             values = np.where(near, values / np.where(near, length, 1.0), values)
         return values
 
+    def look(self, index: int, name: str, decoded: dict[str, np.ndarray]) -> np.ndarray:
+        """Values of COLOR_0, 0 to 1 if they are whole numbers, or of texture coordinates."""
+        accessor = self.document["accessors"][index]
+        kind, shape = accessor["componentType"], accessor["type"]
+        of_colors = name == "COLOR_0"
+        shapes, kinds = (("VEC3", "VEC4"), _COLORS) if of_colors else (("VEC2",), _COORDINATES)
+        if shape not in shapes:
+            raise Refused(
+                f"its {name} is of the type {shown(str(shape))}, not {' or '.join(shapes)}", ONE_MATERIAL
+            )
+        if kind not in kinds:
+            raise Refused(f"its {name} has the componentType {shown(str(kind))}", ONE_MATERIAL)
+        scaled = accessor.get("normalized") is True and kind != _FLOAT
+        if of_colors and not scaled and kind != _FLOAT:
+            raise Refused(f"its {name} has whole numbers that are not normalised", ONE_MATERIAL)
+        if name not in decoded:
+            return self.read(index).astype(np.float64)
+        values = decoded[name].astype(np.float64)
+        return _normalised(values, np.dtype(_TYPES[kind])) if scaled else values
+
     def document_parts(self) -> tuple[dict, bytes]:
         """Accessors, views and the buffer of the arrays that were added."""
         views, accessors, offset = [], [], 0
@@ -242,8 +238,12 @@ class _Arrays:
         )
 
 
-def plain_arrays(document: dict, buffers: list[bytes], found: Found) -> bytes:
-    """Put a document into a form of triangles alone, which trimesh reads right; return its one buffer.
+def plain_arrays(
+    document: dict, buffers: list[bytes], materials: list[dict] | None, found: Found
+) -> tuple[bytes, list[dict[str, Any]]]:
+    """Put a document into a form of triangles alone, which trimesh reads right.
+
+    Each primitive has a material of its own, with the primitive's number as name.
 
     By itself trimesh scales no normalised whole numbers, reads no sparse arrays, leaves out triangle fans,
     and draws only one of a node's instances. Parts of points and lines are told.
@@ -254,10 +254,21 @@ def plain_arrays(document: dict, buffers: list[bytes], found: Found) -> bytes:
         Document after `check_arrays`. It is changed.
     buffers : list of bytes
         From `gltf_buffers`.
+    materials : list of dict or None
+        Materials of the document. ``None``: they do not count, and colours of vertices do not either.
     found : Found
         Takes the contents that are left out.
+
+    Returns
+    -------
+    buffer : bytes
+        The one buffer.
+    looks : list of dict
+        Of each primitive: ``"material"``, the number of its material from 1, 0 for none; ``"colors"`` and
+        ``"coordinates"``, float64 arrays of colours and texture coordinates of its vertices, or ``None``.
     """
     arrays = _Arrays(document, buffers)
+    looks: list[dict[str, Any]] = []
     for mesh in document.get("meshes", []):
         solid = [p for p in mesh["primitives"] if p.get("mode", 4) > _LINES]
         found.tell(
@@ -265,7 +276,11 @@ def plain_arrays(document: dict, buffers: list[bytes], found: Found) -> bytes:
         )
         drawn = [primitive for primitive in solid if "POSITION" in primitive["attributes"]]
         found.tell("part without positions", "parts without positions", len(solid) - len(drawn))
-        mesh["primitives"] = [_plain_primitive(primitive, arrays, found) for primitive in drawn]
+        mesh["primitives"] = []
+        for primitive in drawn:
+            plain, look = _plain_primitive(primitive, arrays, materials, found)
+            mesh["primitives"].append({**plain, "material": len(looks)})
+            looks.append(look)
     _plain_instances(document, arrays)
     for node in document["nodes"]:
         # trimesh would lose the nodes below.
@@ -273,11 +288,15 @@ def plain_arrays(document: dict, buffers: list[bytes], found: Found) -> bytes:
             del node["mesh"]
     parts, buffer = arrays.document_parts()
     document |= parts
-    return buffer
+    document["materials"] = [{"name": str(number)} for number in range(len(looks))]
+    return buffer, looks
 
 
-def _plain_primitive(primitive: dict, arrays: _Arrays, found: Found) -> dict:
-    """A primitive of triangles with floats for positions and normals."""
+def _plain_primitive(
+    primitive: dict, arrays: _Arrays, materials: list[dict] | None, found: Found
+) -> tuple[dict, dict[str, Any]]:
+    """A primitive of triangles with floats for positions and normals, and its look."""
+    decoded: dict[str, np.ndarray] = {}
     accessors = arrays.document["accessors"]
     given = {name: primitive["attributes"][name] for name in _READ if name in primitive["attributes"]}
     used = [*given.values(), *([primitive["indices"]] if "indices" in primitive else [])]
@@ -308,7 +327,44 @@ def _plain_primitive(primitive: dict, arrays: _Arrays, found: Found) -> dict:
         raise Refused(f"a part of triangles has {len(corners)} corners, not a multiple of 3")
     plain = {"attributes": {name: arrays.add(values) for name, values in vectors.items()}}
     plain["indices"] = arrays.add(corners.ravel())
-    return plain | ({"material": primitive["material"]} if "material" in primitive else {})
+    if materials is None:
+        return plain, {"material": 0, "colors": None, "coordinates": None}
+    number = primitive.get("material")
+    material = {} if number is None else materials[number]
+    colors, coordinates = _looks(
+        primitive["attributes"], material, len(vectors["POSITION"]), arrays, decoded, found
+    )
+    return plain, {
+        "material": 0 if number is None else number + 1,
+        "colors": colors,
+        "coordinates": coordinates,
+    }
+
+
+def _looks(
+    attributes: dict,
+    material: dict,
+    count: int,
+    arrays: _Arrays,
+    decoded: dict[str, np.ndarray],
+    found: Found,
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Colours and texture coordinates of a primitive's vertices; ``None`` where there are none."""
+    info = color_texture(material)
+    names = ["COLOR_0", *([] if info is None else [texture_set(info)])]
+    values = {name: arrays.look(attributes[name], name, decoded) for name in names if name in attributes}
+    for name in [name for name in values if len(values[name]) != count]:
+        found.tell(f"{name} of another number than positions")
+        del values[name]
+    colors, coordinates = values.get("COLOR_0"), values.get(names[-1])
+    if colors is not None:
+        mode = material.get("alphaMode", "OPAQUE")
+        if mode != "OPAQUE" and (colors[:, 3:] < 1).any():
+            found.tell_names("of materials", [f"alpha (alphaMode {mode})"])
+        colors = colors[:, :3]
+    if info is None or coordinates is None:
+        return colors, None
+    return colors, texture_coordinates(info, coordinates)
 
 
 def _plain_instances(document: dict, arrays: _Arrays) -> None:
@@ -322,7 +378,7 @@ def _plain_instances(document: dict, arrays: _Arrays) -> None:
         columns = {}
         for name, width in (("TRANSLATION", 3), ("ROTATION", 4), ("SCALE", 3)):
             if name in attributes:
-                index = _whole(attributes[name], "instances with the accessor", len(document["accessors"]))
+                index = whole(attributes[name], "instances with the accessor", len(document["accessors"]))
                 columns[name.lower()] = values = arrays.read(index).astype(np.float64)
                 if values.shape[1] != width or not np.isfinite(values).all():
                     raise Refused(f"the {name} of its instances are not {width} finite numbers each")

@@ -26,6 +26,7 @@ from blysk.sim.meshes.gltf import (
     tell_contents,
 )
 from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
+from blysk.sim.meshes.gltf_textures import GltfTextures
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.mesh_path import check_mesh_path
 from blysk.sim.meshes.normals import (
@@ -122,16 +123,32 @@ def load_mesh(
     are not applied. A glTF file without scenes shows its root nodes. Invisible nodes (KHR_node_visibility)
     are left out. Texts may begin with a byte order mark, and have any ends of lines.
 
-    *Materials.* Of a GLB or glTF file these are read: the base colour without its alpha, metallic and
-    roughness factors of ``pbrMetallicRoughness``, each 1 if missing (see `Material.of_metallic_roughness`),
-    and ``doubleSided``. Of an OBJ file these are read from the ``mtllib`` files in its folder: ``Kd``, ``Ks``
-    and ``Ns`` (rounded, at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of
-    glTF are linear, as k_d is, and the picture is written without a transfer curve. So they are used without
-    conversion, and Kd, too. If a material file is missing, or lacks a name, the colours are ``None``.
-    Materials of no face are left out, and equal materials merged. PLY and STL files have one material.
+    *Materials.* Of a GLB or glTF file these are read:
 
-    Contents that change a picture and are not read are in ``ignored``: textures, vertex colours, alpha,
-    emission, ``illum``, smoothing groups, lights, cameras, animations. Each reader has a list of the
+    - the base colour without its alpha, metallic and roughness factors of ``pbrMetallicRoughness``, each 1 if
+      missing (see `Material.of_metallic_roughness`);
+    - the factors of KHR_materials_pbrSpecularGlossiness, which replace them (see
+      `Material.of_specular_glossiness`);
+    - ``emissiveFactor``, with KHR_materials_emissive_strength, unless it has a texture;
+    - KHR_materials_unlit and ``doubleSided``;
+    - the texture of the colour, see `load_texture`: its sampler, its set of coordinates,
+      KHR_texture_transform, and its image in the buffer, in the text or in a file of the folder;
+    - colours of vertices, COLOR_0, without alpha.
+
+    A sampler's filter for enlarging serves both ways. Levels are chosen, not blended.
+
+    Of an OBJ file these are read from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded,
+    at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of glTF are linear, as
+    k_d is, and the picture is written without a transfer curve. So they are used without conversion, and Kd,
+    too. If a material file is missing, or lacks a name, the colours are ``None``. Materials of no face are
+    left out, and equal materials merged. PLY and STL files have one material.
+
+    *Looks.* In a mesh with colours of vertices other vertices are white. Colours over 1 count as 1, and are
+    told. Corners of equal normal are welded only if their colours and texture coordinates are equal, too. A
+    part without texture coordinates is drawn without its texture, and so is a part whose image is not there.
+
+    Contents that change a picture and are not read are in ``ignored``: other textures, alpha, ``illum``,
+    smoothing groups, lights, cameras, animations. Each reader has a list of the
     statements, keywords, properties, keys and extensions that it knows. Others are in ``ignored`` by their
     names.
 
@@ -145,7 +162,7 @@ def load_mesh(
     crease_angle : float
         Degrees, 0 to 180. At 0 only coplanar faces share a normal, at 180 all faces do.
     materials : bool
-        Whether to read the file's materials. If not, all faces have one material without values.
+        Whether to read the file's materials and colours. If not, all faces have one material without values.
 
     Returns
     -------
@@ -165,6 +182,7 @@ def load_mesh(
         - it holds no triangle, a vertex that is not finite, an index out of range, nodes that form no trees,
           or more than 20 million triangles;
         - a used material has a colour that is not three numbers from 0 to 1, or an exponent over 1000;
+        - an image, colour, texture coordinate, sampler or transform that is used is damaged or out of range;
         - more than 1024 materials are in use.
     """
     if not 0 <= crease_angle <= 180:
@@ -321,7 +339,7 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     import trimesh
 
     suffix = path.suffix.lower()
-    references, options, found = {}, {"skip_materials": True}, Found()
+    references, options, found, looks = {}, {"skip_materials": True}, Found(), []
     if suffix == ".obj":
         data, libraries = split_obj(data, found)
         for name in libraries:
@@ -341,18 +359,23 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     else:
         document = gltf_document(data, suffix, found)
         check_gltf(document)
-        uris = [image.get("uri") for image in document.get("images", []) if isinstance(image, dict)]
+        images = document.get("images")
+        images = images if isinstance(images, list) else []
+        uris = [image.get("uri") for image in images if isinstance(image, dict)]
         refers(path.parent, *(unquote(uri) for uri in uris if isinstance(uri, str) and len(uri) < 4096))
         buffers = gltf_buffers(document, data, suffix, path.parent)
         complete_scene(document, found)
-        find_gltf_materials(document, materials, found)
+        textures = GltfTextures(document, buffers, path.parent, found)
+        texts = find_gltf_materials(document, materials, textures, found)
         tell_contents(document, found)
-        references = {"0": plain_arrays(document, buffers, found)}
+        references["0"], looks = plain_arrays(document, buffers, texts, found)
         data = plain_gltf(document)
         options["skip_materials"], suffix = False, ".gltf"
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type=suffix[1:], resolver=references, process=False, **options
     )
+    for geometry in scene.geometry.values() if looks else ():
+        geometry.metadata.update(looks[int(geometry.visual.material.name)])
     return scene, found
 
 
@@ -490,13 +513,12 @@ def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
     return [(matrix, name) for matrix, name in names if name is not None]
 
 
-def _number(name: str, geometry: object, path: Path) -> int:
+def _number(name: str, geometry: "trimesh.Trimesh", path: Path) -> int:
     """Number of the material of a part of a mesh."""
     suffix = path.suffix.lower()
     if suffix == ".obj":
         return int(name) if name.isdecimal() else 0
-    material = getattr(getattr(geometry, "visual", None), "material", None)
-    return 0 if material is None or suffix not in (".glb", ".gltf") else int(material.name)
+    return geometry.metadata["material"] if suffix in (".glb", ".gltf") else 0
 
 
 def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:

@@ -121,7 +121,7 @@ GLTF_TOLD = {
     "skin": (lambda d: (with_node(skin=0)(d), d.update(skins=[{"joints": [0]}])), ("1 skin",)),
     "morph": (lambda d: d["meshes"][0].update(weights=[1]), ("1 mesh with morph weights",)),
     "morph of 0": (lambda d: (with_part(targets=[{"POSITION": 0}])(d), with_node(weights=[0])(d)), ()),
-    "colours": (lambda d: primitive(d)["attributes"].update(COLOR_0=0), ("vertex colours",)),
+    "colours": (lambda d: primitive(d)["attributes"].update(COLOR_1=0), ("attributes: COLOR_1",)),
     "tangents": (
         lambda d: primitive(d)["attributes"].update(TANGENT=0, TEXCOORD_1=0, _OWN=0, JOINTS_0=0),
         (),
@@ -201,11 +201,11 @@ MATERIAL_TOLD = [
     (base(1, 0, 0, 0.6, alphaMode="MASK"), ()),
     (base(1, 0, 0, 0.6, alphaMode="MASK", alphaCutoff=0.7), "alpha (alphaMode MASK)"),
     (base(1, 0, 0, 1, emissiveFactor=[0, 0, 0]), ()),
-    (base(1, 0, 0, 1, emissiveFactor=[1, 0, 0]), "emission (emissiveFactor)"),
-    (base(1, 0, 0, 1, **extended("KHR_materials_unlit")), "KHR_materials_unlit"),
+    (base(1, 0, 0, 1, emissiveFactor=[1, 0, 0]), ()),
+    (base(1, 0, 0, 1, **extended("KHR_materials_unlit")), ()),
     (
-        base(1, 0, 0, 1, **extended("KHR_materials_pbrSpecularGlossiness", diffuseFactor=[1, 0, 0, 1])),
-        "KHR_materials_pbrSpecularGlossiness",
+        base(1, 0, 0, 1, **extended("KHR_materials_pbrSpecularGlossiness", diffuse=[1, 0, 0, 1])),
+        "diffuse",
     ),
     (
         base(1, 0, 0, 1, extensions={"KHR_materials_clearcoat": {}, "KHR_materials_sheen": {}}),
@@ -229,13 +229,13 @@ def test_gltf_materials_that_are_not_read_whole(tmp_path, material, told):
     assert load(tmp_path / "a.glb", (document, buffer)).ignored == ()
 
 
-def test_textures_in_extensions_are_counted(tmp_path):
-    textures = {
-        "diffuseTexture": {"index": 0, **extended("KHR_texture_transform")},
-        "specularGlossinessTexture": {},
-    }
-    material = base(1, 0, 0, 1, **extended("KHR_materials_pbrSpecularGlossiness", **textures))
-    told = ("2 textures", "of materials: KHR_materials_pbrSpecularGlossiness")
+def test_textures_that_are_not_read_are_named(tmp_path):
+    material = base(1, 0, 0, 1, **extended("KHR_materials_sheen", sheenColorTexture={}))
+    material |= {"normalTexture": {"index": 0, **extended("KHR_texture_transform")}, "occlusionTexture": {}}
+    told = (
+        "textures: normalTexture, occlusionTexture, sheenColorTexture",
+        "of materials: KHR_materials_sheen",
+    )
     assert load(tmp_path / "a.glb", material_gltf([material], [0])).ignored == told
 
 

@@ -1,0 +1,62 @@
+"""Parts of glTF documents: checked references, extensions, views, and data in texts."""
+
+import base64
+import binascii
+import math
+from typing import Any
+
+from blysk.sim.meshes.refusal import REEXPORT, Refused, shown
+
+__all__ = ["MESHOPT", "data_of_uri", "extension_of", "has_extension", "listed", "view_bytes", "whole"]
+
+MESHOPT = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
+"""Extensions of compressed views without a decoder. A view is read if the plain data is there, too."""
+
+
+def has_extension(part: dict, name: str) -> bool:
+    """Whether a part of a document has an extension."""
+    extensions = part.get("extensions", {})
+    return isinstance(extensions, dict) and name in extensions
+
+
+def extension_of(part: dict, name: str) -> dict:
+    """An extension of a part of a document; empty if it has none."""
+    extension = part["extensions"][name] if has_extension(part, name) else {}
+    return extension if isinstance(extension, dict) else {}
+
+
+def listed(document: dict, name: str) -> list[dict]:
+    """An array of objects of a document; `Refused` if it is none."""
+    rows = document.get(name, [])
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise Refused(f"its {name} are not a list of objects")
+    return rows
+
+
+def whole(value: Any, what: str, below: float = math.inf, remedy: str = REEXPORT) -> int:
+    """A whole number from 0; `Refused` if it is none, as Python would count a negative index from the end."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise Refused(f"it has {what} {shown(str(value))}, not a whole number from 0", remedy)
+    if value >= below:
+        raise Refused(f"it has {what} {value} (from 0), but there are {below}", remedy)
+    return value
+
+
+def data_of_uri(uri: str, what: str, remedy: str = REEXPORT) -> bytes:
+    """Bytes in the text of a reference; `Refused` if it is not base64."""
+    try:
+        return base64.b64decode(uri.partition("base64,")[2])
+    except (binascii.Error, ValueError):
+        raise Refused(f"the text of {what} is not base64", remedy) from None
+
+
+def view_bytes(view: dict, buffers: list[bytes]) -> bytes:
+    """Bytes of a view; `Refused` if only their compressed form is there."""
+    data = buffers[view["buffer"]][view.get("byteOffset", 0) :][: view["byteLength"]]
+    compressed = sorted(MESHOPT.intersection(view.get("extensions", {})))
+    if len(data) < view["byteLength"] and compressed:
+        raise Refused(
+            f"it is compressed with {compressed[0]}, for which there is no decoder",
+            "export it uncompressed",
+        )
+    return data
