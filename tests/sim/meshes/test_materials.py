@@ -341,7 +341,7 @@ RANGE = "not three numbers from 0 to 1"
         ([base(0, 0, 1)], 0, "has baseColorFactor '[0, 0, 1]'"),
         *(([base(0, 0, value, 1)], 0, RANGE) for value in (1.5, -0.5, 10**400, True, "1")),
         ([{"pbrMetallicRoughness": {"baseColorFactor": {"r": 1}}}], 0, RANGE),
-        ([{"pbrMetallicRoughness": [1]}], 0, RANGE),
+        ([{"pbrMetallicRoughness": [1]}], 0, "has pbrMetallicRoughness '[1]', not an object"),
         *(
             ([{"pbrMetallicRoughness": {key: value}}], 0, f"has {key} '{value}', not a number from 0 to 1")
             for key, value in (("metallicFactor", 2), ("roughnessFactor", -0.5), ("roughnessFactor", True))
