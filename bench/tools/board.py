@@ -25,6 +25,7 @@ from blysk.bench.tools.tool_runner import ToolError
 from blysk.golden.frames.compare import BORDER, compare_image
 from blysk.golden.gpu import Gpu
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import SPACES
 from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
 from blysk.golden.video.draw_unit import turned
 from blysk.hdl.emit.processes import run_program
@@ -119,7 +120,8 @@ def design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator
     design = drawing.renderer.design
     style = "compact" if design.build.compact_geometry else "fast"
     lights = "1 light" if design.lights == 1 else f"{design.lights} lights"
-    yield f"{'shading':<12}{design.method}, {design.model}, {lights}, {style} geometry"
+    codes = f"codes of {SPACES[design.transfer]}"
+    yield f"{'shading':<12}{design.method}, {design.model}, {lights}, {style} geometry, {codes}"
     bits = "".join(map(str, buffer.colour_bits))
     yield f"{'display':<12}640x480 at 60 Hz, bands of {buffer.lines} lines, RGB{bits}"
     rates = ", ".join(f"{name} {float(rate) / 1e6:.6g} MHz" for name, rate in plan.rates.items())
@@ -241,8 +243,9 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
     figures = compare_image(exact, gpu.drawing.renderer.design, shown.frames[0])
     for kind, error in (("method", figures.method_error), ("total", figures.total_error)):
         yield (
-            f"{'error':<12}{kind:<7} largest {error.max_lsb:.2f} LSB, {error.p999_lsb:.2f} at 99.9 %, "
-            f"{error.psnr_db:.1f} dB, against {reference_of(kind, figures.target)}"
+            f"{'error':<12}{kind:<7} largest {error.max_lsb:.2f} LSB of {SPACES[figures.transfer]}, "
+            f"{error.p999_lsb:.2f} at 99.9 %, {error.psnr_db:.1f} dB, against "
+            f"{reference_of(kind, figures.target)}"
         )
     at_border = f"{figures.border_pixels:,} pixels have {figures.border} at most {BORDER:g}"
     yield f"{'':<12}errors are of the first frame, {figures.visible_pixels:,} pixels; {at_border}"

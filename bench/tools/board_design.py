@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from blysk.bench.tools.board_options import COLOURS, DEFAULTS
 from blysk.bench.tools.boards import Board
+from blysk.golden.frames.frame import background_code
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID
 from blysk.golden.gpu import Gpu
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -83,8 +84,8 @@ def gpu_of(
         (scene,) = scenes_of(loaded, settings)
         design = _design(settings, scene, board)
     scenes = _presets(scene, settings["up"])
-    background = tuple(round(255 * channel) for channel in scene.background)
-    buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=background)
+    red, green, blue = background_code(scene, design.transfer).tolist()
+    buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=(red, green, blue))
     _check_memory(board, mesh, scene, buffer)
     try:
         drawing = Drawing.of(

@@ -135,13 +135,14 @@ _TOLD = {"style": "{}", "setup_interval": "interval {}", "pipes": "{} pipelines"
 
 
 def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
-    """Name of a design in tables: core, method, model, lights, and build options other than the defaults."""
+    """Name of a design in tables: core, method, model, lights, and options other than the defaults."""
     build = design.build
     name = [f"{'pipeline' if build.top == 'shader' else build.top} {design.method}"]
     name += [design.model or "no model"]
     name += [f"{design.lights} lights" if design.lights != 1 else "1 light"]
     name += [operand] if operand else []
     name += ["gate"] if design.gate else []
+    name += [design.transfer] if design.transfer != "linear" else []
     default = vars(Build(top=build.top))
     changed = {option: value for option, value in vars(build).items() if value != default[option]}
     name += [_TOLD.get(option, f"{option} {{}}").format(value) for option, value in changed.items()]

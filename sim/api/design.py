@@ -47,6 +47,8 @@ def design(
         Minimum cycles from one span to the next, for methods with this choice.
     style : {"throughput", "compact"}
         ``throughput``: one pixel a cycle. ``compact``: few multipliers.
+    transfer : {"srgb", "linear"}
+        Codes of the pixels: encoded by the curve of sRGB, or linear light.
 
     Raises
     ------

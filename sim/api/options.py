@@ -17,6 +17,7 @@ from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.light import Triple
 from blysk.golden.reference.lobes import TabulatedModel
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
+from blysk.golden.reference.transfer import TRANSFERS
 from blysk.sim.api.lights import Lights, LightsLike
 from blysk.sim.meshes.normals import DEFAULT_CREASE
 from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, MAX_TRIANGLES, MIN_TRIANGLES
@@ -350,6 +351,12 @@ DESIGN: dict[str, Option] = {
         "throughput: one pixel a cycle. compact: few multipliers.",
         "pipeline.style",
     ),
+    "transfer": Option(
+        Choice("transfer", TRANSFERS),
+        "linear",
+        "Codes of the pixels. srgb: encoded by the curve of sRGB, as monitors expect. linear: linear light.",
+        "pipeline.transfer",
+    ),
 }
 """Options of a design, but for its counts; ``setup_interval`` and ``style`` are fields of `Build`."""
 
@@ -467,6 +474,7 @@ class DesignOptions(TypedDict, total=False):
     gate: bool
     setup_interval: int
     style: Style
+    transfer: Literal["srgb", "linear"]
 
 
 class SharedOptions(TypedDict, total=False):

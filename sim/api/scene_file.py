@@ -108,6 +108,7 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
         method = "quotient"
         model = "blinn"
         style = "throughput"                # "compact"
+        transfer = "linear"                 # "srgb": codes by the curve of sRGB
         gate = false                        # the highlight gate, of other methods
         # operand = "cosine"                # "one_minus_cosine"; for methods that compute unit normals
         # setup_interval = 4                # for methods with this choice

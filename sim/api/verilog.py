@@ -11,6 +11,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.scene import BACK_FACES
+from blysk.golden.reference.transfer import SPACES
 from blysk.golden.render import Renderer
 from blysk.hdl.bus.bus import BusUnit, core_of
 from blysk.hdl.emit.verilog import check_name, emit
@@ -45,6 +46,7 @@ def header_of(unit: ShadingUnit) -> list[str]:
         f"blysk {version('blysk')} shading pipeline, MIT licence",
         f"method {made.method}, model {made.model}, lights {made.lights}, materials {made.materials}, "
         f"{made.build.style} style{gate}",
+        f"transfer {made.transfer}: pixels are codes of {SPACES[made.transfer]}",
         f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a pixel",
         f"a span takes at most max({unit.cycles_per_pixel} length, {unit.setup_interval}) cycles",
         *_several_lines(several, unit),

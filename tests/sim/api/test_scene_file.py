@@ -57,6 +57,7 @@ def test_documented_example(write):
         "method": "quotient",
         "model": "blinn",
         "style": "throughput",
+        "transfer": "linear",
         "gate": False,
     }
     assert file.keys["mesh"] == "mesh.file"
