@@ -1,20 +1,26 @@
 """Images of mesh files: bytes of a picture file to a texture in linear light."""
 
 import io
+import os
 import warnings
+from pathlib import Path
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from blysk.golden.reference.srgb import linear_of_srgb
 from blysk.golden.reference.texture import LARGEST_TEXTURE, Texture
+from blysk.golden.reference.transfer import decode
 from blysk.sim.meshes.materials import Found
-from blysk.sim.meshes.refusal import Refused, shown
+from blysk.sim.meshes.refusal import Refused, inside, shown
+from blysk.sim.run_files import reads
 
-__all__ = ["MAX_PIXELS", "load_texture"]
+__all__ = ["MAX_PIXELS", "NOT_THERE", "OUTSIDE", "find_image", "load_texture", "read_texture"]
 
 MAX_PIXELS = 1 << 26
 """Largest number of pixels of an image, 8192 x 8192."""
+
+NOT_THERE, OUTSIDE = "which does not exist", "outside its folder"
+"""Why a file beside a mesh file is not read."""
 
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA")
 _REMEDY = "save the image again, as PNG or JPEG, or shade the mesh with one material"
@@ -70,16 +76,61 @@ def load_texture(
         if not (kind == "alpha" and opaque):
             found.tell_names(f"{kind} of images", [name])
     size = tuple(min(1 << round(float(np.log2(side))), LARGEST_TEXTURE) for side in image.size)
-    decode = linear_of_srgb(np.arange(256) / 255)
+    light = decode(np.arange(256) / 255)
     if image.size == size:
-        texels = decode[np.asarray(image)]
+        texels = light[np.asarray(image)]
     else:
         texels = np.stack(
-            [_resampled(np.asarray(image.getchannel(c)), decode, size, wrap, filter) for c in "RGB"], axis=-1
+            [_resampled(np.asarray(image.getchannel(c)), light, size, wrap, filter) for c in "RGB"], axis=-1
         )
         of, to = (f"{width} x {height}" for width, height in (image.size, size))
         found.tell_names("sizes of images", [f"{of} (resampled to {to}) of {name}"])
     return Texture(texels, wrap, filter, mipmapped)
+
+
+def find_image(name: str, folder: Path, beside: Path | None = None) -> tuple[Path | None, str]:
+    """The file of an image that a mesh file, or a file beside it, names.
+
+    Of a name in another folder, as of another machine, the last part is looked for, too. A name may end in a
+    comment, after ``#``.
+
+    Parameters
+    ----------
+    name : str
+        The name. Folders are parted by ``/`` or ``\\``.
+    folder : Path
+        Folder of the mesh file, which holds the image or a folder of the image.
+    beside : Path, optional
+        Folder of the file that names the image, looked at first.
+
+    Returns
+    -------
+    tuple of Path or None, and str
+        ``None``, and `NOT_THERE` or `OUTSIDE`, if there is no file.
+    """
+    plain = name.strip().strip('"').replace("\\", "/")
+    bare = plain.partition(" #")[0].strip()
+    reason = NOT_THERE
+    for part in dict.fromkeys([plain, bare, bare.rpartition("/")[2]]):
+        for place in dict.fromkeys([beside or folder, folder]):
+            try:
+                target = inside(folder, part, os.path.relpath(place / part, folder))
+                if os.path.isfile(target):
+                    return target, ""
+            except (Refused, ValueError, OSError):
+                reason = OUTSIDE if part == bare else reason
+    return None, reason
+
+
+def read_texture(path: Path, found: Found, wrap: tuple[str, str] = ("repeat", "repeat")) -> Texture:
+    """Texture of a file, as `load_texture`."""
+    reads(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        reason = f"its image {shown(path.name)!r} cannot be opened ({error.strerror})"
+        raise Refused(reason, _REMEDY) from error
+    return load_texture(data, path.name, found, wrap=wrap)
 
 
 def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
@@ -124,7 +175,7 @@ def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
 
 
 def _resampled(
-    channel: np.ndarray, decode: np.ndarray, size: tuple[int, ...], wrap: tuple[str, str], filter: str
+    channel: np.ndarray, light: np.ndarray, size: tuple[int, ...], wrap: tuple[str, str], filter: str
 ) -> np.ndarray:
     """A channel of codes in linear light at another size. A whole ratio takes means, as levels do."""
     old = channel.shape[::-1]
@@ -137,5 +188,5 @@ def _resampled(
     whole = all(before % after == 0 for before, after in zip(old, size, strict=True))
     kind = Image.Resampling.BOX if whole or filter == "nearest" else Image.Resampling.BILINEAR
     box = (pad[0], pad[1], pad[0] + old[0], pad[1] + old[1])
-    made = Image.fromarray(decode.astype(np.float32)[channel]).resize(size, kind, box)
+    made = Image.fromarray(light.astype(np.float32)[channel]).resize(size, kind, box)
     return np.clip(np.asarray(made, dtype=np.float64), 0, 1)

@@ -29,6 +29,7 @@ from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.gltf_textures import GltfTextures
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.mesh_path import check_mesh_path
+from blysk.sim.meshes.mtl import find_obj_materials
 from blysk.sim.meshes.normals import (
     DEFAULT_CREASE,
     crease_normals,
@@ -36,8 +37,9 @@ from blysk.sim.meshes.normals import (
     repaired_normals,
     transformed,
 )
-from blysk.sim.meshes.obj import find_obj_materials, split_obj, tidy_obj
-from blysk.sim.meshes.ply import read_ply
+from blysk.sim.meshes.obj import read_obj, split_obj
+from blysk.sim.meshes.parts import scene_of
+from blysk.sim.meshes.ply import find_ply_images, read_ply
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused, refers
 from blysk.sim.meshes.stl import read_stl
 from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, teapot
@@ -334,47 +336,42 @@ def _read(path: Path) -> bytes:
 
 
 def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scene, Found]":
-    """Load a file by trimesh, after the checks that trimesh lacks; no file is opened that was not checked."""
-    # Its import takes longer than to draw a small picture; only a file needs it.
-    import trimesh
-
-    suffix = path.suffix.lower()
-    references, options, found, looks = {}, {"skip_materials": True}, Found(), []
+    """A scene of trimesh, glTF by trimesh's loader; no file is opened that was not checked."""
+    suffix, found = path.suffix.lower(), Found()
     if suffix == ".obj":
         data, libraries = split_obj(data, found)
         for name in libraries:
             refers(path.parent, name, *name.split())
+        images = {}
         if materials and len(found.names) > 1:
-            find_obj_materials(libraries, path.parent, found)
-        data = tidy_obj(data, found)
-        options["split_objects"] = True
-    elif suffix == ".ply":
-        head = data.partition(b"end_header")[0].decode("utf-8", "replace")
-        refers(path.parent, *re.findall(r"^comment TextureFile (.+?)\s*$", head, re.MULTILINE))
-        vertices, normals, faces = read_ply(data, found)
-        mesh = trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False)
-        return trimesh.Scene(mesh), found
-    elif suffix == ".stl":
-        return trimesh.Scene(trimesh.Trimesh(*read_stl(data, found), process=False)), found
-    else:
-        document = gltf_document(data, suffix, found)
-        check_gltf(document)
-        images = document.get("images")
-        images = images if isinstance(images, list) else []
-        uris = [image.get("uri") for image in images if isinstance(image, dict)]
-        refers(path.parent, *(unquote(uri) for uri in uris if isinstance(uri, str) and len(uri) < 4096))
-        buffers = gltf_buffers(document, data, suffix, path.parent)
-        complete_scene(document, found)
-        textures = GltfTextures(document, buffers, path.parent, found)
-        texts = find_gltf_materials(document, materials, textures, found)
-        tell_contents(document, found)
-        references["0"], looks = plain_arrays(document, buffers, texts, found)
-        data = plain_gltf(document)
-        options["skip_materials"], suffix = False, ".gltf"
-    scene = trimesh.load_scene(
-        io.BytesIO(data), file_type=suffix[1:], resolver=references, process=False, **options
-    )
-    for geometry in scene.geometry.values() if looks else ():
+            images = find_obj_materials(libraries, path.parent, found)
+        return scene_of(read_obj(data, found, images, materials)), found
+    if suffix == ".ply":
+        parts, names = read_ply(data, found, materials)
+        refers(path.parent, *names)
+        if materials:
+            find_ply_images(names, path.parent, found)
+        return scene_of(parts), found
+    if suffix == ".stl":
+        return scene_of([read_stl(data, found, materials)]), found
+    document = gltf_document(data, suffix, found)
+    check_gltf(document)
+    images = document.get("images")
+    images = images if isinstance(images, list) else []
+    uris = [image.get("uri") for image in images if isinstance(image, dict)]
+    refers(path.parent, *(unquote(uri) for uri in uris if isinstance(uri, str) and len(uri) < 4096))
+    buffers = gltf_buffers(document, data, suffix, path.parent)
+    complete_scene(document, found)
+    textures = GltfTextures(document, buffers, path.parent, found)
+    texts = find_gltf_materials(document, materials, textures, found)
+    tell_contents(document, found)
+    arrays, looks = plain_arrays(document, buffers, texts, found)
+    data = plain_gltf(document)
+    # Its import takes longer than to draw a small picture; only a file needs it.
+    import trimesh
+
+    scene = trimesh.load_scene(io.BytesIO(data), file_type="gltf", resolver={"0": arrays}, process=False)
+    for geometry in scene.geometry.values():
         geometry.metadata.update(looks[int(geometry.visual.material.name)])
     return scene, found
 
@@ -395,8 +392,9 @@ def _assemble(
     import trimesh
 
     nodes = _placed(scene)
-    numbers = {name: _number(name, scene.geometry[name], path) for _, name in nodes}
-    nodes = [(matrix, scene.geometry[name], numbers[name]) for matrix, name in nodes]
+    nodes = [
+        (matrix, scene.geometry[name], scene.geometry[name].metadata["material"]) for matrix, name in nodes
+    ]
     nodes = [node for node in nodes if isinstance(node[1], trimesh.Trimesh) and len(node[1].faces)]
     if not nodes:
         ignored = f" (not read: {'; '.join(found.ignored)})" if found.ignored else ""
@@ -511,14 +509,6 @@ def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
         frames += [(child, matrix @ step) for child, step in below.get(frame, [])]
     names = [(matrix, graph.node_data[frame].get("geometry")) for frame, matrix in frames]
     return [(matrix, name) for matrix, name in names if name is not None]
-
-
-def _number(name: str, geometry: "trimesh.Trimesh", path: Path) -> int:
-    """Number of the material of a part of a mesh."""
-    suffix = path.suffix.lower()
-    if suffix == ".obj":
-        return int(name) if name.isdecimal() else 0
-    return geometry.metadata["material"] if suffix in (".glb", ".gltf") else 0
 
 
 def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:

@@ -1,54 +1,29 @@
-"""OBJ files and their material files, in the form that trimesh reads."""
+"""OBJ files: triangles with normals, colours and texture coordinates."""
 
-import math
-import os
 import re
-from collections.abc import Iterator
-from functools import partial
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 
-from blysk.golden.lighting.specular import MAX_EXPONENT
-from blysk.golden.text import plain_text
-from blysk.sim.meshes.materials import FileMaterial, Found, color_of
-from blysk.sim.meshes.polygons import check_corners, triangulated
-from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, refers, shown
-from blysk.sim.run_files import reads
+from blysk.sim.meshes.colors import vertex_colors
+from blysk.sim.meshes.materials import Found
+from blysk.sim.meshes.mtl import ObjImage, plain_lines
+from blysk.sim.meshes.parts import Part, distinct
+from blysk.sim.meshes.polygons import check_corners, cut_polygons
+from blysk.sim.meshes.refusal import Refused, shown
 
-__all__ = ["find_obj_materials", "split_obj", "tidy_obj"]
+__all__ = ["read_obj", "split_obj"]
 
-# Statements that are read, and those that only name parts; texture coordinates are told with the textures.
+# Statements that are read, and those that only name parts.
 _STATEMENTS = {"usemtl", "mtllib", "o", "g", "s", "vt"}
-# Keywords of materials that are read, and those that count only together with others that are told.
-_KNOWN = {"Kd", "Ks", "Ns", "Pr", "Pm", "Ni", "sharpness", "Pcr", "anisor", "map_aat"}
-# Others, each with its meaning, and with the number that changes nothing.
-_UNREAD = {
-    "d": ("alpha", 1),
-    "Tr": ("alpha", 0),
-    "Tf": ("transmission", 1),
-    "Ke": ("emission", 0),
-    "Ka": ("ambient colour", math.nan),
-    "Ps": ("sheen", 0),
-    "Pc": ("clearcoat", 0),
-    "aniso": ("anisotropy", 0),
-    "illum": ("", 2),
-}
-# Why a material file is not read.
-_REASONS = ("which does not exist", "outside its folder")
-# Bytes of a material file; 100,000 materials take less.
-_MAX_LIBRARY = 16_000_000
-_IMAGE = re.compile(
-    r"^[ \t]*(?:map_\w+|norm|bump|disp|decal|refl)[ \t]+(\S.*)$", re.MULTILINE | re.IGNORECASE
-)
 
 
 def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
     """An OBJ file with an object for each material, named by its number, and the names of its material files.
 
-    Statements of positions, normals, faces and the objects stay, a line for each. Statements of other kinds
-    are told. A backslash at the end of a line continues the line, but not in a comment. The text after ``#``
-    is part of a material's name, as in ``usemtl Material #25``, and no comment.
+    Statements of positions, normals, texture coordinates, faces and the objects stay, a line for each.
+    Statements of other kinds are told. A backslash at the end of a line continues the line, but not in a
+    comment. The text after ``#`` is part of a material's name, as in ``usemtl Material #25``, and no comment.
     """
     numbers = {"": 0}
     libraries = []
@@ -69,145 +44,11 @@ def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
             found.readers.append(None)
         return b"o %d\n" % numbers[rest]
 
-    data = _joined(data)
-    data = re.sub(rb"^[^\S\n]*+(?!(?:vn?|f)(?!\S))(\S++)([^\n]*)\n?", replaced, data, flags=re.MULTILINE)
-    # Texture coordinates have gone.
-    data = re.sub(rb"(?<!\S)(-?[0-9]++)/-?[0-9]*+/(-?[0-9]++)(?!\S)", rb"\1//\2", data)
-    data = re.sub(rb"(?<!\S)(-?[0-9]++)/-?[0-9]*+/?+(?!\S)", rb"\1", data)
-    if smooth and re.search(rb"^[ \t]*f[ \t]+[^\s/]+(?!\S)", data, re.MULTILINE):
+    data = plain_lines(data)
+    data = re.sub(rb"^[^\S\n]*+(?!(?:v[nt]?|f)(?!\S))(\S++)([^\n]*)\n?", replaced, data, flags=re.MULTILINE)
+    if smooth and re.search(rb"^[ \t]*f[ \t]+[^\s/]+(?:/[^\s/]*)?(?!\S)", data, re.MULTILINE):
         found.tell("smoothing groups (--crease says which edges are sharp)")
     return data, libraries
-
-
-def _joined(data: bytes) -> bytes:
-    """A text without comments, each statement in a line of its own; names keep what looks like a comment."""
-
-    def without_comment(line):
-        name = line[1] or b""
-        return name.rstrip(b"\\") if b"#" in name else name
-
-    data = plain_text(data, "replace").encode()
-    names = rb"^([ \t]*(?:usemtl|mtllib|newmtl)(?!\S)[^\n]*)|#[^\n]*"
-    data = re.sub(names, without_comment, data, flags=re.MULTILINE)
-    return re.sub(rb"\\[ \t]*\n", b" ", data)
-
-
-def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> None:
-    """Find the materials' definitions in the material files. A definition is read if a face uses it."""
-    texts, commented = {}, {}
-    for target in dict.fromkeys(file for name in libraries for file in _library_files(name, folder, found)):
-        if target.stat().st_size > _MAX_LIBRARY:
-            raise Refused(
-                f"its material file {shown(target.name)!r} is over {_MAX_LIBRARY:,} bytes", "shorten it"
-            )
-        reads(target)
-        library = _joined(target.read_bytes()).decode()
-        for rest in _IMAGE.findall(library):
-            refers(folder, rest.strip(), rest.split()[-1])
-        for block in re.split(r"^[ \t]*newmtl(?!\S)", library, flags=re.MULTILINE)[1:]:
-            first, _, text = block.partition("\n")
-            texts.setdefault(first.strip(), text)
-            commented.setdefault(first.partition(" #")[0].strip(), text)
-    for number, name in enumerate(found.names[1:], 1):
-        bare = name.partition(" #")[0].strip()
-        text = texts.get(name, texts.get(bare, commented.get(name)))
-        found.readers[number] = None if text is None else partial(_mtl_material, text, shown(name), found)
-    missing = found.readers[1:].count(None)
-    found.tell("material name without a definition", "material names without a definition", missing)
-
-
-def _library_files(name: str, folder: Path, found: Found) -> list[Path]:
-    """Files that a statement names, as a name with spaces, or as several names; others are told."""
-    bare = name.partition(" #")[0].strip()
-    files, reasons = [], {}
-    for part in dict.fromkeys([name, bare, *bare.split()]):
-        try:
-            target = inside(folder, part, part.replace("\\", "/"))
-        except Refused:
-            reasons[part] = _REASONS[1]
-            continue
-        if not os.path.isfile(target):
-            reasons[part] = _REASONS[0]
-        elif part in (name, bare):
-            return [target]
-        else:
-            files.append(target)
-    if name and not files:
-        reasons = {bare: max(reasons.values(), key=_REASONS.index)}
-    for part in bare.split() if files else [bare]:
-        if part in reasons:
-            found.tell(f"the material file {shown(part)!r}, {reasons[part]}")
-    return files
-
-
-def _mtl_material(text: str, name: str, found: Found) -> FileMaterial:
-    """A material of a material file.
-
-    If it has a roughness Pr or a metallic factor Pm, these replace Ks and Ns; a missing Pr is then 1, a
-    missing Pm 0, and a missing Kd white. What else changes its look is told.
-    """
-    values = {}
-    for line in text.split("\n"):
-        keyword, *words = line.split() or [""]
-        if re.match("map_|norm$|bump$|disp$|decal$|refl$", keyword.lower()) and keyword != "map_aat":
-            found.tell("texture", "textures")
-        elif keyword:
-            values[keyword] = words
-    found.tell_names("of materials", _unread(values))
-    colors = {}
-    for keyword in ("Kd", "Ks"):
-        if keyword in values:
-            # One number is for all channels.
-            given = values[keyword] * 3 if len(values[keyword]) == 1 else values[keyword]
-            colors[keyword] = color_of([_float(word) for word in given], keyword, name, " ".join(given))
-    factors = {"Pm": 0.0, "Pr": 1.0}
-    for keyword in factors.keys() & values.keys():
-        given = " ".join(values[keyword])
-        if not 0 <= (number := _float(given)) <= 1:
-            raise Refused(
-                f"material {name!r} has {keyword} {shown(given)!r}, not a number from 0 to 1", ONE_MATERIAL
-            )
-        factors[keyword] = number
-    if factors.keys() & values.keys():
-        base = colors.get("Kd", (1.0, 1.0, 1.0))
-        return FileMaterial.of_metallic_roughness(name, base, *factors.values())
-    exponent = None
-    if "Ns" in values:
-        number = _float(" ".join(values["Ns"]))
-        if not 0 <= number <= MAX_EXPONENT:
-            raise Refused(
-                f"material {name!r} has Ns {shown(' '.join(values['Ns']))!r}, not a number from 0 to "
-                f"{MAX_EXPONENT}",
-                ONE_MATERIAL,
-            )
-        exponent = max(1, math.floor(number + 0.5))
-    return FileMaterial(name, colors.get("Kd"), colors.get("Ks"), exponent)
-
-
-def _unread(values: dict[str, list[str]]) -> Iterator[str]:
-    """Keywords of a material that change its look and are not read, with what they mean."""
-    for keyword, words in values.items():
-        numbers = [_float(word) for word in words]
-        meaning, neutral = _UNREAD.get(keyword, ("", math.nan))
-        if keyword in _KNOWN or (numbers and all(number == neutral for number in numbers)):
-            continue
-        if keyword == "Tr" and "d" in values:
-            continue
-        if keyword == "illum":
-            # 1 is without a highlight.
-            if numbers == [1] and not any(map(_float, values.get("Ks", ["1"]))):
-                continue
-            yield " ".join([keyword, *words])
-        else:
-            yield f"{meaning} ({keyword})" if meaning else keyword
-
-
-def _float(word: str) -> float:
-    """A number, or NaN."""
-    try:
-        return float(word)
-    except ValueError:
-        return math.nan
 
 
 # Possessive: a line is looked at once.
@@ -217,20 +58,34 @@ _CORNER = rb"-?[0-9]++(?:/-?[0-9]*+){0,2}+"
 _END = rb"[ \t]*+\r?$"
 
 
-def tidy_obj(data: bytes, found: Found) -> bytes:
-    """An OBJ file in the form that trimesh reads, with positions of 3 numbers and faces of 3 corners.
+def read_obj(data: bytes, found: Found, images: Mapping[int, ObjImage], painted: bool) -> list[Part]:
+    """Triangles of a text of `split_obj`.
 
-    Lines that trimesh would read wrongly are refused:
+    Parameters
+    ----------
+    data : bytes
+        The text.
+    found : Found
+        Is told what is not read.
+    images : mapping of int to ObjImage
+        Images of materials. Texture coordinates of other materials are left out.
+    painted : bool
+        Whether to read colours of vertices.
 
-    - numbers in another form than C's;
-    - positions with a weight other than 1;
-    - indices that are 0;
-    - missing normals, for which trimesh leaves out all others.
+    Raises
+    ------
+    Refused
+        If a number has another form than C's, or a position has a weight other than 1. If a face has fewer
+        than 3 corners, or an index of what is not there. If a colour is out of range.
     """
-    if re.search(rb"^(?:[ \t]++(?:vn?|f)[ \t]|(?:vn?|f)(?:\t| [ \t]))", data, re.MULTILINE):
-        data = re.sub(rb"^[ \t]*(v|vn|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
+    if re.search(rb"^(?:[ \t]++(?:v[nt]?|f)[ \t]|(?:v[nt]?|f)(?:\t| [ \t]))", data, re.MULTILINE):
+        data = re.sub(rb"^[ \t]*(v[nt]?|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
+    if not images:
+        data = re.sub(rb"(?<!\S)(-?[0-9]++)/-?[0-9]*+/(-?[0-9]++)(?!\S)", rb"\1//\2", data)
+        data = re.sub(rb"(?<!\S)(-?[0-9]++)/-?[0-9]*+/?+(?!\S)", rb"\1", data)
+    colors = None
     if re.search(rb"^vn? (?!%b%b)" % (_THREE, _END), data, re.MULTILINE):
-        data = _positions(data, found)
+        data, colors = _positions(data, found, painted)
     if re.search(rb"^f(?: +[^\s]+){0,2}[ \t]*\r?$", data, re.MULTILINE):
         raise Refused("a face has fewer than 3 corners")
     corners = rb"^f (?!%b(?:[ \t]++%b)*+%b)([^\n]*)" % (_CORNER, _CORNER, _END)
@@ -238,21 +93,100 @@ def tidy_obj(data: bytes, found: Found) -> bytes:
         raise Refused(f"a face has the corners {shown(bad[1].decode().strip())!r}, not indices")
     if re.search(rb"^f .*(?<= )-?0+(?=[/\s]|\Z)", data, re.MULTILINE):
         raise Refused("a face has the vertex index 0; they count from 1")
-    if re.search(rb"^f .*[ /]-\d", data, re.MULTILINE):
+    if re.search(rb"^f\b.*[ \t/]-\d", data, re.MULTILINE):
         data = _absolute(data)
-    normals, faces = (
-        len(re.findall(rb"^vn ", data, re.MULTILINE)),
-        re.findall(rb"^f [^\n]*", data, re.MULTILINE),
-    )
-    used = map(int, set(re.findall(rb"\d/\d*/(\d+)", b"\n".join(faces))))
-    if wrong := [index for index in used if not 1 <= index <= normals]:
-        raise Refused(f"a face has the normal {max(wrong)}, but there are {normals} normals")
-    return _triangular(data)
+    vertices, normals = _rows(data, b"v"), _rows(data, b"vn")
+    coordinates = _coordinates(data) if images else np.zeros((0, 2))
+    triangles, numbers = _triangles(data, vertices, len(coordinates), len(normals))
+    parts = []
+    for number in np.unique(numbers).tolist():
+        keys = triangles[numbers == number].reshape(-1, 3)
+        image = images.get(number)
+        if image is None or image.target is None:
+            keys[:, 1] = 0
+        has_normals = bool((keys[:, 2] > 0).all())
+        if not has_normals:
+            keys[:, 2] = 0
+        first, faces = distinct(keys)
+        corner = keys[first]
+        of_image = None
+        bare = int((corner[:, 1] == 0).sum())
+        if image is not None and bare < len(corner):
+            found.tell(
+                "missing texture coordinates of a vertex", "missing texture coordinates of vertices", bare
+            )
+            of_image = np.concatenate([[[0.0, 1.0]], image.placed(coordinates)])[corner[:, 1]]
+        at = corner[:, 0] - 1
+        parts.append(
+            Part(
+                number,
+                vertices[at],
+                faces.reshape(-1, 3),
+                normals[corner[:, 2] - 1] if has_normals else None,
+                None if colors is None else colors[at],
+                of_image,
+            )
+        )
+    return parts
+
+
+def _rows(data: bytes, keyword: bytes) -> np.ndarray:
+    """Three numbers of each statement."""
+    numbers = b" ".join(re.findall(rb"^%b ([^\n]*)" % keyword, data, re.MULTILINE)).split()
+    return np.array(numbers).astype(np.float64).reshape(-1, 3)
+
+
+def _coordinates(data: bytes) -> np.ndarray:
+    """Texture coordinates, two of each statement, v from below. A missing v is 0."""
+    wrong = rb"^vt (?!%b(?:[ \t]++%b){0,2}+%b)([^\n]*)" % (_NUMBER, _NUMBER, _END)
+    if bad := re.search(wrong, data, re.MULTILINE):
+        raise Refused(f"texture coordinates are {shown(bad[1].decode().strip())!r}, not 1 to 3 numbers")
+    rows = [line.split()[:2] for line in re.findall(rb"^vt ([^\n]*)", data, re.MULTILINE)]
+    found = np.array([row if len(row) == 2 else [*row, b"0"] for row in rows]).astype(np.float64)
+    return found.reshape(-1, 2)
+
+
+def _triangles(
+    data: bytes, vertices: np.ndarray, coordinates: int, normals: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles as indices from 1 of position, coordinates, normal, (T, 3, 3), and numbers of materials.
+
+    A missing index is 0.
+    """
+    blocks = re.split(rb"^o ([0-9]+)\n?", data, flags=re.MULTILINE)
+    of_block = [0, *map(int, blocks[1::2])]
+    lines, number = [], []
+    for block, material in zip(blocks[::2], of_block, strict=True):
+        faces = re.findall(rb"^f ([^\n]*)", block, re.MULTILINE)
+        lines += faces
+        number.append(np.full(len(faces), material))
+    text = b" ".join(lines) + b" "
+    counts = np.array([len(line.split()) for line in lines], dtype=np.int64)
+    # Missing indices become 0: of 1//3, of 1/2, and of 1.
+    if re.search(rb"/[0-9]*+/0++(?![0-9])", text):
+        raise Refused(f"a face has the normal 0, but there are {normals} normals")
+    if re.search(rb"(?<![/0-9])[0-9]++/0++(?![0-9])", text):
+        raise Refused(f"a face has the texture coordinates 0, but there are {coordinates}")
+    text = re.sub(rb"/(?=[/\s])", b"/0", text)
+    if text.count(b"/") < 2 * counts.sum():
+        text = re.sub(rb"(?<![/0-9])([0-9]++)(?![/0-9])", rb"\1/0", text)
+        text = re.sub(rb"(?<![/0-9])([0-9]++/[0-9]++)(?!/)", rb"\1/0", text)
+    words = text.replace(b"/", b" ").split()
+    if any(len(word) > 18 for word in words):
+        raise Refused("a face has an index of over 18 digits")
+    indices = np.array(words).astype(np.int64).reshape(-1, 3)
+    check_corners(indices[:, 0] - 1, len(vertices))
+    if (most := indices[:, 2].max(initial=0)) > normals:
+        raise Refused(f"a face has the normal {most}, but there are {normals} normals")
+    if (most := indices[:, 1].max(initial=0)) > coordinates:
+        raise Refused(f"a face has the texture coordinates {most}, but there are {coordinates}")
+    places, faces = cut_polygons(vertices, indices[:, 0] - 1, counts)
+    return indices[places], np.concatenate(number)[faces]
 
 
 def _absolute(data: bytes) -> bytes:
-    """The text with absolute indices: trimesh counts relative ones from the end of the file."""
-    counts = {b"v": 0, b"": 0, b"vn": 0}
+    """The text with absolute indices, in place of those that count back from their line."""
+    counts = {b"v": 0, b"vt": 0, b"vn": 0}
 
     def absolute(corner):
         kinds = zip(counts, corner[0].split(b"/"), strict=False)
@@ -273,45 +207,43 @@ def _absolute(data: bytes) -> bytes:
         counts[line[1]] += 1
         return line[0]
 
-    return re.sub(rb"^(vn|v|f) ([^\n]*)", replaced, data, flags=re.MULTILINE)
+    return re.sub(rb"^(v[nt]?|f) ([^\n]*)", replaced, data, flags=re.MULTILINE)
 
 
-def _positions(data: bytes, found: Found) -> bytes:
-    """The text with three numbers for each position, without weights and colours."""
+def _positions(data: bytes, found: Found, painted: bool) -> tuple[bytes, np.ndarray | None]:
+    """The text with three numbers for each position, and the colours behind positions, if there are any.
+
+    The numbers behind x, y, z are a weight; red, green, blue; these and alpha; or a weight and these. Of four
+    numbers the first is the weight if it is always 1 and the last is not.
+    """
     wrong = rb"^(?:v (?!%b(?:[ \t]++%b){0,5}+%b)|vn (?!%b%b))([^\n]*)" % (_THREE, _NUMBER, _END, _THREE, _END)
     if bad := re.search(wrong, data, re.MULTILINE):
         raise Refused(f"a position or normal is {shown(bad[1].decode().strip())!r}, not 3 numbers")
-    weights = re.findall(rb"^v %b[ \t]++(%b)%b" % (_THREE, _NUMBER, _END), data, re.MULTILINE)
-    if any(float(weight) != 1 for weight in weights):
-        raise Refused("a position has a weight w other than 1", "export it without weights")
-    if re.search(rb"^v %b(?:[ \t]++%b){2}+%b" % (_THREE, _NUMBER, _END), data, re.MULTILINE):
+    rows = [line.split()[3:] for line in re.findall(rb"^v ([^\n]*)", data, re.MULTILINE)]
+    counts = np.array([len(row) for row in rows])
+    if (counts == 2).any():
         raise Refused("a position has 5 numbers", "give x y z, and red green blue after them")
-    if re.search(rb"^v %b(?:[ \t]++%b){3}" % (_THREE, _NUMBER), data, re.MULTILINE):
-        found.tell("vertex colours")
-    return re.sub(rb"^(v %b)[^\n]*" % _THREE, rb"\1", data, flags=re.MULTILINE)
-
-
-def _triangular(data: bytes) -> bytes:
-    """The text with polygons cut into triangles, a line for each."""
-    lines = list(re.finditer(rb"^f (\S++(?:[ \t]++\S++){3,}+)%b" % _END, data, re.MULTILINE))
-    if not lines:
-        return data
-    numbers = b" ".join(re.findall(rb"^v ([^\n]*)", data, re.MULTILINE)).split()
-    vertices = np.array(numbers).astype(np.float64).reshape(-1, 3)
-    faces = [line[1].split() for line in lines]
-    sides = np.array([len(face) for face in faces])
-    texts: list[list[bytes]] = [[] for _ in faces]
-    for count in np.unique(sides).tolist():
-        chosen = np.flatnonzero(sides == count).tolist()
-        indices = np.array([[int(corner.partition(b"/")[0]) for corner in faces[k]] for k in chosen])
-        polygons = np.where(indices > 0, indices - 1, indices + len(vertices))
-        check_corners(polygons, len(vertices))
-        corners, owners = triangulated(vertices, polygons)
-        for owner, (a, b, c) in zip(owners.tolist(), corners.tolist(), strict=True):
-            face = faces[chosen[owner]]
-            texts[chosen[owner]].append(b"f " + b" ".join((face[a], face[b], face[c])))
-    pieces, start = [], 0
-    for line, text in zip(lines, texts, strict=True):
-        pieces += [data[start : line.start()], b"\n".join(text)]
-        start = line.end()
-    return b"".join([*pieces, data[start:]])
+    colors = np.ones((len(rows), 3))
+    has_color = counts >= 3
+    for count in np.unique(counts[counts > 0]).tolist():
+        chosen = np.flatnonzero(counts == count)
+        numbers = np.array([rows[k] for k in chosen.tolist()]).astype(np.float64)
+        weighted = count in (1, 5)
+        if count == 4:
+            weighted = bool((numbers[:, 0] == 1).all() and (numbers[:, 3] != 1).any())
+        if weighted:
+            if (numbers[:, 0] != 1).any():
+                raise Refused("a position has a weight w other than 1", "export it without weights")
+            numbers = numbers[:, 1:]
+        whole = 255 if (numbers[:, :3] > 1).any() else 1
+        if painted and numbers.shape[1] > 3 and (numbers[:, 3] != whole).any():
+            found.tell("vertex alpha")
+        if numbers.shape[1] >= 3:
+            colors[chosen] = numbers[:, :3]
+    data = re.sub(rb"^(v %b)[^\n]*" % _THREE, rb"\1", data, flags=re.MULTILINE)
+    if not painted or not has_color.any():
+        return data, None
+    without = int((~has_color).sum())
+    found.tell("missing colour of a vertex", "missing colours of vertices", without)
+    colors[has_color] = vertex_colors(colors[has_color])
+    return data, colors

@@ -2,17 +2,22 @@
 
 import re
 import struct
+from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from blysk.golden.text import is_wide, plain_text
-from blysk.sim.meshes.materials import Found
-from blysk.sim.meshes.polygons import check_corners, triangulated
-from blysk.sim.meshes.refusal import Refused, shown
+from blysk.sim.meshes.colors import vertex_colors
+from blysk.sim.meshes.images import find_image, read_texture
+from blysk.sim.meshes.materials import FileMaterial, Found
+from blysk.sim.meshes.parts import Part, distinct
+from blysk.sim.meshes.polygons import check_corners, cut_polygons
+from blysk.sim.meshes.refusal import Refused, refers, shown
 from blysk.sim.meshes.strips import strip_triangles
 
-__all__ = ["read_ply"]
+__all__ = ["find_ply_images", "read_ply"]
 
 _KINDS = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
 _TYPES = {
@@ -28,8 +33,11 @@ _KNOWN = {
     | {"nx", "ny", "nz"},
     "tristrips": {"vertex_indices", "vertex_index"},
 }
-_COLORS = {"red", "green", "blue", "diffuse_red", "diffuse_green", "diffuse_blue", "r", "g", "b"}
+# Names of a colour's channels, and of texture coordinates.
+_CHANNELS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
+_COLORS = {name for names in _CHANNELS for name in names}
 _ALPHA = {"alpha", "diffuse_alpha", "a"}
+_COORDINATES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -57,16 +65,34 @@ class _List(NamedTuple):
 _Columns = dict[str, np.ndarray | _List]
 
 
-def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
-    """Vertices, their normals if there are any, and triangles of a PLY file.
+def read_ply(data: bytes, found: Found, painted: bool) -> tuple[list[Part], list[str]]:
+    """Triangles of a PLY file, a part for each image, and the names of its images.
+
+    Vertices may have normals, colours (by the curve of sRGB) and texture coordinates. Corners of faces may
+    have texture coordinates instead (``texcoord``), and faces the number of their image (``texnumber``).
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    found : Found
+        Is told what is not read.
+    painted : bool
+        Whether to read colours and texture coordinates.
+
+    Returns
+    -------
+    tuple of list of Part, and list of str
+        Part number 0 has no image, and part number k the image k, from 1. Files without images, and files
+        that are not painted, have part 0 alone.
 
     Raises
     ------
     Refused
         If the header is damaged, or rows or bytes are missing. If a list has another length than its count,
-        or a face has fewer than 3 corners or a missing corner.
+        or a face has fewer than 3 corners or a missing corner. If a colour is out of range.
     """
-    order, elements, body = _header(data, found)
+    order, elements, images, body = _header(data)
     columns: dict[str, _Columns] = {}
     rows = []
     if not order:
@@ -87,35 +113,124 @@ def read_ply(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray | None, 
             columns[element.name] = _text(element, rows[start : start + element.rows])
             start += element.rows
         if element.rows:
-            _tell(element, columns[element.name], found)
+            _tell(element, columns[element.name], found, painted)
     unit = "byte" if order else "line"
     rest = len(body if order else rows) - start
     found.tell(f"{unit} after the last element", f"{unit}s after the last element", rest)
-    vertex = columns.get("vertex", {})
-    if not all(isinstance(vertex.get(name), np.ndarray) for name in "xyz"):
+    vertex, face = columns.get("vertex", {}), columns.get("face", {})
+    vertices, normals = _table(vertex, ("x", "y", "z")), _table(vertex, ("nx", "ny", "nz"))
+    if vertices is None:
         raise Refused("its vertices have no x, y and z")
-    vertices = np.column_stack([vertex[name] for name in "xyz"]).astype(np.float64)
-    normals = None
-    if all(isinstance(vertex.get(name), np.ndarray) for name in ("nx", "ny", "nz")):
-        normals = np.column_stack([vertex[name] for name in ("nx", "ny", "nz")]).astype(np.float64)
-    faces = _triangles(vertices, columns.get("face", {}))
+    faces, places, owners = _triangles(vertices, face)
     if "tristrips" in columns:
         strips = _indices(columns["tristrips"])
         corners = np.zeros(0, np.int64) if strips is None else _separated(strips)
         check_corners(corners[corners != -1], len(vertices))
         faces = np.concatenate([faces, strip_triangles(corners)])
-    return vertices, normals, faces
+    if not painted:
+        return [Part(0, vertices, faces, normals)], images
+    whole = Part(0, vertices, faces, normals, _colors(vertex, elements))
+    if not images:
+        return [whole], []
+    return _with_images(whole, columns, places, owners, len(images), found), images
 
 
-def _tell(element: _Element, columns: _Columns, found: Found) -> None:
+def _with_images(
+    whole: Part,
+    columns: dict[str, _Columns],
+    places: np.ndarray,
+    owners: np.ndarray,
+    images: int,
+    found: Found,
+) -> list[Part]:
+    """A part for each image, with texture coordinates of the vertices, or of the corners of faces.
+
+    ``places`` are the corners of triangles of faces, and ``owners`` their faces.
+    """
+    face = columns.get("face", {})
+    number = np.ones(len(whole.faces), dtype=np.int64)
+    chosen = face.get("texnumber")
+    if isinstance(chosen, np.ndarray):
+        number[: len(owners)] = 1 + chosen[owners]
+        wrong = (number < 1) | (number > images)
+        found.tell("missing image of a face", "missing images of faces", int(wrong.sum()))
+        number[wrong] = 0
+    given = (_table(columns["vertex"], names) for names in _COORDINATES)
+    coordinates = next((each for each in given if each is not None), None)
+    corners, indices = face.get("texcoord"), _indices(face)
+    if isinstance(corners, _List) and indices is not None and len(corners.values):
+        if len(whole.faces) == len(owners) and np.array_equal(corners.counts, 2 * indices.counts):
+            pairs = corners.values.reshape(-1, 2)
+            _, kinds = np.unique(pairs + 0.0, axis=0, return_inverse=True)
+            at = whole.faces.ravel()
+            first, faces = distinct(np.column_stack([at, kinds.ravel()[places.ravel()]]))
+            vertices, normals, colors = (
+                None if each is None else each[at[first]]
+                for each in (whole.vertices, whole.normals, whole.colors)
+            )
+            whole = Part(0, vertices, faces.reshape(-1, 3), normals, colors)
+            coordinates = pairs[places.ravel()[first]]
+        else:
+            found.tell("face texture coordinates")
+    if coordinates is not None:
+        coordinates = np.column_stack([coordinates[:, 0], 1 - coordinates[:, 1]])
+    return [
+        whole._replace(number=k, faces=whole.faces[number == k], coordinates=coordinates if k else None)
+        for k in np.unique(number).tolist()
+    ]
+
+
+def find_ply_images(names: list[str], folder: Path, found: Found) -> None:
+    """A material for each image, read if a face uses it."""
+    for name in names:
+        target, reason = find_image(name, folder)
+        refers(folder, *([] if target is None else [str(target)]))
+        found.names.append(name)
+        found.readers.append(partial(_ply_material, name, target, reason, found))
+
+
+def _ply_material(name: str, target: Path | None, reason: str, found: Found) -> FileMaterial:
+    if target is None:
+        found.tell(f"the image {shown(name)!r}, {reason}")
+        return FileMaterial(shown(name))
+    return FileMaterial(shown(name), texture=read_texture(target, found))
+
+
+def _table(columns: _Columns, names: tuple[str, ...]) -> np.ndarray | None:
+    """Columns of these names side by side, float64; ``None`` if one is missing."""
+    found = [columns.get(name) for name in names]
+    if not all(isinstance(column, np.ndarray) for column in found):
+        return None
+    table: np.ndarray = np.column_stack(found).astype(np.float64)
+    return table
+
+
+def _colors(vertex: _Columns, elements: list[_Element]) -> np.ndarray | None:
+    """Colours of the vertices in linear light, shape (V, 3)."""
+    kinds = {
+        each.name: each.kind
+        for element in elements
+        if element.name == "vertex"
+        for each in element.properties
+    }
+    for names in _CHANNELS:
+        table = _table(vertex, names)
+        if table is not None:
+            kind = kinds[names[0]]
+            return vertex_colors(table, {"u2": 65535.0}.get(kind, None if kind[0] == "f" else 255.0))
+    return None
+
+
+def _tell(element: _Element, columns: _Columns, found: Found, painted: bool) -> None:
     """Tell an element, or those of its properties, that change the look and are not read."""
     if element.name not in _KNOWN:
         found.tell_names("elements", [element.name])
         return
     names = {each.name for each in element.properties}
-    if names & _COLORS:
+    read = element.name == "vertex" and any(_table(columns, channels) is not None for channels in _CHANNELS)
+    if painted and names & _COLORS and not read:
         found.tell(f"{element.name} colours")
-    for name in names & _ALPHA:
+    for name in names & _ALPHA if painted else ():
         values, whole = columns[name], {"u1": 255, "u2": 65535}
         kind = next(each.kind for each in element.properties if each.name == name)
         if isinstance(values, _List) or (values != whole.get(kind, 1)).any():
@@ -141,36 +256,28 @@ def _separated(strips: _List) -> np.ndarray:
     return np.insert(strips.values, np.cumsum(strips.counts), -1)
 
 
-def _triangles(vertices: np.ndarray, face: _Columns) -> np.ndarray:
+def _triangles(vertices: np.ndarray, face: _Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles of faces, their corners' places in the list of all corners, and their faces."""
     indices = _indices(face)
     if indices is None:
-        return np.zeros((0, 3), dtype=np.int64)
+        return np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64)
     values = indices.values
     check_corners(values, len(vertices))
     if (indices.counts < 3).any():
         raise Refused("a face has fewer than 3 corners")
-    starts = np.cumsum(indices.counts) - indices.counts
-    pieces, faces = [], []
-    for sides in np.unique(indices.counts).tolist():
-        chosen = np.flatnonzero(indices.counts == sides)
-        polygons = values[starts[chosen][:, np.newaxis] + np.arange(sides)]
-        corners, owners = triangulated(vertices, polygons)
-        pieces.append(polygons[owners[:, np.newaxis], corners])
-        faces.append(chosen[owners])
-    if not pieces:
-        return np.zeros((0, 3), dtype=np.int64)
-    return np.concatenate(pieces)[np.argsort(np.concatenate(faces), kind="stable")]
+    places, owners = cut_polygons(vertices, values, indices.counts)
+    return values[places], places, owners
 
 
-def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
-    """Byte order (empty for text), the elements, and the rest after the header."""
+def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
+    """Byte order (empty for text), the elements, names of images, and the rest after the header."""
     if is_wide(data):
         data = plain_text(data, "replace").encode()
     # The word stands at the head of a line, and not in a comment.
     end = re.search(rb"[\r\n][ \t]*+end_header[ \t]*+(?=[\r\n]|\Z)", data)
     if end is None:
         raise Refused("the PLY header has no end")
-    order, elements, textures = None, [], 0
+    order, elements, images = None, [], []
     head, body = data[: end.start()], data[end.end() :]
     lines = [line.strip() for line in plain_text(head, "replace").split("\n") if line.strip()] or [""]
     if lines[0].lower() != "ply":
@@ -179,7 +286,8 @@ def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
         words = line.split()
         # A comment of several lines: some programs forget the word before the second.
         if not words or words[0] not in ("format", "element", "property"):
-            textures += [word.lower() for word in words[:2]] == ["comment", "texturefile"]
+            if [word.lower() for word in words[:2]] == ["comment", "texturefile"] and len(words) > 2:
+                images.append(line.split(maxsplit=2)[2])
         elif words[0] == "format" and len(words) == 3 and words[1] in _ORDERS and order is None:
             order = _ORDERS[words[1]]
         elif words[0] == "element" and len(words) == 3 and re.fullmatch("[0-9]{1,18}", words[2]):
@@ -194,12 +302,11 @@ def _header(data: bytes, found: Found) -> tuple[str, list[_Element], bytes]:
         names = [each.name for each in element.properties]
         if len(set(names)) < len(names) or [e.name for e in elements].count(element.name) > 1:
             raise Refused("its header has a name twice")
-    found.tell("texture", "textures", textures)
     # A file of lone carriage returns may have a line feed as the first byte of its data.
     for mark in (b"\r\n", b"\n", b"\r") if b"\n" in head else (b"\r", b"\n"):
         if body.startswith(mark):
-            return order, elements, body.removeprefix(mark)
-    return order, elements, b""
+            return order, elements, images, body.removeprefix(mark)
+    return order, elements, images, b""
 
 
 def _property(words: list[str]) -> _Property | None:

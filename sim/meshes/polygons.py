@@ -8,7 +8,7 @@ import numpy as np
 
 from blysk.sim.meshes.refusal import Refused
 
-__all__ = ["check_corners", "triangulated"]
+__all__ = ["check_corners", "cut_polygons", "triangulated"]
 
 # Twice the area of a triangle that counts as none, over that of its polygon: rounding only.
 _FLAT = 2.0**-40
@@ -21,6 +21,40 @@ def check_corners(corners: np.ndarray, vertices: int) -> None:
     if corners.size and not 0 <= corners.min() <= corners.max() < vertices:
         wrong = corners.min() if corners.min() < 0 else corners.max()
         raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {vertices}")
+
+
+def cut_polygons(
+    vertices: np.ndarray, corners: np.ndarray, counts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cut polygons of any counts of corners into triangles, see `triangulated`.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (V, 3)
+        Coordinates.
+    corners : int ndarray, shape (n,)
+        Vertices of the polygons' corners, polygon after polygon, in range.
+    counts : int ndarray, shape (P,)
+        Corners of each polygon, at least 3.
+
+    Returns
+    -------
+    places : int ndarray, shape (T, 3)
+        The corners of each triangle, by their places in ``corners``, polygon after polygon.
+    owners : int ndarray, shape (T,)
+        The polygon of each triangle.
+    """
+    starts = np.cumsum(counts) - counts
+    pieces, polygons = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for sides in np.unique(counts).tolist():
+        chosen = np.flatnonzero(counts == sides)
+        places = starts[chosen][:, np.newaxis] + np.arange(sides)
+        triangles, owners = triangulated(vertices, corners[places])
+        pieces.append(places[owners[:, np.newaxis], triangles])
+        polygons.append(chosen[owners])
+    owner = np.concatenate(polygons)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(pieces)[order], owner[order]
 
 
 def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,8 +5,10 @@ import struct
 
 import numpy as np
 
+from blysk.golden.reference.transfer import decode
 from blysk.golden.text import is_wide, plain_text
 from blysk.sim.meshes.materials import Found
+from blysk.sim.meshes.parts import Part
 from blysk.sim.meshes.refusal import Refused, shown
 
 __all__ = ["read_stl"]
@@ -15,8 +17,23 @@ __all__ = ["read_stl"]
 _KNOWN = {"solid", "endsolid", "facet", "endfacet", "normal", "outer", "loop", "endloop", "vertex", "end"}
 
 
-def read_stl(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices, three a triangle, and triangles of an STL file. Facet normals follow from the vertices.
+def read_stl(data: bytes, found: Found, painted: bool) -> Part:
+    """Triangles of an STL file, each with vertices of its own. Facet normals follow from the vertices.
+
+    Facets of a binary file may have colours, 5 bits a channel, by the curve of sRGB:
+
+    - Red has the highest bits. Bit 15 says that there is a colour. (VisCAM, SolidView)
+    - If the header has ``COLOR=`` with the colour of the solid, red has the lowest bits. Bit 15 says that the
+      facet has the colour of the solid. If all attributes are 0, all facets have it. (Materialise)
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    found : Found
+        Is told what is not read.
+    painted : bool
+        Whether to read colours.
 
     Raises
     ------
@@ -27,8 +44,14 @@ def read_stl(data: bytes, found: Found) -> tuple[np.ndarray, np.ndarray]:
     text = is_wide(data) or b"\0" not in data.rstrip(b"\0")
     if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
         text = False
-    vertices = _text(data, found) if text else _binary(data, found)
-    return vertices, np.arange(len(vertices)).reshape(-1, 3)
+    colors = None
+    if text:
+        vertices = _text(data, found)
+    else:
+        rows = _binary(data, found)
+        vertices = rows["corners"].reshape(-1, 3).astype(np.float64)
+        colors = _colors(rows["attribute"], data[:80], found) if painted else None
+    return Part(0, vertices, np.arange(len(vertices)).reshape(-1, 3), colors=colors)
 
 
 def _text(data: bytes, found: Found) -> np.ndarray:
@@ -65,6 +88,7 @@ def _text(data: bytes, found: Found) -> np.ndarray:
 
 
 def _binary(data: bytes, found: Found) -> np.ndarray:
+    """Rows of a normal, corners and an attribute."""
     if len(data) < 84:
         raise Refused(f"it is cut short: a binary STL has at least 84 bytes, but there are {len(data)}")
     (count,) = struct.unpack_from("<I", data, 80)
@@ -75,12 +99,29 @@ def _binary(data: bytes, found: Found) -> np.ndarray:
             f"but there are {len(data)}"
         )
     found.tell("byte after the last triangle", "bytes after the last triangle", len(data) - size)
-    rows = np.frombuffer(
+    return np.frombuffer(
         data, [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")], count, 84
     )
-    found.tell(
-        "attribute that may be a colour", "attributes that may be colours", int((rows["attribute"] > 0).sum())
-    )
-    if re.search(rb"COLOR=|MATERIAL=", data[:80]):
-        found.tell("the colour of its header")
-    return rows["corners"].reshape(-1, 3).astype(np.float64)
+
+
+def _colors(attributes: np.ndarray, header: bytes, found: Found) -> np.ndarray | None:
+    """Colours of the facets' corners in linear light, shape (3 F, 3)."""
+    flag = attributes >> 15 > 0
+    solid = re.search(rb"COLOR=(.)(.)(.)(.)", header, re.DOTALL)
+    shifts = (10, 5, 0) if solid is None else (0, 5, 10)
+    codes = np.stack([attributes >> shift & 31 for shift in shifts], axis=1) / 31
+    if solid is not None:
+        *channels, alpha = (part[0] for part in solid.groups())
+        codes[flag | ~attributes.any()] = np.array(channels) / 255
+        if alpha != 255:
+            found.tell("the alpha of its header")
+    else:
+        others = int((attributes[~flag] > 0).sum())
+        found.tell("attribute that may be a colour", "attributes that may be colours", others)
+        if not flag.any():
+            return None
+        codes[~flag] = 1
+        found.tell("missing colour of a facet", "missing colours of facets", int((~flag).sum()))
+    if b"MATERIAL=" in header:
+        found.tell("the material of its header")
+    return np.repeat(decode(codes), 3, axis=0)

@@ -10,7 +10,7 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import blysk.sim.meshes.obj
+import blysk.sim.meshes.mtl
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
@@ -214,16 +214,10 @@ def test_material_of_dropped_faces_only_is_dropped(tmp_path):
     assert (loaded.materials, loaded.dropped_faces) == ((FileMaterial("b", GREEN),), 1)
 
 
-def test_textures_and_vertex_colours_are_told(tmp_path):
-    put(tmp_path / "a.mtl", "newmtl a\nmap_Kd a.png\nmap_bump -bm 1 b.png\nnewmtl b\nmap_Kd c.png\n")
-    box = trimesh.creation.box()
-    box.visual.vertex_colors = np.full((8, 4), 255, np.uint8)
-    for name, content, told in (
-        ("a.obj", material_obj("a"), "2 textures"),
-        ("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n", "vertex colours"),
-        ("a.ply", box, "vertex colours"),
-    ):
-        assert load(tmp_path / name, content).ignored == (told,)
+def test_other_textures_and_missing_images_are_told(tmp_path):
+    put(tmp_path / "a.mtl", "newmtl a\nmap_Kd no.png\nmap_bump -bm 1 b.png\nnewmtl b\nmap_Kd c.png\n")
+    told = ("1 texture", "the image 'no.png', which does not exist")
+    assert load(tmp_path / "a.obj", material_obj("a")).ignored == told
 
 
 @pytest.mark.parametrize("suffix", [".obj", pytest.param(".glb", marks=pytest.mark.long)])
@@ -319,7 +313,7 @@ def test_odd_material_files(tmp_path, monkeypatch):
     long = load(path, material_obj("a", "x" * 5000 + ".mtl"))
     assert long.ignored[0].endswith("x...', which does not exist")
     assert load(path, material_obj("a", "c.mtl")).materials == (FileMaterial("a", RED),)
-    monkeypatch.setattr(blysk.sim.meshes.obj, "_MAX_LIBRARY", 10)
+    monkeypatch.setattr(blysk.sim.meshes.mtl, "_MAX_LIBRARY", 10)
     check_refused(path, "its material file 'c.mtl' is over 10 bytes")
 
 

@@ -8,6 +8,7 @@ import pytest
 import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from blysk.sim.installation import install_extra
 from blysk.sim.meshes.mesh import load_mesh
@@ -60,9 +61,8 @@ def test_objects_and_materials_weld_to_one(tmp_path):
         ("v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3", "all its vertices are at one point"),
         ("v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3", "none of its faces has an area"),
         (CORNERS + "v 9 9 9", "it has no faces"),
-        # Of the first trimesh makes points, of the second an IndexError.
         ("v 0 0 0\nv 1 0 0\nl 1 2", "it has no faces"),
-        (CORNERS + "f 1 2 4", "entry 4 of a list of 3"),
+        (CORNERS + "f 1 2 4", "refers to vertex 3 (from 0), but there are 3"),
         (CORNERS + "f 0 1 2", "vertex index 0"),
         (CORNERS + "f 1 2 3\nf 1 2", "fewer than 3 corners"),
         (CORNERS + "f 1 2 -9", "has the index -9, with 3 v before it"),
@@ -236,7 +236,7 @@ def test_references_that_are_no_files(tmp_path, name):
 
 @pytest.mark.parametrize("kind", ["outside", "inside", "one material", "gltf"])
 def test_reads_the_file_and_checked_references_only(tmp_path, monkeypatch, kind):
-    # No material file outside the folder, no texture, and nothing at all where materials are not asked for.
+    # No material file outside the folder, and nothing at all where materials are not asked for.
     library = "../../secret.mtl" if kind == "outside" else "a.mtl"
     path, other = tmp_path / "a.obj", tmp_path / "a.mtl"
     put(path, f"mtllib {library}\n{CORNERS}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n")
@@ -252,7 +252,7 @@ def test_reads_the_file_and_checked_references_only(tmp_path, monkeypatch, kind)
         document["meshes"][0]["primitives"][0]["material"] = 0
         put(path, (document, buffer))
         other.write_bytes(buffer)
-    (tmp_path / "a.png").write_bytes(b"no picture")
+    Image.new("L", (1, 1)).save(tmp_path / "a.png")
     opened = []
     original = io.open
 
@@ -263,7 +263,8 @@ def test_reads_the_file_and_checked_references_only(tmp_path, monkeypatch, kind)
     monkeypatch.setattr("builtins.open", watching)
     monkeypatch.setattr("io.open", watching)
     load_mesh(str(path), materials=kind != "one material")
-    assert opened == [str(path), *([str(other)] if kind in ("inside", "gltf") else [])]
+    read = {"inside": [str(other), str(tmp_path / "a.png")], "gltf": [str(other)]}
+    assert opened == [str(path), *read.get(kind, [])]
 
 
 # Damage

@@ -20,7 +20,8 @@ OBJ_TOLD = {
     "curves": (OBJ + "cstype bezier\ndeg 2\ncurv 0 1 1 2 3\nend\n", ("statements: cstype, deg, curv, end",)),
     "another case": (OBJ + "V 0 0 9\nF 1 2 3\nUseMtl a\n", ("statements: V, F, UseMtl",)),
     "group of lines": (OBJ + "fo 1 2 3\nfoo\n1 2 3\n", ("statements: fo, foo, 1",)),
-    "mixed colours": ("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\n" + FACE, ("vertex colours",)),
+    "mixed colours": ("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\n" + FACE, ("2 missing colours of vertices",)),
+    "transparent": ("v 0 0 0 1 0 0 .5\nv 1 0 0 0 0 0 1\nv 0 1 0 1 0 0 1\n" + FACE, ("vertex alpha",)),
     "smooth": (CORNERS + "s 1\n" + FACE, ("smoothing groups (--crease says which edges are sharp)",)),
     "flat": (CORNERS + "s off\nf 1/1 2/2 3/3\n", ("smoothing groups (--crease says which edges are sharp)",)),
     "smooth, with normals": (CORNERS + "vn 0 0 1\ns 1\nf 1//1 2//1 3//1\n", ()),
@@ -112,11 +113,12 @@ COLOR = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
 PLY_TOLD = {
     "plain": (ply_of("property float confidence\nproperty float intensity\n", (" .5 1",) * 3), ()),
     "texture coordinates": (ply_of("property float s\nproperty float t\n", (" .5 1",) * 3), ()),
-    "colours": (ply_of(COLOR, (" 1 2 3",) * 3), ("vertex colours",)),
-    "opaque": (ply_of(COLOR + "property uchar alpha\n", (" 1 2 3 255",) * 3), ("vertex colours",)),
+    "colours": (ply_of(COLOR, (" 1 2 3",) * 3), ()),
+    "opaque": (ply_of(COLOR + "property uchar alpha\n", (" 1 2 3 255",) * 3), ()),
+    "half a colour": (ply_of("property uchar red\n", (" 1",) * 3), ("vertex colours",)),
     "alpha": (
         ply_of(COLOR + "property uchar alpha\n", (" 1 2 3 255", " 1 2 3 9", " 1 2 3 255")),
-        ("vertex colours", "vertex alpha"),
+        ("vertex alpha",),
     ),
     "floats": (ply_of("property float alpha\n", (" 1", " 1", " 1")), ()),
     "another name": (ply_of("property int kind_of\n", (" 1",) * 3), ("vertex properties: kind_of",)),
@@ -133,7 +135,7 @@ PLY_TOLD = {
     "lines behind": (ply_of(tail="3 0 1 2\n\n3 0 1 2\n"), ("2 lines after the last element",)),
     "texture": (
         ply_of().replace("1.0\n", "1.0\ncomment TextureFile a.png\ncomment texturefile b.png\n", 1),
-        ("2 textures",),
+        ("the image 'a.png', which does not exist",),
     ),
 }
 
@@ -190,8 +192,13 @@ STL_TOLD = {
     "begins like a text": (binary_stl(head=b"solid a"), ()),
     "a stray byte": (binary_stl(b"\n"), ("1 byte after the last triangle",)),
     "stray bytes": (binary_stl(bytes(60)), ("60 bytes after the last triangle",)),
-    "colours": (binary_stl(attribute=0x801F), ("1 attribute that may be a colour",)),
-    "colour of all": (binary_stl(head=b"COLOR=\xff\0\0\xff"), ("the colour of its header",)),
+    "colours": (binary_stl(attribute=0x801F), ()),
+    "another attribute": (binary_stl(attribute=0x1F), ("1 attribute that may be a colour",)),
+    "colour of all": (binary_stl(head=b"COLOR=\xff\0\0\xff"), ()),
+    "material of all": (
+        binary_stl(head=b"COLOR=\xff\0\0\x80,MATERIAL=" + bytes(12)),
+        ("the alpha of its header", "the material of its header"),
+    ),
     "upper case": (STL.upper(), ()),
     "indented": (STL.replace("\n", "\n\t  "), ()),
     "a comment before": ("; made by hand\n" + STL, ()),

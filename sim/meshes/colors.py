@@ -1,0 +1,43 @@
+"""Colours of vertices in mesh files."""
+
+import numpy as np
+
+from blysk.golden.reference.transfer import decode
+from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused
+
+__all__ = ["vertex_colors"]
+
+# How far over full light a number may lie by rounding, as a part of it.
+_ROUNDED = 1e-6
+
+
+def vertex_colors(channels: np.ndarray, whole: float | None = None) -> np.ndarray:
+    """Colours in linear light of channels by the curve of sRGB.
+
+    Parameters
+    ----------
+    channels : array, shape (V, 3)
+        Numbers of a file.
+    whole : float, optional
+        The number of full light. ``None``: 255 if all numbers are whole and one is over 1, else 1.
+
+    Returns
+    -------
+    float64 array, shape (V, 3)
+
+    Raises
+    ------
+    Refused
+        If a number is NaN, negative or over full light.
+    """
+    channels = np.asarray(channels, dtype=np.float64)
+    if whole is None:
+        coded = (channels == np.floor(channels)).all() and channels.max(initial=0) > 1
+        whole = 255.0 if coded else 1.0
+    wrong = ~((channels >= 0) & (channels <= whole * (1 + _ROUNDED)))
+    if wrong.any():
+        raise Refused(
+            f"a vertex has {channels[wrong][0]:g} in its colour, not a number from 0 to {whole:g}",
+            ONE_MATERIAL,
+        )
+    return decode(channels / whole)
