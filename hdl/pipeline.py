@@ -7,21 +7,15 @@ from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from blysk.golden.frame_constants import LOBE_ADDRESS
-from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
-from blysk.hdl.lighting.diffuse import DiffuseUnit
-from blysk.hdl.lighting.factor import FactorUnit
-from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
-from blysk.hdl.lighting.light import LightUnit, kind_of
-from blysk.hdl.lighting.transfer import TransferUnit
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
+from blysk.hdl.pixel_shading import PixelShading
 
 __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 
@@ -161,13 +155,8 @@ class ShadingPipelineUnit(wiring.Component):
             }
         )
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
-        self._interpolator, self._gate, self._slope, self._lights = None, None, None, []
-        self._tables, self._transfer = None, None
-        if p.transfer != "linear":
-            # Without lights colours are constant, and are encoded all the time.
-            channels = p.intensity.channels
-            interval = channels if p.build.compact and p.lights else 1
-            self._transfer = TransferUnit(channels=channels, initiation_interval=interval)
+        self._interpolator = self._gate = None
+        self._shading = PixelShading(p)
         self.direction = Signal(normal_shape(), name="first_direction")
         self.setup_interval = self._shortest_interval = self.cycles_per_pixel = 1
         self.latency = LATE_FIFO_LATENCY + self._assembler.coordinates_latency
@@ -199,51 +188,14 @@ class ShadingPipelineUnit(wiring.Component):
         )
         self.setup_interval = self._interpolator.setup_interval
         self._shortest_interval = self._interpolator.shortest_interval
-        self._lights = self._light_units()
-        self._intensity = (CompactIntensityUnit if compact else IntensityUnit)(p.intensity)
-        slowest = max(self._lights, key=lambda light: light.latency)
-        chain = (self._interpolator, slowest, self._intensity, self._transfer, self._assembler)
-        self.latency = sum(unit.latency for unit in chain if unit is not None)
+        self.latency = self._interpolator.latency + self._shading.latency + self._assembler.latency
         if p.gate:
             self._gate = method.gate_beside(p, self.setup_interval)
         if self._gate is not None:
             # A FIFO before the gate, and one after it.
             decided = self._gate.latency + 2 * FIFO_LATENCY
             self.latency += max(decided - self._interpolator.latency, 0)
-        self.cycles_per_pixel = max(
-            self._interpolator.cycles_per_pixel,
-            self._lights[0].initiation_interval,
-            self._intensity.initiation_interval,
-        )
-
-    def _light_units(self) -> list:
-        """Light units, or diffuse units without specular light; and the slopes or tables that they share."""
-        p = self.model
-        compact, exponent = p.build.compact, p.build.exponent
-        diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
-        if p.specular is None:
-            return [DiffuseUnit(diffuse) for _ in range(p.lights)]
-        self._kind = kind = kind_of(p.specular)
-        if exponent is None and kind.slope_unit:
-            self._slope = kind.slope_unit(p.specular)
-        if kind.memory:
-            self._tables = kind.memory(p.specular, p.lights)
-        # In lockstep all lights take as long as a light that fades.
-        waiting = range(p.lights) if p.factors and not compact else p.factors
-        # In the compact style a colour takes a cycle a channel at least.
-        interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
-        return [
-            LightUnit(
-                p.specular,
-                diffuse,
-                initiation_interval=interval,
-                exponent=exponent,
-                shares_slope=self._slope is not None or self._tables is not None,
-                gated=p.gate,
-                factor=FactorUnit(has_factor=index in p.factors) if index in waiting else None,
-            )
-            for index in range(p.lights)
-        ]
+        self.cycles_per_pixel = max(self._interpolator.cycles_per_pixel, self._shading.cycles_per_pixel)
 
     @property
     def vectors(self) -> bool:
@@ -277,33 +229,11 @@ class ShadingPipelineUnit(wiring.Component):
                 m.d.comb += self.direction.eq(frame.constants.lights[0].direction)
             sinks += self._shade(m, frame)
         else:
-            colors = self._encode(m)
-            for channel, name in enumerate("rgb"):
-                light = frame.constants.ambient[0 if p.grey else channel]
-                level = light.round_half_up(p.intensity.fraction_bits).saturate(p.intensity.result_format)
-                m.d.comb += colors.payload[name].eq(level.as_value())
-            m.d.comb += assembler.colors.valid.eq(1)
+            self._shading.connect_constant(m, frame.constants.ambient, assembler.colors)
         connect(m, assembler.o, wiring.flipped(self.o))
         admit = self._admit(m, frame, sinks)
         self._count(m, admit)
         return m
-
-    def _encode(self, m: Module) -> stream.Interface:
-        """Colours on their way to the assembler, through the transfer unit if there is one."""
-        transfer, colors = self._transfer, self._assembler.colors
-        if transfer is None:
-            return colors
-        m.submodules.transfer = transfer
-        if self.model.lights:
-            connect(m, transfer.o, colors)
-        else:
-            # Constant colours never wait. They are encoded before the first span after a write reaches them.
-            m.d.comb += [
-                copy(colors.payload, transfer.o.payload),
-                transfer.i.valid.eq(1),
-                transfer.o.ready.eq(1),
-            ]
-        return transfer.i
 
     def _carry_coordinates(self, m: Module) -> tuple[Value, Value]:
         """FIFO of the coordinates of spans, from the input to the assembler; valid and ready of its input."""
@@ -397,7 +327,7 @@ class ShadingPipelineUnit(wiring.Component):
         """Units from spans to colours; valid and ready of those that take spans."""
         p, span = self.model, self.i.payload
         m.submodules.interpolator = interpolator = self._interpolator
-        m.submodules.intensity = intensity = self._intensity
+        m.submodules.intensity = self._shading.intensity
         sinks = [(interpolator.i.valid, interpolator.i.ready)]
         words = interpolator.i.payload
         m.d.comb += copy_fields(words, span)
@@ -411,77 +341,9 @@ class ShadingPipelineUnit(wiring.Component):
         operands, gated = interpolator.o, None
         if self._gate is not None:
             operands, gated = self._decide(m, frame, sinks)
-        if self._slope is not None:
-            m.submodules.slope = self._slope
-            m.d.comb += self._slope.exponent.eq(frame.constants.exponent)
-        if self._tables is not None:
-            self._connect_tables(m)
-        self._connect_lights(m, operands)
-        for index, light in enumerate(self._lights):
-            m.submodules[f"light_{index}"] = light
-            constants = frame.constants.lights[index]
-            m.d.comb += [
-                copy(intensity.constants.diffuse[index], constants.diffuse),
-                copy(intensity.constants.specular[index], constants.specular),
-            ]
-            words, terms = operands.payload[index], light.o.payload
-            if p.specular is None:
-                m.d.comb += [light.i.payload.eq(words.cosine), intensity.i.payload.diffuse[index].eq(terms)]
-                continue
-            m.d.comb += [
-                light.i.payload.cosine.eq(words.cosine),
-                light.i.payload.highlight.eq(words.highlight),
-                intensity.i.payload.diffuse[index].eq(terms.diffuse),
-                intensity.i.payload.specular[index].eq(terms.specular),
-            ]
-            if p.gate:
-                decision = words.gated if gated is None else gated[index]
-                m.d.comb += light.i.payload.gated.eq(decision)
-            if light.fades:
-                m.d.comb += light.i.payload.factor.eq(words.factor)
-            if self._slope is not None:
-                m.d.comb += copy(light.constants, self._slope.slope)
-            elif "constants" in light.signature.members:
-                word = frame.constants[self._kind.constant]
-                m.d.comb += Value.cast(light.constants).eq(word)
-        m.d.comb += copy(intensity.constants.ambient, frame.constants.ambient)
-        connect(m, intensity.o, self._encode(m))
+        self._shading.connect_tables(m, self.write.payload, self._written)
+        self._shading.connect(m, frame.constants, operands, gated, self._assembler.colors)
         return sinks
-
-    def _connect_tables(self, m: Module) -> None:
-        """The memory of the lights' tables, behind a register of the writes that load it."""
-        m.submodules.tables = tables = self._tables
-        for light, read in zip(self._lights, tables.reads, strict=True):
-            wiring.connect(m, light.table, read)
-        if tables.tables is None:
-            # Whether a write was taken and which address it had, by two registers.
-            of_table = Signal(name="of_table")
-            m.d.sync += [
-                of_table.eq(self.write.payload.address == LOBE_ADDRESS),
-                Value.cast(tables.write.payload).eq(self.write.payload.data),
-            ]
-            m.d.comb += tables.write.valid.eq(self._written & of_table)
-
-    def _connect_lights(self, m: Module, operands: stream.Interface) -> None:
-        """Handshakes from the operands through all lights to the intensity unit.
-
-        Equal units with the same input and the same ready of the output are in the same state on every cycle:
-        the handshake of the first is that of all. Where lights skip beats, all accept a beat on the same
-        cycle, or none does.
-        """
-        intensity = self._intensity
-        lockstep = self.model.specular is None or not self._lights[0].skips_dark
-        leaders = self._lights[:1] if lockstep else self._lights
-        for light in self._lights:
-            others = [other for other in leaders if other is not light and not lockstep]
-            m.d.comb += [
-                light.i.valid.eq(reduce(and_, (other.i.ready for other in others), operands.valid)),
-                light.o.ready.eq(reduce(and_, (other.o.valid for other in others), intensity.i.ready)),
-            ]
-        m.d.comb += [
-            operands.ready.eq(reduce(and_, (light.i.ready for light in leaders))),
-            intensity.i.valid.eq(reduce(and_, (light.o.valid for light in leaders))),
-        ]
 
     def _decide(self, m: Module, frame: FrameConstantsUnit, sinks: list) -> tuple[stream.Interface, Value]:
         """Operands of the pixels, and the highlight gate's decision for each light; two more ``sinks``."""

@@ -3,9 +3,10 @@
 import pytest
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 
+import blysk.hdl.lighting.colored_intensity
 import blysk.hdl.lighting.light
 import blysk.hdl.methods.interpolator
-import blysk.hdl.pipeline
+import blysk.hdl.pixel_shading
 from blysk.golden.frame_constants import FIELDS_OF_A_FRAME
 from blysk.golden.methods.linear_interpolator import LinearInterpolator
 from blysk.golden.presets import preset
@@ -18,6 +19,7 @@ from blysk.hdl.lighting.intensity import IntensityUnit
 from blysk.hdl.lighting.specular import SpecularUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.pixel_shading import PixelShading
 
 from .prover import Harness
 from .rules import answers, pixels_follow, stays, taken
@@ -80,15 +82,15 @@ def stubs(monkeypatch):
         # Longer than that of a dark beat, so that the lights are not in step.
         longer = 3 if style == "compact" else 1
         units = (
-            (blysk.hdl.pipeline, DiffuseUnit, diffuse, 1, 1),
+            (blysk.hdl.pixel_shading, DiffuseUnit, diffuse, 1, 1),
             # A light unit builds it for the latency of its specular unit.
             (blysk.hdl.lighting.light, DiffuseUnit, diffuse, 2, 1),
             (blysk.hdl.lighting.light, SpecularUnit, specular, 2, longer),
-            (blysk.hdl.pipeline, IntensityUnit, colors, interval, interval),
+            (blysk.hdl.lighting.colored_intensity, IntensityUnit, colors, interval, interval),
             (blysk.hdl.methods.interpolator, HighlightGateUnit, decisions, 2, 2),
         )
         compact = short(IntensityUnit, colors, interval, interval)
-        monkeypatch.setattr(blysk.hdl.pipeline, "CompactIntensityUnit", compact)
+        monkeypatch.setattr(blysk.hdl.lighting.colored_intensity, "CompactIntensityUnit", compact)
         for module, unit, *options in units:
             monkeypatch.setattr(module, unit.__name__, short(unit, *options))
         monkeypatch.setitem(InterpolatorUnit.UNITS, LinearInterpolator, Line)
@@ -164,8 +166,8 @@ def of_waiting_spans(unit, late):
     h.claim(~(unit.write.valid & taken(unit.i)))
     if model.lights:
         h.claim(taken(unit._interpolator.i) == (taken(unit.i) & (span.length != 0)))
-    for light in unit._lights[1:]:
-        h.claim(taken(light.i) == taken(unit._lights[0].i))
+    for light in unit._shading.lights[1:]:
+        h.claim(taken(light.i) == taken(unit._shading.lights[0].i))
     return h
 
 
@@ -245,10 +247,10 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, stubs, bug):
-    """Injected in `ShadingPipelineUnit`, each refutes the claims, in the cycles of the proof."""
+    """Injected in the pipeline or its shading, each refutes the claims, in the cycles of the proof."""
     name, *change = BUGS[bug]
     *pipeline, late, cycles = PIPELINES[name]
-    inject(ShadingPipelineUnit, *change)
+    inject(PixelShading if change[0] == "_connect_lights" else ShadingPipelineUnit, *change)
     refute(of_waiting_spans(stubs(*pipeline), late), cycles)
 
 

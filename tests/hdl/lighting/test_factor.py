@@ -31,6 +31,6 @@ def test_a_light_that_fades_takes_a_product_a_pixel_and_two_a_span():
 def test_compact_lights_without_a_factor_do_not_wait():
     """The terms of such a light take no unit more; its input has no factor."""
     unit = ShadingPipelineUnit(preset("chord-local", "lyon3", 2, factors=(1,), style="compact"))
-    members = [set(light.i.payload.shape().members) for light in unit._lights]
+    members = [set(light.i.payload.shape().members) for light in unit._shading.lights]
     assert ["factor" in names for names in members] == [False, True]
-    assert unit._lights[1].latency == unit._lights[0].latency + 2
+    assert unit._shading.lights[1].latency == unit._lights[0].latency + 2

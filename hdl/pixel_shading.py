@@ -1,0 +1,222 @@
+"""From the operands of pixels to their colours: the lights, the intensity and the transfer of a pipeline."""
+
+from functools import reduce
+from operator import and_
+
+from amaranth.hdl import Module, Signal, Value
+from amaranth.lib import data, stream, wiring
+
+from blysk.golden.frame_constants import LOBE_ADDRESS
+from blysk.golden.lighting.diffuse import Diffuse
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.hdl.core.stream import connect
+from blysk.hdl.core.views import copy
+from blysk.hdl.lighting.colored_intensity import intensity_unit
+from blysk.hdl.lighting.diffuse import DiffuseUnit
+from blysk.hdl.lighting.factor import FactorUnit
+from blysk.hdl.lighting.light import LightUnit, kind_of
+from blysk.hdl.lighting.transfer import TransferUnit
+
+__all__ = ["PixelShading"]
+
+
+class PixelShading:
+    """The units of a pipeline between operands and colours, and their connections.
+
+    Parameters
+    ----------
+    model : ShadingPipeline
+        Design of the pipeline.
+
+    Attributes
+    ----------
+    lights : list
+        Light units, or diffuse units without specular light.
+    slope, tables : Component or None
+        Slopes or tables that the lights share.
+    intensity : Component or None
+        Intensity unit; ``None`` if colours are constant, without lights.
+    transfer : TransferUnit or None
+        Transfer unit, if the transfer is not linear.
+    light_latency, latency : int
+        Latency from the operands to the terms, and to the colours.
+    cycles_per_pixel : int
+        Cycles of a pixel with every term.
+    """
+
+    def __init__(self, model: ShadingPipeline):
+        self.model = p = model
+        self.slope = self.tables = self.intensity = self.transfer = None
+        self.lights = self._light_units() if p.lights else []
+        if p.lights:
+            self.intensity = intensity_unit(p.intensity, p.build.compact)
+        if p.transfer != "linear":
+            # Without lights colours are constant, and are encoded all the time.
+            channels = p.intensity.channels
+            interval = channels if p.build.compact and self.intensity is not None else 1
+            self.transfer = TransferUnit(channels=channels, initiation_interval=interval)
+        self.light_latency = max((light.latency for light in self.lights), default=0)
+        behind = [unit for unit in (self.intensity, self.transfer) if unit is not None]
+        self.latency = self.light_latency + sum(unit.latency for unit in behind)
+        paced = [*self.lights[:1], *([] if self.intensity is None else [self.intensity])]
+        self.cycles_per_pixel = max((unit.initiation_interval for unit in paced), default=1)
+
+    def _light_units(self) -> list:
+        """Light units, or diffuse units without specular light; and the slopes or tables that they share."""
+        p = self.model
+        compact, exponent = p.build.compact, p.build.exponent
+        diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
+        if p.specular is None:
+            return [DiffuseUnit(diffuse) for _ in range(p.lights)]
+        self._kind = kind = kind_of(p.specular)
+        if exponent is None and kind.slope_unit:
+            self.slope = kind.slope_unit(p.specular)
+        if kind.memory:
+            self.tables = kind.memory(p.specular, p.lights)
+        # In lockstep all lights take as long as a light that fades.
+        waiting = range(p.lights) if p.factors and not compact else p.factors
+        # In the compact style a colour takes a cycle a channel at least.
+        interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
+        return [
+            LightUnit(
+                p.specular,
+                diffuse,
+                initiation_interval=interval,
+                exponent=exponent,
+                shares_slope=self.slope is not None or self.tables is not None,
+                gated=p.gate,
+                factor=FactorUnit(has_factor=index in p.factors) if index in waiting else None,
+            )
+            for index in range(p.lights)
+        ]
+
+    def connect(
+        self,
+        m: Module,
+        constants: data.View,
+        operands: stream.Interface,
+        gated: Value | None,
+        colors: stream.Interface,
+    ) -> None:
+        """Connect the units, from operands to colours.
+
+        Parameters
+        ----------
+        m : Module
+            Module of the pipeline. The intensity unit is its submodule already.
+        constants : View
+            Frame constants.
+        operands : stream.Interface
+            Operands of pixels.
+        gated : Value or None
+            Decision of a gate for each light; ``None``: the operands contain the decision, if any.
+        colors : stream.Interface
+            Colours of pixels.
+        """
+        p, intensity = self.model, self.intensity
+        if self.slope is not None:
+            m.submodules.slope = self.slope
+            m.d.comb += self.slope.exponent.eq(constants.exponent)
+        self._connect_lights(m, operands)
+        for index, light in enumerate(self.lights):
+            m.submodules[f"light_{index}"] = light
+            of_light = constants.lights[index]
+            m.d.comb += [
+                copy(intensity.constants.diffuse[index], of_light.diffuse),
+                copy(intensity.constants.specular[index], of_light.specular),
+            ]
+            words, terms = operands.payload[index], light.o.payload
+            if p.specular is None:
+                m.d.comb += [light.i.payload.eq(words.cosine), intensity.i.payload.diffuse[index].eq(terms)]
+                continue
+            m.d.comb += [
+                light.i.payload.cosine.eq(words.cosine),
+                light.i.payload.highlight.eq(words.highlight),
+                intensity.i.payload.diffuse[index].eq(terms.diffuse),
+                intensity.i.payload.specular[index].eq(terms.specular),
+            ]
+            if p.gate:
+                decision = words.gated if gated is None else gated[index]
+                m.d.comb += light.i.payload.gated.eq(decision)
+            if light.fades:
+                m.d.comb += light.i.payload.factor.eq(words.factor)
+            if self.slope is not None:
+                m.d.comb += copy(light.constants, self.slope.slope)
+            elif "constants" in light.signature.members:
+                word = constants[self._kind.constant]
+                m.d.comb += Value.cast(light.constants).eq(word)
+        m.d.comb += copy(intensity.constants.ambient, constants.ambient)
+        connect(m, intensity.o, self.encoded(m, colors))
+
+    def connect_tables(self, m: Module, write: data.View, written: Value) -> None:
+        """Connect the tables of the lights, if there are any, and load them by writes of frame constants.
+
+        Parameters
+        ----------
+        m : Module
+            Module of the pipeline.
+        write : View
+            Payload of the write port.
+        written : Value
+            Whether a write was taken on the cycle before.
+        """
+        if self.tables is None:
+            return
+        m.submodules.tables = self.tables
+        for light, read in zip(self.lights, self.tables.reads, strict=True):
+            wiring.connect(m, light.table, read)
+        if self.tables.tables is None:
+            # Whether a write was taken and which address it had, by two registers.
+            of_table = Signal(name="of_table")
+            m.d.sync += [
+                of_table.eq(write.address == LOBE_ADDRESS),
+                Value.cast(self.tables.write.payload).eq(write.data),
+            ]
+            m.d.comb += self.tables.write.valid.eq(written & of_table)
+
+    def _connect_lights(self, m: Module, operands: stream.Interface) -> None:
+        """Handshakes from the operands through all lights to the intensity unit.
+
+        Equal units with the same input and the same ready of the output are in the same state on every cycle:
+        the handshake of the first is that of all. Where lights skip beats, all accept a beat on the same
+        cycle, or none does.
+        """
+        intensity = self.intensity
+        lockstep = self.model.specular is None or not self.lights[0].skips_dark
+        leaders = self.lights[:1] if lockstep else self.lights
+        for light in self.lights:
+            others = [other for other in leaders if other is not light and not lockstep]
+            m.d.comb += [
+                light.i.valid.eq(reduce(and_, (other.i.ready for other in others), operands.valid)),
+                light.o.ready.eq(reduce(and_, (other.o.valid for other in others), intensity.i.ready)),
+            ]
+        m.d.comb += [
+            operands.ready.eq(reduce(and_, (light.i.ready for light in leaders))),
+            intensity.i.valid.eq(reduce(and_, (light.o.valid for light in leaders))),
+        ]
+
+    def connect_constant(self, m: Module, ambient: data.View, colors: stream.Interface) -> None:
+        """Give every pixel the ambient colour, of a pipeline without lights."""
+        p, encoded = self.model, self.encoded(m, colors)
+        for channel, name in enumerate("rgb"):
+            light = ambient[0 if p.grey else channel]
+            level = light.round_half_up(p.intensity.fraction_bits).saturate(p.intensity.result_format)
+            m.d.comb += encoded.payload[name].eq(level.as_value())
+        m.d.comb += colors.valid.eq(1)
+
+    def encoded(self, m: Module, colors: stream.Interface) -> stream.Interface:
+        """Colours on their way to pixels, through the transfer unit if there is one."""
+        transfer = self.transfer
+        if transfer is None:
+            return colors
+        m.submodules.transfer = transfer
+        if self.intensity is not None:
+            connect(m, transfer.o, colors)
+        else:
+            # Constant colours never wait. They are encoded before the first span after a write reaches them.
+            m.d.comb += [
+                copy(colors.payload, transfer.o.payload),
+                transfer.i.valid.eq(1),
+                transfer.o.ready.eq(1),
+            ]
+        return transfer.i
