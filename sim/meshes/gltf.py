@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-import math
 import re
 import struct
 from collections.abc import Iterator
@@ -250,7 +249,7 @@ def _emission(text: dict, name: str) -> Triple | None:
         ("emissiveFactor", given, given),
         ("emissiveStrength", factor, [factor] * 3),
     ):
-        if not _are_numbers(numbers, 3) or not all(0 <= number < math.inf for number in numbers):
+        if not _are_numbers(numbers, 3) or not all(0 <= number <= 1e30 for number in numbers):
             what = "three numbers" if numbers is given else "a number"
             raise Refused(
                 f"material {name!r} has {key} {shown(str(value))!r}, not {what} from 0", ONE_MATERIAL

@@ -42,6 +42,8 @@ _KNOWN = {
     "images": {"uri", "mimeType", "bufferView"},
 }
 _ANY = {"name", "extensions", "extras"}
+# A whole number of JSON may be too large for a float.
+_LARGEST = 1e30
 # Extensions of other kinds of images, beside an image that is read.
 _IMAGES = {"EXT_texture_webp", "KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds"}
 
@@ -90,7 +92,7 @@ def texture_coordinates(info: dict, coordinates: np.ndarray) -> np.ndarray:
     Raises
     ------
     Refused
-        If a number of the transform is missing or not finite.
+        If a number of the transform is missing, not finite or over 1e30.
     """
     transform = extension_of(info, _TRANSFORM)
     if not transform:
@@ -108,7 +110,7 @@ def _numbers(transform: dict, key: str, default: list[float]) -> list[float]:
     numbers = given if len(default) > 1 else [given]
     usable = isinstance(numbers, list) and len(numbers) == len(default)
     for number in numbers if usable else []:
-        usable &= isinstance(number, int | float) and not isinstance(number, bool) and math.isfinite(number)
+        usable &= type(number) in (int, float) and -_LARGEST <= number <= _LARGEST
     if not usable:
         many = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
         raise Refused(f"a texture has the transform's {key} {shown(str(given))!r}, not {many}", ONE_MATERIAL)

@@ -1,6 +1,7 @@
 """Small good meshes and a scene, of every format."""
 
 import base64
+import io
 import itertools
 import json
 import struct
@@ -8,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from PIL import Image
 
 _VERTICES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], "<f4")
 
@@ -16,6 +18,14 @@ _FACES = np.array(
 )
 
 LIBRARY = b"newmtl red\nKd 0.8 0.1 0.1\nKs 0.5 0.5 0.5\nNs 40\nmap_Kd a.png\nnewmtl blue\nKd 0.1 0.1 0.8\n"
+
+
+def _image() -> bytes:
+    """A PNG of 2 x 2 pixels."""
+    file = io.BytesIO()
+    Image.fromarray(np.arange(0, 240, 20, dtype=np.uint8).reshape(2, 2, 3)).save(file, "PNG")
+    return file.getvalue()
+
 
 SCENE = b"""# A scene.
 size = [16, 12]
@@ -67,10 +77,15 @@ def obj() -> bytes:
 
 def document_of(uri: str | None) -> tuple[dict, bytes]:
     """A glTF document of two nodes, and its buffer."""
-    views = [_VERTICES.tobytes(), _VERTICES.tobytes(), _FACES.tobytes()]
+    colors = np.tile(np.array([255, 128, 0, 255], np.uint8), (6, 1))
+    views = [_VERTICES.tobytes(), _VERTICES.tobytes(), _FACES.tobytes(), colors.tobytes()]
+    views += [_VERTICES[:, :2].tobytes(), _image()]
     offsets = np.cumsum([0, *map(len, views)]).tolist()
     buffer = {"byteLength": offsets[-1]} | ({"uri": uri} if uri else {})
-    attributes = {"POSITION": 0, "NORMAL": 1}
+    attributes = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 3, "TEXCOORD_0": 4}
+    transform = {"offset": [0, 0.5], "rotation": 0.5, "scale": [1, 2]}
+    texture = {"index": 0, "texCoord": 0, "extensions": {"KHR_texture_transform": transform}}
+    look = {"baseColorFactor": [0.8, 0.1, 0.1, 1], "baseColorTexture": texture}
     document = {
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -80,11 +95,16 @@ def document_of(uri: str | None) -> tuple[dict, bytes]:
             {"mesh": 0, "translation": [0.5, 0, 0], "scale": [0.5, 0.5, 0.5]},
         ],
         "meshes": [{"primitives": [{"attributes": attributes, "indices": 2, "material": 0}]}],
-        "materials": [{"name": "red", "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.1, 0.1, 1]}}],
+        "materials": [{"name": "red", "pbrMetallicRoughness": look, "emissiveFactor": [0, 0, 0.1]}],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 10497}],
+        "images": [{"bufferView": 5, "mimeType": "image/png"}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 6, "type": "VEC3"},
             {"bufferView": 1, "componentType": 5126, "count": 6, "type": "VEC3"},
             {"bufferView": 2, "componentType": 5125, "count": 24, "type": "SCALAR"},
+            {"bufferView": 3, "componentType": 5121, "normalized": True, "count": 6, "type": "VEC4"},
+            {"bufferView": 4, "componentType": 5126, "count": 6, "type": "VEC2"},
         ],
         "bufferViews": [
             {"buffer": 0, "byteOffset": begin, "byteLength": end - begin}
