@@ -13,7 +13,7 @@ from blysk.golden.methods.installed import installed_methods
 
 __all__ = ["ROOMS", "UNITS"]
 
-ROOMS = ("geometry", "normals", "cosines", "methods", "lighting", "video", "bus", "")
+ROOMS = ("geometry", "normals", "cosines", "methods", "albedo", "lighting", "video", "bus", "")
 """Rooms in the order in which data pass them. The last is for records outside a room."""
 
 _RECORD = re.compile(r"^RECORD = ", re.MULTILINE)

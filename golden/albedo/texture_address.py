@@ -102,7 +102,7 @@ class TextureAddress:
         for axis, logarithm in enumerate((descriptor.width, descriptor.height)):
             sizes.append(np.maximum(logarithm - level, 0))
             wrap = WRAPS[descriptor.wrap[axis]]
-            pair = np.stack([wrapped(first[:, axis] + k, 1 << sizes[axis], wrap) for k in (0, 1)])
+            pair = np.stack([wrapped(first[:, axis] + k, 1 << sizes[axis], wrap) for k in (0, self.bilinear)])
             starts_odd = pair[0] % 2
             low.append(np.where(starts_odd, pair[::-1], pair) >> 1)
             fraction = np.where(pair[0] % 2 == pair[1] % 2, 0, share[:, axis])

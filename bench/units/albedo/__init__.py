@@ -1,0 +1,1 @@
+"""Records of the units in the room `albedo`."""

@@ -1,0 +1,62 @@
+"""Record of the texture sampler."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.albedo.texel_memory import loaded_words
+from blysk.bench.units.albedo.textures import any_places, any_texture, of_descriptor
+from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.golden.albedo.texel_memory import LoadedTextures, TexelMemory, TextureDescriptor
+from blysk.golden.albedo.texture_sampler import TextureSampler
+from blysk.golden.number.fixed import Fixed
+from blysk.golden.reference.texture import Texture
+from blysk.hdl.albedo.texture_sampler import TextureSamplerUnit
+
+__all__ = ["RECORD"]
+
+_MEMORY = TexelMemory(104)
+"""A texture of 16x16 texels, and a small texture."""
+
+
+def _measure(rng, count):
+    """Any texels of an image of 16x16, at exact coordinates."""
+    model = TextureSampler(_MEMORY)
+    texture = Texture(rng.random((16, 16, 3)))
+    loaded = _MEMORY.load([texture])
+    codes, level = any_places(rng, model.address, loaded.descriptors[0], count)
+    place = codes * 2.0**-model.share_bits / np.maximum(16 >> level, 1)[:, np.newaxis]
+    found = model.sample(loaded, loaded.descriptors[0], Fixed(model.address.coordinate_format, codes), level)
+    exact = texture.sample(place, level)
+    return Sample(found.values, exact, None, exact)
+
+
+def _expect(unit, case):
+    p = unit.model
+    coordinates = Fixed(p.address.coordinate_format, case.beats["coordinates"])
+    loaded = LoadedTextures(loaded_words(p.memory, case.write), ())
+    return p.sample(loaded, TextureDescriptor(**case.constants), coordinates, case.beats["level"]).codes
+
+
+def _places(unit, rng, count):
+    """Places over three images each way, their borders, and any; two textures of any size a run."""
+    textures = [any_texture(rng, largest) for largest in (4, 1)]
+    loaded = unit.model.memory.load(textures)
+    descriptor = loaded.descriptors[int(rng.random() < 0.2)]
+    codes, level = any_places(rng, unit.model.address, descriptor, count)
+    return Case({"coordinates": codes, "level": level}, of_descriptor(descriptor), loaded.writes())
+
+
+RECORD = Record(
+    name="texture_sampler",
+    title="Colours of a texture at places of a surface",
+    source="docs/theory/textures.md#texture-unit",
+    variants={
+        "": Variant(partial(TextureSamplerUnit, TextureSampler(_MEMORY)), _measure, "any texels and places"),
+        "interval 3": Variant(partial(TextureSamplerUnit, TextureSampler(_MEMORY), 3), long=True),
+        "nearest": Variant(partial(TextureSamplerUnit, TextureSampler(_MEMORY, bilinear=False)), long=True),
+    },
+    expect=_expect,
+    stimuli={"places": Stimulus(_places, 400, repeats=10, pace=lambda unit: unit.initiation_interval)},
+    axis="exact colour",
+)
