@@ -342,6 +342,7 @@ def transform(**values):
         ({"sampler": {"minFilter": [1]}}, "a sampler has the minFilter '[1]', not one of 9728"),
         ({"info": transform(offset=[1])}, "a texture has the transform's offset '[1]', not 2 finite numbers"),
         ({"info": transform(scale=[1, math.inf])}, "the transform's scale '[1, inf]', not 2 finite numbers"),
+        ({"info": transform(scale=[1, 10**400])}, "not 2 finite numbers"),
         (
             {"info": transform(rotation="1")},
             "a texture has the transform's rotation '1', not a finite number",
@@ -482,6 +483,7 @@ def test_emission(tmp_path, material, emission, told):
     ("material", "reason"),
     [
         ({"emissiveFactor": [1, 1]}, "emissiveFactor '[1, 1]', not three numbers from 0"),
+        ({"emissiveFactor": [1, 1, 10**400]}, "not three numbers from 0"),
         ({"emissiveFactor": [1, 1, -1]}, "emissiveFactor '[1, 1, -1]', not three numbers from 0"),
         ({"emissiveFactor": [1, 1, math.nan]}, "emissiveFactor '[1, 1, nan]', not three numbers from 0"),
         (
