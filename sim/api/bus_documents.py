@@ -15,10 +15,10 @@ from blysk.sim.run_files import MARK
 __all__ = ["FRAME", "documents_of", "frame_text", "layout_lines"]
 
 FRAME = "in the light's frame: H along z, L and V in the xz plane"
-"""Of which frame the vectors N/W of spans or corners are, for a method that takes them."""
+"""Frame of the vectors N/W of spans or corners, for a method that takes vectors."""
 
 _IN_FRAME = ("normal", "start")
-"""Fields of a beat that hold such vectors."""
+"""Fields of a beat that hold vectors N/W."""
 
 _SPACE = 1 << ADDRESS_BITS
 _IN_SVD = {
@@ -45,7 +45,7 @@ def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
 
 
 def frame_text(core: ShadingPipelineUnit | RendererUnit | GeometryUnit) -> str:
-    """Of which frame the vectors of a core's spans or corners are; empty where of none of a light."""
+    """Frame of the vectors of a core's spans or corners. Empty if the frame does not belong to a light."""
     unit = core.geometry if isinstance(core, RendererUnit) else core
     if isinstance(unit, GeometryUnit) and unit.rotates:
         return FRAME.replace("the light's", "light 0's")

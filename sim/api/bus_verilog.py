@@ -65,7 +65,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
     """
     framing, map = unit.framing, unit.map
     packets, layouts = framing.packets, framing.model
-    # The layouts and the map describe the words.
+    # The layouts and the register map describe the words.
     kept = [line for line in of_core if not line.startswith(("status_", "constants_", "before the first"))]
     registers = [
         f"  0x{register.address:03X}  {register.name:<12} {register.text}"

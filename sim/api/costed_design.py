@@ -13,7 +13,7 @@ __all__ = ["Design", "DesignCost"]
 
 @dataclass(frozen=True)
 class DesignCost:
-    """Cost of a pipeline, counted in its netlist; with parts of an FPGA, if its placement is committed.
+    """Cost of a pipeline, counted in its netlist; and parts of an FPGA if a placement is committed.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class DesignCost:
 
 
 class Design(pipeline.ShadingPipeline):
-    """A design of the golden layer with `cost`; it equals the design without."""
+    """A design of the golden layer that also has `cost`. It equals the design without `cost`."""
 
     @classmethod
     def of(cls, design: pipeline.ShadingPipeline) -> "Design":

@@ -80,7 +80,7 @@ and perhaps normals."""
 
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
-"""Names of engines; ``"auto"``: ``"cxxrtl"``, or ``"pysim"`` where no C++ compiler works."""
+"""Names of engines. ``"auto"`` takes ``"cxxrtl"``, or ``"pysim"`` if no C++ compiler works."""
 
 DOCUMENTS = (".md", ".h", ".svd")
 """Suffixes of the documents that are written beside the Verilog of a core on a bus."""
@@ -97,11 +97,11 @@ class Option(NamedTuple):
     kind : Value
         Its type.
     default : object
-        Its value where neither the caller nor a scene file gives one.
+        The option's value if neither the caller nor a scene file gives a value.
     help : str
         Text of the command line's help.
     key : str
-        Its key in a scene file; empty if it has none.
+        Its key in a scene file. Empty if scene files do not have the option.
     """
 
     kind: Value
@@ -157,7 +157,7 @@ class Direction(Vector):
     Parameters
     ----------
     words : mapping of str
-        Meaning of each word: a vector, or the word itself if its vector depends on other options.
+        Value of each word: a vector, or the word itself if its vector depends on other options.
     """
 
     def __init__(self, words: Mapping[str, str | Triple]):
@@ -369,7 +369,7 @@ COUNTS: dict[str, Option] = {
         "How many of the first lights fade, by distance or as spots. Needs --method chord-local.",
     ),
 }
-"""Counts of a design, for commands without a scene; a scene gives its own."""
+"""Counts of a design, for commands without a scene. A scene has its own counts."""
 
 BUILD: dict[str, Option] = {
     "geometry": Option(
@@ -414,7 +414,7 @@ BUILD: dict[str, Option] = {
 
 RENDERING: dict[str, Option] = {
     **{name: BUILD[name] for name in ("geometry", "pipes", "setups")},
-    # For the picture's size, which is an option of the scene.
+    # The size of the depth test is the picture's size, which is an option of the scene.
     "coarse": Option(
         Truth(),
         False,
@@ -438,7 +438,7 @@ RENDERING: dict[str, Option] = {
 
 
 class SceneOptions(TypedDict, total=False):
-    """Options of a scene, by their names in Python: those of `SCENE`."""
+    """Options of a scene from the table `SCENE`, by their names in Python."""
 
     size: tuple[int, int] | str
     background: ColorLike
@@ -466,7 +466,7 @@ class SceneOptions(TypedDict, total=False):
 
 
 class DesignOptions(TypedDict, total=False):
-    """Options of a design, by their names in Python: those of `DESIGN`."""
+    """Options of a design from the table `DESIGN`, by their names in Python."""
 
     method: str
     model: str | TabulatedModel
@@ -486,7 +486,7 @@ class SharedOptions(TypedDict, total=False):
 
 
 class BuildOptions(SharedOptions, total=False):
-    """Options of a core, by their names in Python: those of `BUILD`."""
+    """Options of a core from the table `BUILD`, by their names in Python."""
 
     merged: bool
     top: Literal["shader", "geometry", "render"]

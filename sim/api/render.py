@@ -39,7 +39,10 @@ __all__ = [
 SPECIALISING = "finding what the scene needs"
 """Stage of `prepare_rendering` in which a specialisation is found."""
 BUILDING = "building the model"
-"""Stage of `prepare_rendering` in which the hardware is compiled; the cause of a long time is appended."""
+"""Stage of `prepare_rendering` in which the hardware is compiled.
+
+If this takes long, the cause is appended.
+"""
 
 Progress = Callable[[int, int], object]
 
@@ -55,13 +58,13 @@ class Rendering:
     scenes : tuple of Scene
         What is drawn.
     specialisation : Specialisation
-        The full pipeline and its reductions; none if no specialisation was asked for.
+        The full pipeline and its reductions. Without a specialisation there are no reductions.
     is_specialised : bool
         Whether a specialisation was asked for.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     simulator : FrameSimulator or TriangleSimulator or None
-        The hardware's simulator; ``None`` where there is no compiler and none is needed.
+        The hardware's simulator. ``None`` if there is no compiler and no compiler is needed.
     seconds : dict
         Seconds of loading and building.
     """
@@ -129,14 +132,14 @@ def prepare_rendering(
     settings : Settings
         Settings of `rendering_settings`.
     design : Design, optional
-        The pipeline, in place of the settings' own.
+        The pipeline, which replaces the pipeline of the settings.
     engine : {"auto", "cxxrtl", "pysim"}
-        If ``"auto"`` finds no compiler, pictures are at most `SLOW_SIZE`, with a warning; a given scene keeps
-        its size.
+        If ``"auto"`` finds no compiler, there is a warning, and pictures are at most `SLOW_SIZE`. A given
+        scene keeps its size.
     frames : int
-        Number of frames of a turntable; 0: a single picture.
+        Number of frames of a turntable. 0 stands for a single picture.
     remote : bool
-        Whether other machines draw the frames, so that a compiler is not needed on this one.
+        Whether other machines draw the frames. Then this machine needs no compiler.
     stage : callable
         Called with a text before each stage of the work.
     """
@@ -181,7 +184,7 @@ def _large(design: ShadingPipeline) -> str:
 def _simulator(
     design: ShadingPipeline, scene: Scene, settings: Settings, engine: str
 ) -> FrameSimulator | TriangleSimulator:
-    """The simulator of the geometry that is asked for."""
+    """The simulator for the geometry option."""
     if settings["pipes"] > scene.height:
         reason = f"the picture has {scene.height} row{'s' * (scene.height > 1)}"
         raise settings.refuse("pipes", reason, "give at most one for each row")
@@ -211,7 +214,7 @@ def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
     if given.pop("coarse"):
         given["coarse"] = (source.width, source.height) if isinstance(source, Scene) else settings["size"]
     try:
-        # A design that drew another frame may bring options of its core.
+        # A design that a caller gives may bring options of its core.
         return built(replace(design, build=design.build.shading), given)
     except OptionError as error:
         if error.option == "geometry" or (error.option == "pipes" and not hardware):
@@ -262,7 +265,7 @@ def _specialised(scenes: Sequence[Scene], design: ShadingPipeline, settings: Set
 
 
 def _shrink(settings: Settings, error: CompilerMissing) -> None:
-    """Reduce the picture to the size of the engine pysim, with a warning; a given scene keeps its size."""
+    """Reduce the picture to the size of the engine pysim, with a warning. A given scene keeps its size."""
     if isinstance(settings.source, Scene):
         warnings.warn(f"pysim instead of cxxrtl, {error}", RuntimeWarning, stacklevel=4)
         return
@@ -303,8 +306,8 @@ def render(
 ) -> RenderedFrame:
     """Draw a mesh or a scene by a simulated pipeline.
 
-    The simulation is checked: a new model gives the pixels of the bit-accurate model for a sample, and the
-    frame has no lost or doubled pixel.
+    The simulation is checked. For a sample a new model must give the pixels of the bit-accurate model. The
+    frame must have no lost or doubled pixel.
 
     Parameters
     ----------
@@ -312,16 +315,16 @@ def render(
         ``"teapot"``, a mesh file, a scene file (``.toml``), a mesh, a scene as `scene` makes it, a mesh of
         trimesh, or ``(vertices, faces)`` or ``(vertices, faces, normals)``, see `given_mesh`.
     design : Design, optional
-        The pipeline, as `design` makes it; in place of options of a design.
+        The pipeline, as `design` makes it. It replaces the options of a design.
     engine : {"auto", "cxxrtl", "pysim"}
-        Simulator: the compiled one, or Amaranth's own; ``"auto"`` takes the first where a C++ compiler works,
-        else the second, with a warning and at most 160 x 120 pixels.
+        Simulator: the compiled simulator, or Amaranth's own. ``"auto"`` takes the compiled simulator if a C++
+        compiler works. Else it takes Amaranth's own, with a warning and at most 160 x 120 pixels.
     vcd : path, optional
         File for the waveforms; it sets the engine to ``"pysim"`` and the default size to 160 x 120.
     progress : callable, optional
         Called now and then with the number of pixels so far and in all.
     **options
-        Those below, by the names of the command line. Each takes the text of the command line, too:
+        The options below, by the names of the command line. Each also takes the text of the command line:
         ``size="640x480"``, ``lights="0,1,1"``. ``None`` counts as not given.
 
     Raises

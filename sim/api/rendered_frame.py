@@ -37,7 +37,7 @@ class RenderedFrame:
     scene : Scene
         The scene that was drawn.
     design : Design
-        The pipeline; for a specialised pipeline, the full pipeline.
+        The pipeline. If it was specialised, this is the full pipeline.
     simulated : SimulatedFrame or SimulatedTriangleFrame
         The hardware's frame, from spans or from triangles.
     name : str
@@ -70,7 +70,7 @@ class RenderedFrame:
 
     @property
     def total_error(self) -> FrameErrors:
-        """Errors against exact shading by the exact model: a lobe's own, else Blinn's power (`target_of`).
+        """Errors against exact shading by the exact model: a lobe's own, or Blinn's power (`target_of`).
 
         This includes the error of the reflection model. With a lobe it equals `error`.
         """
@@ -83,7 +83,10 @@ class RenderedFrame:
 
     @property
     def cycles(self) -> int:
-        """Cycles from the first write of a constant to the last pixel; of triangles until all are drawn."""
+        """Cycles from the first write of a constant to the last pixel.
+
+        A frame of triangles counts until all are drawn.
+        """
         return self.simulated.cycles
 
     @property
@@ -93,7 +96,7 @@ class RenderedFrame:
 
     @property
     def pixels(self) -> int:
-        """Number of pixels that left it, with hidden pixels."""
+        """Number of pixels that left the shading pipeline, including hidden pixels."""
         return self.simulated.pixels
 
     @property
@@ -103,7 +106,10 @@ class RenderedFrame:
 
     @cached_property
     def comparison(self) -> Comparison:
-        """The golden frame, and the errors against three references; with triangles, against two."""
+        """The golden frame, and the errors against three references.
+
+        A frame of triangles has two references.
+        """
         if isinstance(self.simulated, SimulatedTriangleFrame):
             drawn = self.simulated
             return compare_triangles(self.scene, Renderer(self.design), drawn.sent, drawn.image)

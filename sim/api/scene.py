@@ -55,8 +55,8 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         ``"bottom"``. The camera shows the whole mesh. The default is (0.4, 0.5, 1) along right, up and front.
         Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z. Right is the cross product of up and front.
     position, target : three floats
-        Position of the camera, which replaces ``view``, and the point in the middle of its picture. Without
-        ``target`` this is the middle of the mesh. Both are in the mesh's units.
+        Position of the camera, which replaces ``view``, and the point in the middle of its picture. The
+        default of ``target`` is the middle of the mesh. Both are in the mesh's units.
     up : three floats or {"x", "y", "z"}
         Direction that points up in the picture, by default y for all formats. STL files often need z.
     field_of_view : float
@@ -68,7 +68,7 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         direction, or direction and colour. Lights with a position need the method ``chord-local``. They may
         fade by distance or be spots. Lights of colour 0 are off, and left out.
     point_lights, spot_lights
-        More lights in the same forms. Their numbers are those of ``--point-light`` and ``--spot-light``.
+        More lights in the same forms. Their numbers are as for ``--point-light`` and ``--spot-light``.
     ambient, diffuse, specular, exponent, roughness, fresnel
         See `Material`; by default the values of the mesh file's materials, else copper and exponent 50. An
         exponent that is given here also replaces the roughness of a file.
@@ -145,7 +145,7 @@ def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Sc
     loaded : LoadedMesh
         The mesh.
     settings : Settings
-        All options of `scene`. If the source is a scene, it is the first.
+        All options of `scene`. If the source is a scene, this scene is the first.
     count : int
         Number of frames of a turntable.
 
@@ -170,7 +170,7 @@ def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Sc
 def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, list[Camera]]:
     """The first scene, and the cameras of all scenes."""
     mesh = loaded.mesh
-    # The camera frames the mesh whatever its unit is; products of huge or tiny coordinates would overflow.
+    # Products of huge or tiny coordinates would overflow. The camera frames the mesh in any unit.
     shift = -int(np.frexp(np.abs(mesh.vertices).max())[1])
     mesh = replace(mesh, vertices=np.ldexp(mesh.vertices, shift))
     width, height = settings["size"]
@@ -188,7 +188,7 @@ def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, li
 
 
 def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
-    """The file's materials. Coefficients from options replace those of the file."""
+    """The file's materials. Coefficients from options replace coefficients of the file."""
     default = Material(*(settings[name] for name in COEFFICIENTS))
     return surfaces(loaded.materials, default, settings.given.intersection(COEFFICIENTS))
 
@@ -211,7 +211,7 @@ def _framing(vertices: np.ndarray, settings: Settings, count: int) -> list[Camer
     """Cameras that show the whole mesh."""
     width, height = settings["size"]
     view, up = settings["view"], settings["up"]
-    # The first direction is the same to the bit, however many there are.
+    # The first direction is the same to the bit for any number of directions.
     views = [view, *turned(normalise(view), up, count)[1:].tolist()]
     kind = settings["projection"], width / height, settings["field_of_view"]
     return equal_distance([Camera.framing(vertices, view, *kind, up=up) for view in views])

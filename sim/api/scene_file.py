@@ -20,10 +20,13 @@ from blysk.sim.value_types import PartError, Value, shown, shown_key
 __all__ = ["MAX_BYTES", "SceneFile", "key_lines", "read_scene_file"]
 
 MAX_BYTES = 100_000
-"""Largest scene file, in bytes; it holds no mesh."""
+"""Largest scene file, in bytes. A scene file holds no mesh."""
 
 _MAX_DOTS = 256
-"""Most dots in a line: `tomllib` takes memory with the square of the parts of a key."""
+"""Most dots in a line.
+
+The memory that `tomllib` takes grows with the square of the number of parts of a key.
+"""
 
 
 @dataclass(frozen=True)
@@ -114,8 +117,8 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
         # setup_interval = 4                # for methods with this choice
         {rendering}
 
-    The values have the ranges of the command line, and may be its texts: ``size = "640x480"``.
-    This function checks neither the mesh file nor conflicts between values.
+    The values have the ranges of the command line. They may also be texts of the command line: ``size =
+    "640x480"``. This function checks neither the mesh file nor conflicts between values.
 
     Parameters
     ----------

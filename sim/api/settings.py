@@ -26,7 +26,7 @@ __all__ = ["Settings", "check_engine", "check_mesh", "checked", "read_settings",
 
 @dataclass(frozen=True)
 class Settings:
-    """Values of options, and the origin of each.
+    """Values of options, and the origin of each value.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Settings:
         return self.values[name]
 
     def refuse(self, name: str, reason: str, remedy: str, value: object = None) -> OptionError:
-        """The error of a value. Without ``value`` the message shows the option's own."""
+        """The error of a value. Without ``value`` the message shows the value of these settings."""
         return OptionError(name, self.values[name] if value is None else value, reason, remedy)
 
     @property
@@ -121,7 +121,7 @@ def read_settings(
     table : dict
         All options.
     **defaults
-        Defaults that replace those of the table.
+        Defaults that replace defaults of the table.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def check_engine(engine: str) -> None:
     Raises
     ------
     OptionError
-        If there is none of that name.
+        If there is no option of that name.
     """
     checked({"engine": engine}, {"engine": Option(Choice("engine", get_args(Engine)), "auto", "")})
 
@@ -231,7 +231,7 @@ def _triple(vector: np.ndarray) -> Triple:
 
 
 _INSTEAD = {"view": ("position", "target"), "position": ("view", "target")}
-"""Options of a scene file that a caller's option replaces, besides the one of its name."""
+"""Options of a scene file that a caller's option replaces, besides the option of the same name."""
 
 
 def _check_pairs(settings: Settings) -> None:

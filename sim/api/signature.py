@@ -32,9 +32,10 @@ def with_options(table: Mapping[str, Option], types: type | None = None) -> Call
     Parameters
     ----------
     table : dict
-        The options. The signature has their defaults, and no types: these would hide the names.
+        The options. The signature has their defaults. It has no types, because types would hide the names.
     types : TypedDict, optional
-        Type of each. With it the docstring gets a section with type, default and help of each option.
+        Type of each option. If given, the docstring gets a section with type, default and help of each
+        option.
     """
 
     def decorate(function: Function) -> Function:

@@ -75,7 +75,7 @@ class Turntable(Sequence[RenderedFrame]):
         milliseconds : int
             Time that each frame is shown, in steps of 10.
         progress : callable, optional
-            Called after each frame with the number of frames drawn, and of all frames.
+            Called after each frame with the number of frames drawn and the number of all frames.
 
         Raises
         ------
@@ -104,7 +104,7 @@ def turntable(
     engine: Engine = "auto",
     **options: Unpack[RenderOptions],
 ) -> Turntable:
-    """Frames of a camera that goes once around a mesh in equal steps. The first frame is that of `render`.
+    """Frames of a camera that goes once around a mesh in equal steps. `render` gives the first frame.
 
     The lights do not move. This function draws in the calling process. ``blysk render --frames`` draws in
     several processes or on several machines::

@@ -1,4 +1,4 @@
-"""Beats of a stream as NumPy arrays, and their packed form, the words that both engines drive and read.
+"""Beats of a stream as NumPy arrays, and packed into the words that both engines drive and read.
 
 A beat's layout is an `amaranth.lib.data` structure or array, nested as needed, or a plain shape. Fields of
 all other shape-castables (a fixed-point format, an enumeration) are given as integer codes.
@@ -16,7 +16,7 @@ _WORD = 32
 
 
 def _resolve(shape) -> Layout | Shape:
-    """The structure or array layout that a shape stands for, or else its plain shape."""
+    """The structure or array layout of a shape. A plain shape is returned as it is."""
     while isinstance(shape, ShapeCastable) and not isinstance(shape, Layout):
         shape = shape.as_shape()
     if not isinstance(shape, Layout):
@@ -190,7 +190,7 @@ def unpack(layout, words: np.ndarray) -> np.ndarray:
             shift = word * _WORD - offset
             part = words[:, word].astype(np.uint64)
             code |= part >> np.uint64(-shift) if shift < 0 else part << np.uint64(shift)
-        # The field's top bit is shifted to bit 63 and back: the arithmetic shift extends the sign.
+        # The field's top bit is shifted to bit 63 and back. The arithmetic shift back extends the sign.
         spare = 64 - shape.width
         if spare < 64:
             code = code << np.uint64(spare)

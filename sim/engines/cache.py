@@ -90,7 +90,7 @@ def provide_caches() -> None:
     try:
         folder, home = Path(platformdirs.user_cache_path()), Path.home()
         no_home = _unwritable(home)
-        # A home that does not exist is not made.
+        # A home folder that does not exist is not made.
         if no_home is None or not folder.is_relative_to(home):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         reason = _unwritable(folder)

@@ -15,8 +15,8 @@ from blysk.sim.installation import install_extra
 
 __all__ = ["Compiler", "compiler_missing", "find_compilers"]
 
-# A model is one long function over thousands of members. GCC's search for redundant loads and dead stores
-# among them takes half of the compile time, and finds so few that the model runs as fast without it.
+# A model is one long function over thousands of members. GCC searches among them for redundant loads and dead
+# stores. The search takes half of the compile time, and the model runs as fast without it.
 _GCC_FLAGS = ("-fno-gcse", "-fno-tree-dse", "--param", "sccvn-max-alias-queries-per-access=50")
 _REMEDY = f"install one, or {install_extra('native')}, or use the engine pysim"
 
@@ -33,7 +33,7 @@ class Compiler:
         Commands. The caller appends the input file, and ``-o`` with the output file. ``link`` is empty if
         ``compile`` makes the shared library in one step.
     identity : str
-        Path (or name of the package) and version, a part of the key of a cached model.
+        Path (or name of the package) and version. It is a part of the key of a cached model.
     """
 
     name: str
@@ -111,7 +111,7 @@ def _zig() -> Compiler | None:
 def find_compilers() -> Iterator[Compiler]:
     """Compilers of this machine, best first: ``c++``, ``g++``, ``clang++``, ziglang.
 
-    If ``$CXX`` is set, it is the only one tried. The flags in ``$CXXFLAGS`` follow the optimisation flags.
+    If ``$CXX`` is set, only this compiler is tried. The flags in ``$CXXFLAGS`` follow the optimisation flags.
     ziglang does not get them.
 
     Yields

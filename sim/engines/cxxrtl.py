@@ -1,4 +1,4 @@
-"""The compiled engine. CXXRTL translates a component to C++, which is compiled, cached and run.
+"""The compiled engine. CXXRTL translates a component to C++. This C++ is compiled, cached and run.
 
 Amaranth writes RTLIL; Yosys' CXXRTL makes a C++ class of it, which `parts`, `guards` and `words` rewrite.
 `cxxrtl_driver.cc` has the loop over the cycles, and returns to Python once in a million cycles. Before a
@@ -46,7 +46,8 @@ from blysk.sim.errors import InputError
 
 __all__ = ["Compiled", "runtime_folder", "sources_of"]
 
-# A component whose model is in the cache is not elaborated; Amaranth would tell so when it is deleted.
+# A component whose model is in the cache is not elaborated. Amaranth would warn of this when the component is
+# deleted.
 warnings.filterwarnings("ignore", message=r"<blysk\.", category=UnusedElaboratable)
 
 # No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
@@ -75,7 +76,7 @@ class _Job(ctypes.Structure):
 
 
 def _load(path: Path, key: str) -> ctypes.CDLL:
-    """Load a compiled model; `OSError` if the file is not a model, or is one with another key."""
+    """Load a compiled model. `OSError` if the file is not a model, or has another key."""
     library = ctypes.CDLL(str(path))
     try:
         library.blysk_key.restype = ctypes.c_char_p
@@ -112,7 +113,8 @@ def _entry(folder: Path, key: str) -> ctypes.CDLL | None:
 def _without_collection() -> Iterator[None]:
     """Turn garbage collection off.
 
-    A netlist's many small objects all stay in use; collection would take a third of the time.
+    A netlist has many small objects, which all stay in use. Garbage collection would take a third of the
+    time.
     """
     enabled = gc.isenabled()
     gc.disable()
@@ -161,7 +163,8 @@ def _generate(netlist: str) -> str:
     except PermissionError as error:
         raise SimulationError(f"Yosys: {error.filename} cannot be started ({error.strerror})") from error
     for warning in caught:
-        # With feedback or buffered wires, one evaluation a cycle gives wrong values, and several are slow.
+        # With feedback or buffered wires, one evaluation a cycle gives wrong values. Several evaluations are
+        # slow.
         if issubclass(warning.category, YosysWarning) and re.search(
             "feedback|buffered", str(warning.message)
         ):
@@ -274,7 +277,7 @@ def _workshop() -> Iterator[Path]:
 
 
 def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path) -> str | None:
-    """Compile the shared library ``model`` in a folder; the compiler's complaint, or ``None`` on success."""
+    """Compile the shared library ``model`` in a folder. Returns the compiler's error text, or ``None``."""
     names = f'#define BLYSK_MODEL "model.cc"\n#define BLYSK_KEY "{key}"\n'
     text = _generate(netlist)
     (folder / "model.cc").write_text(text)
@@ -297,7 +300,7 @@ def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path
 
 
 def _kept(built: Path, folder: Path, key: str) -> Path:
-    """Copy of a library under a temporary name in the cache folder, or in a private one if that fails."""
+    """Copy of a library under a temporary name in the cache folder; if that fails, in a private folder."""
     try:
         return _copied(built, folder, key)
     except OSError as error:
@@ -328,17 +331,17 @@ class Compiled:
     entry's content. The key is made of netlist, Yosys script, `parts`, `guards`, `words`, driver, compiler,
     flags, platform and version of Yosys. An entry is written under a temporary name and then renamed, so no
     process reads half of it. If the cache has no room, there is a warning, and the next process builds again.
-    For an origin the cache has a note, too. This is a file with the netlist's hash, named by the hash of
-    component type, origin, code and libraries.
+    For an origin the cache also has a file with the netlist's hash. The file's name is the hash of component
+    type, origin, code and libraries.
 
     Parameters
     ----------
     component : Component
         Component to simulate.
     origin : optional
-        All values that, with its type, determine the component. With them a cached model is found without
-        making the netlist. An origin may contain built-in values, values of NumPy and objects that `golden`,
-        `hdl` and `sim` define. It is ignored if it contains anything else, or cannot be pickled.
+        All values that determine the component, together with its type. With them a cached model is found
+        without making the netlist. An origin may contain built-in values, values of NumPy and objects that
+        `golden`, `hdl` and `sim` define. It is ignored if it contains anything else, or cannot be pickled.
 
     Raises
     ------
@@ -410,7 +413,7 @@ class Compiled:
     def _check(self, drive: Drive) -> None:
         component, target, entry = self._unchecked
         write, after = drive.write, drive.write_after
-        # The writes of 1024 materials take pysim half of the time of a build.
+        # For the writes of 1024 materials pysim needs half of the time of a build.
         if len(write) > 2 * _CHECK_WRITES:
             kept = np.r_[:_CHECK_WRITES, len(write) - _CHECK_WRITES : len(write)]
             write, after = write[kept], None if after is None else after[kept]
@@ -431,7 +434,7 @@ class Compiled:
                 f"the first {limit} cycles: a fault of the compiler or of CXXRTL; use the engine pysim, or "
                 "another compiler in CXX"
             )
-        # If the cache has meanwhile filled up or been removed, only the next process has to build again.
+        # If the cache has filled up or was removed in the meantime, only the next process has to build again.
         with contextlib.suppress(OSError):
             os.replace(target, entry)
         self._unchecked = None

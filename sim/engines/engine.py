@@ -7,13 +7,13 @@ the streams ``i`` (in) and ``o`` (out), and may have
 - ``write``, a stream in;
 - ``status``, an output, read after the run.
 
-Both engines do the same on every clock. So they give equal beats at equal cycles:
+Both engines do the same on every clock, so they give equal beats at equal cycles:
 
 1. The writes are offered first, each until it is taken. From the clock after the last write on, the source
    offers the next input beat, unless ``input_stalls`` says otherwise on this clock. An offered beat stays
-   until it is taken. Writes that come after a number of beats are offered when these are taken, beside the
-   next beats. While ``valid`` is low, every payload bit of an input is 1. So a component that uses a payload
-   without ``valid`` gives wrong results.
+   until it is taken. A write that comes after a number of beats is offered when these beats are taken, at the
+   same time as the next beats. While ``valid`` is low, every payload bit of an input is 1. So a component
+   that uses a payload without ``valid`` gives wrong results.
 2. The sink is ready unless ``output_stalls`` says otherwise on this clock.
 3. ``ready``, ``valid`` and payloads are read as they stand just before the rising edge. A beat moves at the
    edge where its ``valid`` and ``ready`` are both high.
@@ -49,7 +49,7 @@ class Ports:
     i, o : shape
         Payload shapes of the input and of the output stream.
     constants, write, status : shape or None
-        Shape of each, ``None`` if the component lacks it.
+        Shape of each member. ``None`` if the component does not have the member.
 
     Raises
     ------
@@ -148,7 +148,7 @@ class StopReason(IntEnum):
 
 @dataclass(frozen=True)
 class Trace:
-    """Record of an engine's run, with packed beats. `Run` has the same with unpacked beats.
+    """Record of an engine's run, with packed beats. `Run` is the same record with unpacked beats.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""CXXRTL's expressions, read and written anew: of at most 64 bits in one machine word.
+"""CXXRTL's expressions, read and written anew. Values of up to 64 bits are computed in one machine word.
 
 CXXRTL writes every expression with templates over the widths: ``add_uu<5>(a.curr, b.slice<7,4>().val())``.
 `expressions_of` reads such an expression. It writes
@@ -36,20 +36,20 @@ condition or memory access stays as it is.
 
 
 class Unreadable(Exception):
-    """Raised for a statement that is not understood, and so stays as it is."""
+    """Raised for a statement that is not understood. The statement then stays as it is."""
 
 
 class Expression(NamedTuple):
     """C++ of an expression, and what is known of its value.
 
-    ``code`` is a variable's name if ``variable``; else a word, below 2^width, for up to 64 bits, and a
-    ``value`` for more. The other fields are empty where they do not apply:
+    If ``variable``, ``code`` is a variable's name. Else it is a word below 2^width for up to 64 bits, and a
+    ``value`` for more bits. The other fields are empty if they do not apply:
 
     - ``low``: simpler C++ of a word with the lowest 64 bits.
     - ``among``: a word and a mask. The expression is not 0 if, and only if, the word is a constant whose bit
       is set in the mask.
-    - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits; or,
-      if it has 1 bit and they are more, it tells whether they are not all 0.
+    - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits. If
+      it has 1 bit and there are several bits, it is 1 if any of the bits is 1.
     - ``zeros``: a variable, last and first bit, and a number. The expression is the count of leading zeros of
       these bits plus the number.
     """
@@ -64,7 +64,7 @@ class Expression(NamedTuple):
 
     @property
     def word(self) -> str:
-        """The value as a word; refused as `Unreadable` for more than 64 bits."""
+        """The value as a word. More than 64 bits are refused as `Unreadable`."""
         if self.width > 64:
             raise Unreadable
         if not self.width:
@@ -106,9 +106,9 @@ def literal(parts: str) -> int:
 class _Parser:
     """Recursive-descent parser of one expression.
 
-    In a text of more than `LONG` characters, operands whose code has more than 64 characters get a name, and
-    equal ones the same: ``names``, by code. CXXRTL repeats the text of an operand at every use; in a divider
-    the text of a step is repeated for every step after it.
+    In a text of more than `LONG` characters, operands whose code has more than 64 characters get a name.
+    Equal operands get the same name; ``names`` has the names by code. CXXRTL repeats the text of an operand
+    at every use. In a divider it repeats the text of a step for every later step.
     """
 
     def __init__(self, text: str, variables: dict[str, tuple[str, int]]):
@@ -273,8 +273,8 @@ def _bits(of: Expression) -> tuple[Expression, int, int] | None:
 def _zeros(question: Expression, yes: Expression, no: Expression) -> tuple[Expression, int, int, int] | None:
     """``zeros`` of ``(question ? yes : no)``, if it counts the leading zeros of adjacent bits; else ``None``.
 
-    The condition is that the upper part of the bits is not 0; then ``yes`` counts its leading zeros, else
-    ``no`` those of the lower part and adds the width of the upper one.
+    The condition is that the upper part of the bits is not 0. Then ``yes`` counts the upper part's leading
+    zeros. Else ``no`` counts the lower part's leading zeros, and adds the width of the upper part.
     """
     if not (yes.zeros and no.zeros and question.bits):
         return None
@@ -328,7 +328,7 @@ def _binary(name: str, width: int, a: Expression, b: Expression) -> Expression:
             code = _cut(f"{_SHIFTS[name]}({a.signed if signs == 'su' else a.word}, {b.word})", width)
         elif signs in ("uu", "ss") and operation in _ARITHMETIC:
             code = f"{left} {_ARITHMETIC[operation]} {right}"
-            # A bitwise operation on operands no wider than the result needs no mask.
+            # A bitwise operation needs no mask if no operand is wider than the result.
             fits = signs == "uu" and operation in ("and", "or", "xor") and max(a.width, b.width) <= width
             code = f"({code})" if fits else _cut(code, width)
             if operation == "add" and b.zeros and _NUMBER.fullmatch(left):

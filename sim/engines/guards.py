@@ -111,7 +111,7 @@ class _Block:
         for k, item in enumerate(self.items):
             for register in item.reads:
                 readers[register].add(k)
-        # Of each statement, the registers that it writes and others still read.
+        # For each statement, the registers that it writes and that other statements still read.
         waits = {
             k: {name for name in item.writes if name not in buffered and readers[name] - {k}}
             for k, item in enumerate(self.items)
@@ -160,10 +160,11 @@ class _Block:
 
 
 def _guard_writes(text: str) -> str:
-    """Put each memory write, and the assignments that only make its word, under a test of the enable.
+    """Put each memory write under a test of its enable, with the assignments that only this write needs.
 
-    CXXRTL makes the word and calls ``update`` on every clock, with the enable repeated as a mask. The move is
-    valid as at the edge memories are written before registers, which then still have their old values.
+    CXXRTL makes the word and calls ``update`` on every clock, with the enable repeated as a mask. This move
+    changes nothing, because at the edge memories are written before registers. The registers still have their
+    old values then.
     """
 
     def guarded(match: re.Match) -> str:
@@ -179,10 +180,10 @@ def _guard_writes(text: str) -> str:
 
 
 def _write_at_once(text: str) -> tuple[str, set[str]]:
-    """Replace ``update`` by ``write`` for each memory with one write port; also returns their names.
+    """Replace ``update`` by ``write`` for each memory with one write port. Also returns the memories' names.
 
     ``write`` changes the memory at once. All statements that read a memory come before it. A mask that
-    repeats one enable bit is dropped, as `_guard_writes` has put the write under a test of that bit.
+    repeats one enable bit is dropped, because `_guard_writes` has put the write under a test of this bit.
     """
     counts = Counter(match[1] for match in _UPDATE.finditer(text))
     memories = {name for name, count in counts.items() if count == 1}
@@ -237,8 +238,8 @@ def group_registers(text: str) -> str:
     - The statements at the edge read old register values, and combinational values that are complete before
       the first of them. So their order is free, and a register that no later statement reads may take its
       next value.
-    - Before every evaluation, ``next`` of a copied register equals its ``curr``. So ``r.next = r.curr`` may
-      be left out.
+    - Before every evaluation, ``next`` of a copied register equals its ``curr``. So the statement ``r.next =
+      r.curr`` may be left out.
     - The driver reads outputs before the copies. So registers that are outputs are copied.
     - The reset is an input that the driver never sets, so it is always 0.
 

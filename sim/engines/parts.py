@@ -44,7 +44,10 @@ class _Reader:
         return self.widths[source.removesuffix(".curr")][1]
 
     def found(self, name: str, low: int, high: int) -> _Part | None:
-        """Source of bits ``low`` to ``high`` of a word; ``None`` if unknown, or if there are several."""
+        """Source of bits ``low`` to ``high`` of a word.
+
+        ``None`` if it is unknown, or if there are several sources.
+        """
         for part in self.parts.get(name, ()):
             if part.low <= low and high <= part.high:
                 return _Part(low, high, part.source, part.start + low - part.low)
@@ -70,7 +73,10 @@ class _Reader:
         return f"{part.source}.slice<{stop},{part.start}>()" + (".val()" if last is None else "")
 
     def statements(self, line: str) -> Iterator[str]:
-        """Lines for a statement of ``eval``, rewritten; the sources of the word that it assigns are noted."""
+        """Rewritten lines for a statement of ``eval``.
+
+        The sources of the word that it assigns are recorded.
+        """
         match = _ASSIGNMENT.fullmatch(line)
         kind, width = self.widths.get(match[1], ("", 0)) if match else ("", 0)
         if kind != "value":
@@ -138,7 +144,7 @@ def read_parts(text: str) -> str:
 
 
 def _late(lines: list[str]) -> list[str]:
-    """Lines with the status, and the local words that only it needs, moved under a test for no clock edge."""
+    """Move the status, and local words that only it needs, under a test for no clock edge."""
     local = {match[1] for line in lines if (match := _LOCAL.fullmatch(line))}
     assignments = {k: match for k, line in enumerate(lines) if (match := _ASSIGNMENT.fullmatch(line))}
     late, readers = {"p_status"}, defaultdict(set)

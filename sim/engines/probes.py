@@ -1,4 +1,4 @@
-"""The pipeline with internal values in its status, the number of gated pixels and words of its stages."""
+"""The pipeline with internal values in its status: the number of gated pixels, and words of its stages."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -38,8 +38,8 @@ class Probe:
     shape : ShapeLike
         Its shape. A fixed-point number has a `FixedShape`.
     age : int
-        Cycles from the lights' taking of a pixel's operands (``taken`` of `ObservedPipeline`) to the cycle in
-        which the word belongs to this pixel. Negative if the word comes first.
+        Cycles from the cycle in which the lights take a pixel's operands (``taken`` of `ObservedPipeline`) to
+        the cycle in which the word belongs to this pixel. Negative if the word comes first.
     exact : str
         Name of the exact quantity that the word approximates: ``normal_x``, ``normal_y``, ``normal_z``;
         ``cosine`` (N·L), ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H); ``product`` (the
@@ -66,17 +66,17 @@ class ObservedPipeline(Component):
     Parameters
     ----------
     design : ShadingPipeline
-        Design of the pipeline, with one light, with a gate or without.
+        Design of the pipeline, with one light. It may have a gate.
 
     Members
     -------
     i, o, write
-        Those of `ShadingPipelineUnit`.
+        As for `ShadingPipelineUnit`.
     status : :py:`Out(StructLayout({..., "gated_pixels": 32}))`
         The fields of its status, and
 
-        - ``gated_pixels``: number of pixels that the lights have taken of spans in which the gate found no
-          highlight, 0 without a gate;
+        - ``gated_pixels``: number of taken pixels whose spans have no highlight by the gate, 0 without a
+          gate;
         - ``waits``: whether a pixel of the interpolator is stalled;
         - ``taken``: whether the lights take a pixel;
         - each word, by the name of its probe.
@@ -101,7 +101,7 @@ class ObservedPipeline(Component):
     def elaborate(self, platform):
         """The pipeline, the counter of gated pixels, and connections from internal words to the status."""
         m = Module()
-        # Elaborated here, so that its internal signals can be found.
+        # The unit is elaborated here, so that its internal signals can be found.
         m.submodules.pipeline = fragment = Fragment.get(self.unit, platform)
         for name, member in self.unit.signature.members.items():
             inner, outer = getattr(self.unit, name), getattr(self, name)
@@ -140,7 +140,7 @@ def probes_of(unit: ShadingPipelineUnit) -> list[Probe]:
 
 
 def _part(fragment: Fragment, path: str) -> Fragment | None:
-    """Submodule by its path, names with dots between; ``None`` if there is none."""
+    """Submodule by its path, whose names have dots between them. ``None`` if there is no such submodule."""
     for name in path.split("."):
         inside = [part for part, own, *_ in fragment.subfragments if own == name]
         if not inside:

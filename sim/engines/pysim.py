@@ -1,4 +1,7 @@
-"""The interpreted engine, Amaranth's own simulator. It is always there, is slow, and writes waveforms."""
+"""The interpreted engine, Amaranth's own simulator.
+
+It needs no compiler, is slow, and can write waveforms.
+"""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -23,7 +26,7 @@ term for every bit."""
 
 
 def _codes(words: np.ndarray) -> list[int]:
-    """Beats as Python integers, one a beat, however wide."""
+    """Beats of any width, each as one Python integer."""
     return [int.from_bytes(row.tobytes(), "little") for row in words.astype("<u4")]
 
 

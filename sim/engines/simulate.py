@@ -185,20 +185,20 @@ def simulate(
     beats : structured array or mapping
         Input beats, as `beats.pack` takes them.
     count : int or None
-        Expected number of output beats. The run ends when they, all writes and all input beats are
-        transferred and ``settle`` more cycles have passed. ``None`` takes as many as come, until all input is
-        taken and ``idle_timeout`` cycles have passed without a transfer.
+        Expected number of output beats. The run ends ``settle`` cycles after these beats, all writes and all
+        input beats are transferred. ``None`` takes as many as come, until all input is taken and
+        ``idle_timeout`` cycles have passed without a transfer.
     constants : scalar of the constants' type, or mapping of names to codes
         Values for the whole run. Needed if the component has ``constants``.
     write : structured array or mapping, optional
         Beats for the ``write`` stream, delivered before the first input beat.
     write_after : int array, optional
-        Number of input beats that are taken before each write is offered, in ascending order. Beside a write
-        behind the first beat the next input beats are offered. If these depend on the write, the component
-        has to take the write first.
+        Number of input beats that are taken before each write is offered, in ascending order. A write that
+        comes after the first beat is offered at the same time as the next input beats. If these beats depend
+        on the write, the component has to take the write first.
     engine : str
-        ``"cxxrtl"``, ``"pysim"``, or ``"auto"``: the compiled engine, or, with a warning, pysim if no
-        compiler works.
+        ``"cxxrtl"``, ``"pysim"``, or ``"auto"``. ``"auto"`` takes the compiled engine. If no compiler works,
+        it takes pysim with a warning.
     origin : optional
         Values that the component is made from, as for `cxxrtl.Compiled`. With them the component is found
         faster in the cache.
@@ -263,7 +263,10 @@ def simulate(
 
 
 def _model_of(component: Component, engine: str, origin: Any, vcd: str | None) -> tuple[Prepared, str]:
-    """A component's model in an engine, and the engine's name; pysim for ``auto`` without a compiler."""
+    """A component's model in an engine, and the engine's name.
+
+    ``auto`` takes pysim if there is no compiler.
+    """
     if engine != "pysim":
         try:
             return _compiled(component, origin), "cxxrtl"
@@ -275,7 +278,7 @@ def _model_of(component: Component, engine: str, origin: Any, vcd: str | None) -
 
 
 def _unpacked(shape, words: np.ndarray) -> np.ndarray:
-    """`beats.unpack` in pieces so small that the intermediate words stay in the processor's cache."""
+    """`beats.unpack` by small pieces, so that the intermediate words stay in the processor's cache."""
     beats = np.empty(len(words), dtype=dtype_of(shape))
     for start in range(0, len(words), _PIECE):
         piece = words[start : start + _PIECE]
@@ -284,7 +287,7 @@ def _unpacked(shape, words: np.ndarray) -> np.ndarray:
 
 
 def _judge(drive: Drive, trace: Trace) -> None:
-    """Raise `SimulationError` if the run ended otherwise than complete or at its limit."""
+    """Raise `SimulationError` unless the run is complete or ended at its limit."""
     where = f"at clock {trace.clock}, output beat {len(trace.output)}"
     if trace.end == StopReason.DROPPED:
         raise SimulationError(f"{where}: valid went low while the beat waited for ready")

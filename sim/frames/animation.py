@@ -184,7 +184,10 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
 
 
 def _begin(animation: Animation) -> None:
-    """First call in a process of the pool: the animation is sent once, not with every frame."""
+    """First call in a process of the pool.
+
+    It receives the animation, which is then not sent with every frame.
+    """
     global _animation
     _animation = animation
 

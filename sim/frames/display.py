@@ -33,7 +33,7 @@ class OneClock(wiring.Component):
     Parameters
     ----------
     top : Component
-        With the members ``pairs`` and ``status``, and perhaps ``buttons``.
+        The top module, with the members ``pairs`` and ``status``, and perhaps ``buttons``.
     rate : Fraction
         Rate of ``sync`` over the rate of ``serial``, at most 1.
 
@@ -68,7 +68,7 @@ class OneClock(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The enables, the top under them, and a register that collects bits."""
+        """The enables of the clocks, the top module that they drive, and a register that collects bits."""
         m = Module()
         inner, top = Module(), self.top
         cells = OutputCells(LANES)
@@ -142,7 +142,8 @@ def show(
     count : int
         Frames, from the first after power-up.
     buttons : int array, optional
-        State of the buttons from power-up on: a value for each cycle. The last value then stays.
+        State of the buttons, a value for each cycle from power-up on. After the last cycle the last value
+        stays.
     engine : str
         ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     progress : callable, optional
@@ -155,7 +156,7 @@ def show(
     SimulationError
         If the simulation goes wrong.
     """
-    # Some pixels more, for the latency of the encoders and of the crossing.
+    # A few more pixels cover the latency of the encoders and of the crossing.
     pixels = count * mode.cycles + 16 * CYCLES
     beats = pixels * WordCrossing.RATIO // CYCLES
     run = simulate(

@@ -191,7 +191,7 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "bound_lsb": None if None in bounds else max(bounds),
         "border_pixels": sum(frame["border_pixels"] for frame in frames),
         "counts": {
-            # Lobes are those of the scene, in every frame.
+            # The lobes belong to the scene, so all frames have the same lobes.
             key: (max if key == "sharp_lobes" else sum)(frame["counts"][key] for frame in frames)
             for key in frames[0]["counts"]
         },
@@ -200,7 +200,7 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def worst_errors(figures: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
-    """The worst value of each error over several frames: the least PSNR, the largest of the others.
+    """The worst value of each error over several frames: smallest PSNR, largest of each other error.
 
     Frames that show no surface have no errors and do not count. If no frame shows a surface, every figure is
     NaN.

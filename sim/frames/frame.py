@@ -68,9 +68,9 @@ def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dic
 
 
 def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Pixels of wide beats, sorted to the order of one pipeline. ``y`` are the scanlines of its pixels.
+    """Pixels of wide beats, in the order in which one pipeline gives them; ``y``: their scanlines.
 
-    Within a scanline both orders are the order of its spans.
+    Within a scanline both orders follow the order of the spans.
     """
     lanes = beats["pixels"].shape[1]
     pixels = beats["pixels"][(beats["present"][:, np.newaxis] >> np.arange(lanes) & 1).astype(bool)]
@@ -127,7 +127,7 @@ class FrameSimulator:
     def _run(
         self, spans: Spans, constants: Sequence[FrameConstants], y: np.ndarray, **options
     ) -> tuple[Run, np.ndarray]:
-        """A simulation, and its pixels in the order of the spans; ``y`` are the pixels' scanlines."""
+        """A simulation, and its pixels in the order of the spans. ``y`` has the pixels' scanlines."""
         # The number of wide beats depends on the number of pixels that leave on each cycle.
         ends = {"count": len(y)} if self._pipes == 1 else {"count": None, "idle_timeout": _IDLE}
         run = simulate(
@@ -210,7 +210,7 @@ def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
     members = span_shape(design).members
     if "step" in members:
         ends = rng.normal(size=(2, len(length), members["step"].length))
-        # A span of two pixels has no step that fits, and one of none has none.
+        # A span of two pixels has no step that fits. An empty span has no step.
         vectors = SpanVectors.quantise(*ends, np.where(length > 2, length, 1))
         spans = replace(spans, vectors=vectors)
     if "values" in members:

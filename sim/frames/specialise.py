@@ -67,7 +67,7 @@ class Specialisation:
         return reduce(_without, self.reductions, self.full)
 
     def costs(self) -> tuple[Cost, tuple[Cost, ...]]:
-        """Costs of the full pipeline, with the first reduction, with the first two, and so on."""
+        """Costs of the full pipeline: without reductions, with the first, with the first two, and so on."""
         designs = accumulate(self.reductions, _without, initial=self.full)
         costs = [cost_of(ShadingPipelineUnit(design)) for design in designs]
         return costs[0], tuple(costs[1:])

@@ -34,7 +34,7 @@ _TRIANGLES = 400
 def teapot_frame(
     design: ShadingPipeline, size: tuple[int, int] = _SIZE, triangles: int = _TRIANGLES
 ) -> tuple[Spans, list[FrameConstants], Pixels]:
-    """A teapot with as many lights and materials as a pipeline has, and with no term too bright.
+    """A teapot with as many lights and materials as a pipeline has. No term is too bright for the pipeline.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ def local_executor(
     with warnings.catch_warnings():  # It is said where a model is built.
         warnings.simplefilter("ignore", RuntimeWarning)
         cache = str(cache_folder())
-    # Other threads run in this process, so none is forked.
+    # Other threads run in this process, so processes are not forked.
     context = multiprocessing.get_context("spawn")
     before = set(multiprocessing.active_children())
     executor = _Pool(jobs, context, initializer=_begin, initargs=(cache, begin, arguments))
@@ -79,14 +79,14 @@ def local_executor(
         for child in set(multiprocessing.active_children()) - before:
             child.terminate()
             child.join()
-            # The executor's own thread may have seen the end first, and not written it down yet.
+            # The executor's own thread may have seen the end first, but may not have recorded it yet.
             while child.is_alive():
                 time.sleep(0.01)
 
 
 class _Pool(ProcessPoolExecutor):
     def submit(self, *arguments, **named):
-        with _interrupts_blocked():  # The first calls start the processes, which inherit it.
+        with _interrupts_blocked():  # The first calls start the processes, which inherit the blocked signal.
             return super().submit(*arguments, **named)
 
 
@@ -98,7 +98,7 @@ def _end_with_parent() -> None:
 
 def _begin(cache: str, begin: Callable[..., object] | None, arguments: tuple[Any, ...]) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    # The parent stops its workers; where it could not block the signal for them, they ignore it.
+    # The parent stops its workers. If it could not block the signal for them, they ignore the signal.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["BLYSK_CACHE"] = cache
     if begin is not None:
@@ -126,7 +126,7 @@ def check_address(address: str) -> None:
         If the text has another form, or Dask is missing.
     """
     option = f"--cluster {address}"
-    # Dask's client, given what is no address, stays behind half built.
+    # If the text is no address, Dask's client stays behind half built.
     if not re.fullmatch(r"((tcp|tls|wss?)://)?([^\s/:@\[\]]+|\[[0-9a-fA-F:.%]+\]):[0-9]{1,5}", address):
         raise InputError(option, "not the address of a Dask scheduler", _START)
     if importlib.util.find_spec("distributed") is None:
@@ -193,7 +193,7 @@ def cluster_executor(address: str) -> Iterator[Executor]:
 
 @contextmanager
 def _quiet_dask() -> Iterator[None]:
-    """Keep Dask's log of a lost connection off the terminal: one line of our own tells of it."""
+    """Keep Dask's log of a lost connection off the terminal. Our own message has one line."""
     # The second has a level of its own.
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     levels = [logger.level for logger in loggers]
@@ -211,7 +211,7 @@ def _check_workers(client: "Client", option: str) -> None:
     remedy = f"install blysk {here} where they run"
     try:
         versions = set(client.run(version, "blysk").values())
-    # Whatever a worker without the package raises.
+    # A worker without the package may raise any error.
     except Exception as error:
         text = str(error).strip().split("\n")[0]
         raise InputError(option, f"its workers have no blysk ({text})", remedy) from None

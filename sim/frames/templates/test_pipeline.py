@@ -23,7 +23,7 @@ def read(name):
 
 
 def sample(dut, ports):
-    """Codes on some ports; none of their bits may be undefined."""
+    """Codes on some ports. All their bits must be defined."""
     codes = {}
     for port in ports:
         value = getattr(dut, port).value
@@ -44,7 +44,7 @@ class Source:
         self.offered = False
 
     def drive(self):
-        """Half a cycle before the rising edge: offer the next row, or pause."""
+        """Offer the next row, or pause. Called half a cycle before the rising edge."""
         if not self.offered:
             free = self.rows and (self.after is None or self.after.done)
             self.offered = bool(free) and random.random() >= self.pauses
@@ -54,7 +54,7 @@ class Source:
                     getattr(self.dut, port).value = code
 
     def observe(self):
-        """When the outputs have settled: whether the row is taken at the edge."""
+        """Note whether the row is taken at the edge. Called when the outputs have settled."""
         taken = self.offered and self.ready.value == 1
         if taken:
             self.rows.pop()
@@ -68,19 +68,22 @@ class Source:
 
 
 class Sink:
-    """Sink of a stream: takes pixels, with pauses, and compares each with the expected one."""
+    """Sink of a stream: takes pixels, with pauses, and compares each pixel with the expected pixel."""
 
     def __init__(self, dut, expected, pauses):
         self.dut, self.expected, self.pauses = dut, expected, pauses
         self.taken, self.held, self.ready = 0, None, False
 
     def drive(self):
-        """Half a cycle before the rising edge: be ready, or pause."""
+        """Be ready, or pause. Called half a cycle before the rising edge."""
         self.ready = random.random() >= self.pauses
         self.dut.o_ready.value = int(self.ready)
 
     def observe(self):
-        """After the outputs have settled: check the offered pixel; whether it is taken at the edge."""
+        """Check the offered pixel, and note whether it is taken at the edge.
+
+        Called when the outputs have settled.
+        """
         valid = sample(self.dut, ["o_valid"])["o_valid"]
         pixel = sample(self.dut, self.expected[0]) if valid else None
         where = f"pixel {self.taken}"
@@ -108,7 +111,7 @@ class Sink:
 
 
 async def cycles(dut, parts, count=None):
-    """Run the clock for ``count`` cycles, or until every part is done; the number of cycles."""
+    """Run the clock for ``count`` cycles, or until every part is done. Returns the number of cycles."""
     idle = clock = 0
     while clock != count and not (count is None and all(part.done for part in parts)):
         await FallingEdge(dut.clk)
