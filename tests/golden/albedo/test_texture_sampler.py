@@ -57,6 +57,37 @@ def test_error_against_the_exact_rule(kind, filter):
         assert off <= TextureFilter.ERROR + quantised, (size, wrap)
 
 
+def test_error_of_the_arithmetic():
+    """Of texels that are codes: rounding alone, and the bound is not far above it."""
+    rng = np.random.default_rng(21)
+    worst = 0
+    for _ in range(20):
+        texels = TexelMemory.linear(rng.integers(0, 1 << TexelMemory.CHANNEL_BITS, (64, 64, 3)))
+        texture = Texture(texels, mipmapped=False)
+        level, codes, sides = places(rng, texture, 2000)
+        found = sampled(SAMPLER, texture, codes, level).values
+        worst = max(worst, np.abs(found - texture.sample(codes * 2.0**-14 / sides, level)).max())
+    assert 0.6 * TextureFilter.ERROR <= worst <= TextureFilter.ERROR
+
+
+@pytest.mark.parametrize(("wrap", "mode"), [("repeat", "wrap"), ("mirror", "symmetric"), ("clamp", "edge")])
+def test_wraps_as_padded_images(wrap, mode):
+    """Against the means of neighbours in an image that NumPy has padded."""
+    rng = np.random.default_rng(22)
+    for width, height in ((1, 1), (2, 1), (4, 2), (8, 8)):
+        texels = TexelMemory.linear(rng.integers(0, 1 << TexelMemory.CHANNEL_BITS, (height, width, 3)))
+        pad = 3 * max(width, height) + 1
+        padded = np.pad(texels, ((pad, pad), (pad, pad), (0, 0)), mode)
+        shares = rng.integers(0, 1 << 14, (300, 2))
+        first = rng.integers(1 - pad, pad, (300, 2))
+        texture = Texture(texels, (wrap, wrap), mipmapped=False)
+        codes = (first << 14) + shares + (1 << 13)
+        found = sampled(SAMPLER, texture, codes, np.zeros(300, dtype=np.int64)).values
+        (x, y), (s, t) = first.T + pad, shares.T[:, :, np.newaxis] * 2.0**-14
+        upper, lower = (padded[row, x] * (1 - s) + padded[row, x + 1] * s for row in (y, y + 1))
+        assert np.abs(found - (upper * (1 - t) + lower * t)).max() <= TextureFilter.ERROR
+
+
 @pytest.mark.parametrize("share_bits", [8, 14])
 def test_error_of_rounded_coordinates_in_proportion_to_contrast(share_bits):
     rng = np.random.default_rng(18)

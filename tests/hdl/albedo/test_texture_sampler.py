@@ -55,7 +55,7 @@ class OutsideMemory(wiring.Component):
         return m
 
 
-@pytest.mark.parametrize(("longest", "waiting"), [(9, 16), (3, 4)])
+@pytest.mark.parametrize(("longest", "waiting"), [(9, 16), pytest.param(3, 4, marks=pytest.mark.long)])
 def test_any_latency(longest, waiting):
     """The same colours in the same order, under all stalls of the record."""
     unit = OutsideMemory(longest, waiting)
@@ -64,6 +64,7 @@ def test_any_latency(longest, waiting):
         assert_equals_model(unit, run)
 
 
+@pytest.mark.long
 def test_keeps_its_rate_while_answers_are_on_their_way():
     """A colour a cycle by a memory with a latency: two FIFOs and the banks."""
     unit = OutsideMemory(1)
