@@ -1,13 +1,19 @@
 """Spans of attributes: vertex colours and texture coordinates over W, and 1/W, of a pixel on every cycle."""
 
-from amaranth.hdl import unsigned
-from amaranth.lib import data
+from collections.abc import Iterator
+from typing import ClassVar
+
+from amaranth.hdl import Cat, Const, Module, Signal, Value, signed, unsigned
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.stream import count_down, skid_buffer
+from blysk.hdl.core.views import copy_fields
 
-__all__ = ["attribute_span_shape", "attribute_words_shape"]
+__all__ = ["AttributeSpansUnit", "attribute_span_shape", "attribute_words_shape"]
 
 
 def _lines(model: AttributeSpans) -> dict:
@@ -63,3 +69,87 @@ def attribute_words_shape(model: AttributeSpans) -> data.StructLayout:
         The attributes.
     """
     return data.StructLayout(_lines(model) | _of_span(model))
+
+
+class AttributeSpansUnit(wiring.Component):
+    """Words of every pixel of spans, first pixel first; `AttributeSpans` is the bit-accurate model.
+
+    Each line has an accumulator of 39 bits, and a register of its step, shifted by the exponent. The first
+    pixel of a span is on the output a cycle after the span was accepted. The others follow on each cycle,
+    unless the output waits. A span of m pixels is accepted m cycles after the span before it, also if m is 1.
+    A span of length 0 takes a cycle and gives nothing. The unit has no multipliers.
+
+    Parameters
+    ----------
+    model : AttributeSpans
+        Bit-accurate model.
+    length_bits : int
+        Bits of the length.
+
+    Members
+    -------
+    i : :py:`In(stream.Signature(attribute_span_shape(model, length_bits)))`
+        Spans.
+    o : :py:`Out(stream.Signature(attribute_words_shape(model)))`
+        Words of pixels, with base, range and level of their span.
+
+    Source: docs/theory/textures.md#lines.
+    """
+
+    latency = 1
+
+    FORMULAS: ClassVar[dict[str, str]] = {r"(\w+)_sum": "U + i·dU", r"(\w+)_step": "dU·2^(−e)"}
+
+    def __init__(self, model: AttributeSpans | None = None, length_bits: int = LENGTH_BITS):
+        self.model, self.length_bits = model or AttributeSpans(), length_bits
+        p = self.model
+        super().__init__(
+            {
+                "i": In(stream.Signature(attribute_span_shape(p, length_bits))),
+                "o": Out(stream.Signature(attribute_words_shape(p))),
+            }
+        )
+
+    def elaborate(self, platform):
+        """A counter of pixels, the accumulators, and registers of what belongs to the span."""
+        m = Module()
+        p, span = self.model, self.i.payload
+        advance = Signal()
+        active, ends = count_down(m, self.i.valid, span.length, advance)
+        words = Signal(self.o.payload.shape())
+        m.d.comb += [
+            advance.eq(skid_buffer(m, self.o, active, words)),
+            self.i.ready.eq(advance & ends),
+        ]
+        free = p.SUM_FORMAT.fraction_bits - p.WORD_FORMAT.fraction_bits
+        lines = (self._words(view) for view in (span.start, span.step, words))
+        for (name, start), (_, step), (_, word) in zip(*lines, strict=True):
+            total = Signal(p.SUM_FORMAT.width, name=f"{name}_sum", reset_less=True)
+            difference = Signal(signed(p.SUM_FORMAT.width), name=f"{name}_step", reset_less=True)
+            with m.If(advance):
+                with m.If(ends):
+                    half = Const(1 << (free - 1), free)
+                    m.d.sync += [
+                        total.eq(Cat(half, start)),
+                        difference.eq(Cat(Const(0, free), step).as_signed() >> span.exponent),
+                    ]
+                with m.Else():
+                    m.d.sync += total.eq(total + difference)
+            m.d.comb += word.eq(total[free:])
+        shared = _of_span(p)
+        if shared:
+            held = Signal(data.StructLayout(shared), name="of_span", reset_less=True)
+            with m.If(advance & ends):
+                m.d.sync += copy_fields(held, span, shared)
+            m.d.comb += copy_fields(words, held, shared)
+        return m
+
+    @staticmethod
+    def _words(view: data.View) -> Iterator[tuple[str, Value]]:
+        """Name and bits of every line's word in a view with `_lines`."""
+        for name in view.shape().members:
+            if name in ("colors", "coordinates"):
+                for index, word in enumerate(view[name]):
+                    yield f"{name}_{index}", Value.cast(word)
+            elif name == "weight":
+                yield name, Value.cast(view[name])
