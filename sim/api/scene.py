@@ -119,16 +119,12 @@ def load(settings: Settings) -> LoadedMesh:
 def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
     """A mesh as pipelines without an albedo draw it. What they leave out is told."""
     materials, mesh = loaded.materials, loaded.mesh
-    counts = {
-        "texture": len({id(material.texture) for material in materials if material.texture is not None}),
-        "emission": sum(material.emission is not None for material in materials),
-        "unlit material": sum(material.unlit for material in materials),
-    }
     told = ["vertex colours"] if len(mesh.colors) else []
-    told += [f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items() if count]
-    if not told and not any(material.colored for material in materials):
+    textures = len({id(material.texture) for material in materials if material.texture is not None})
+    told += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
+    if not any(material.has_albedo for material in materials):
         return loaded
-    plain = {"texture": None, "emission": None, "unlit": False, "metallic": None, "colored": False}
+    plain = {"texture": None, "colored": False}
     loaded = replace(
         loaded,
         mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2))),
