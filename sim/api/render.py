@@ -23,7 +23,7 @@ from blysk.sim.frames.figures import difference_figures, saving_figures
 from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 from blysk.sim.frames.specialise import Specialisation, specialise
 from blysk.sim.frames.triangles import LARGEST_PICTURE, TriangleSimulator
-from blysk.sim.meshes.mesh import LoadedMesh
+from blysk.sim.meshes.loaded_mesh import LoadedMesh
 from blysk.sim.output import atomic_writer
 from blysk.sim.run_files import RunFiles
 

@@ -19,8 +19,9 @@ from blysk.sim.api.options import COEFFICIENTS, SCENE, SceneOptions, Source
 from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.api.signature import with_options
 from blysk.sim.frames.animation import equal_distance, turned, turntable
+from blysk.sim.meshes.loaded_mesh import LoadedMesh, merged
 from blysk.sim.meshes.materials import surfaces
-from blysk.sim.meshes.mesh import LoadedMesh, given_mesh, load_mesh, merged
+from blysk.sim.meshes.mesh import given_mesh, load_mesh
 
 __all__ = ["load", "scene", "scenes_of"]
 

@@ -4,9 +4,8 @@ import io
 import logging
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote
@@ -14,8 +13,6 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blysk.golden.frame_constants import MAX_MATERIALS
-from blysk.golden.reference.geometry import Mesh
 from blysk.sim.errors import InputError
 from blysk.sim.meshes.gltf import (
     check_gltf,
@@ -27,20 +24,15 @@ from blysk.sim.meshes.gltf import (
 )
 from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.gltf_textures import GltfTextures
-from blysk.sim.meshes.materials import FileMaterial, Found
+from blysk.sim.meshes.loaded_mesh import LoadedMesh, assembled, finished
+from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.mesh_path import check_mesh_path
 from blysk.sim.meshes.mtl import find_obj_materials
-from blysk.sim.meshes.normals import (
-    DEFAULT_CREASE,
-    crease_normals,
-    face_directions,
-    repaired_normals,
-    transformed,
-)
+from blysk.sim.meshes.normals import DEFAULT_CREASE
 from blysk.sim.meshes.obj import read_obj, split_obj
 from blysk.sim.meshes.parts import scene_of
 from blysk.sim.meshes.ply import find_ply_images, read_ply
-from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, REEXPORT, Refused, refers
+from blysk.sim.meshes.refusal import MAX_FACES, REEXPORT, Refused, refers
 from blysk.sim.meshes.stl import read_stl
 from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, teapot
 from blysk.sim.run_files import OutputIsInput, reads
@@ -48,55 +40,13 @@ from blysk.sim.run_files import OutputIsInput, reads
 if TYPE_CHECKING:
     import trimesh
 
-__all__ = ["LoadedMesh", "given_mesh", "load_mesh", "merged"]
-
+__all__ = ["given_mesh", "load_mesh"]
 
 GIVE_ARRAYS = "give (vertices, faces) or (vertices, faces, normals)"
 GIVE_A_MESH = (
     'give "teapot", the name of a mesh or scene file, a blysk.Mesh, a trimesh.Trimesh or trimesh.Scene, or '
     "(vertices, faces) or (vertices, faces, normals)"
 )
-
-
-# Coordinates beyond which the steps of a float32 are as large as an image of 8 texels.
-_FARTHEST = 2.0**20
-# How far from 0 to 1 a colour may lie by rounding.
-_ROUNDED = 1e-6
-
-
-@dataclass(frozen=True)
-class LoadedMesh:
-    """A mesh, its materials, and the counts of repairs.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The triangles, with unit vertex normals, and perhaps colours and texture coordinates.
-    name : str
-        ``teapot``, or the file's name without folder and suffix.
-    repaired_normals : int
-        Stored vertex normals that were zero, not finite, or more than 1/256 off unit length, or that the
-        file refers to but does not hold.
-    dropped_faces : int
-        Dropped triangles without area: two corners are at one position, or no triangle shares a side. Other
-        triangles without area stay, because they close the seam between a side and its parts.
-    opposed_faces : int
-        Triangles whose stored normals all point against their winding. Their light falls on the other side.
-    materials : tuple of FileMaterial
-        Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
-        differ in more than the name.
-    ignored : tuple of str
-        Contents or references of the file that change a picture and are not read: alpha, textures other than
-        those of the colour, a missing image or material file, and the names that a reader does not know.
-    """
-
-    mesh: Mesh
-    name: str
-    repaired_normals: int
-    dropped_faces: int
-    opposed_faces: int = 0
-    materials: tuple[FileMaterial, ...] = (FileMaterial(),)
-    ignored: tuple[str, ...] = ()
 
 
 def load_mesh(
@@ -201,7 +151,7 @@ def load_mesh(
             scene, found = _load_scene(path, data, materials)
         # Overflow and NaN are looked for, and reported, in what comes out.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _assemble(scene, found, path, data, crease_angle, materials)
+            return assembled(scene, found, path, data, crease_angle, materials)
     except Refused as refusal:
         raise InputError(source, refusal.reason, refusal.remedy) from None
     except OutputIsInput:
@@ -240,7 +190,7 @@ def given_mesh(source: object, crease_angle: float = DEFAULT_CREASE) -> LoadedMe
             found = Found()
             if any(_is_painted(geometry) for geometry in scene.geometry.values()):
                 found.tell("materials and colours of trimesh")
-            return _given(name, lambda: _assemble(scene, found, Path("trimesh"), b"", crease_angle))
+            return _given(name, lambda: assembled(scene, found, Path("trimesh"), b"", crease_angle))
     elif isinstance(source, list | tuple) and len(source) in (2, 3):
         return _given("the arrays of a mesh", lambda: _of_arrays(source, crease_angle))
     raise InputError(f"a mesh of type {type(source).__name__}", "cannot be drawn", GIVE_A_MESH)
@@ -287,7 +237,7 @@ def _of_arrays(source: Sequence[ArrayLike], crease_angle: float) -> LoadedMesh:
     flags = np.full(len(vertices), "normals" in arrays)
     material = np.zeros(len(faces), dtype=np.int64)
     none = np.zeros((0, 3)), np.zeros((0, 2))
-    return _finish(vertices, faces, material, normals, flags, *none, "arrays", 0, crease_angle)
+    return finished(vertices, faces, material, normals, flags, *none, "arrays", 0, crease_angle)
 
 
 def _fault(error: Exception) -> str:
@@ -374,248 +324,3 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     for geometry in scene.geometry.values():
         geometry.metadata.update(looks[int(geometry.visual.material.name)])
     return scene, found
-
-
-def _assemble(
-    scene: "trimesh.Scene",
-    found: Found,
-    path: Path,
-    data: bytes,
-    crease_angle: float,
-    painted: bool = False,
-) -> LoadedMesh:
-    """All triangles of a scene in world coordinates, as one mesh.
-
-    If it is ``painted``, a part's metadata may have ``"colors"``, a float64 array of shape (V, 3), linear,
-    and ``"coordinates"``, a float64 array of shape (V, 2), with v from the top of the image.
-    """
-    import trimesh
-
-    nodes = _placed(scene)
-    nodes = [
-        (matrix, scene.geometry[name], scene.geometry[name].metadata["material"]) for matrix, name in nodes
-    ]
-    nodes = [node for node in nodes if isinstance(node[1], trimesh.Trimesh) and len(node[1].faces)]
-    if not nodes:
-        ignored = f" (not read: {'; '.join(found.ignored)})" if found.ignored else ""
-        raise Refused(f"it has no faces{ignored}", "use a mesh of triangles; points and lines are not shaded")
-    if (total := sum(len(geometry.faces) for _, geometry, _ in nodes)) > MAX_FACES:
-        raise Refused(f"it has {total} triangles; the limit is {MAX_FACES}", "simplify it")
-
-    # trimesh drops the normals of an OBJ file if one of their indices is missing or out of range.
-    promised = path.suffix.lower() == ".obj" and re.search(rb"^f\b.*/-?\d*/-?\d", data, re.MULTILINE)
-    vertices, normals, faces, material, lost = [], [], [], [], 0
-    colors: list[np.ndarray | None] = []
-    coordinates: list[np.ndarray | None] = []
-    offset = 0
-    for matrix, geometry, number in nodes:
-        part, triangles = np.array(geometry.vertices), np.array(geometry.faces)
-        if not 0 <= triangles.min() <= triangles.max() < len(part):
-            wrong = triangles.min() if triangles.min() < 0 else triangles.max()
-            raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {len(part)}")
-        stored = np.full(part.shape, np.nan)
-        # Only the cache tells a stored normal from a computed one; asking for the property computes it.
-        has_normals = "vertex_normals" in geometry._cache
-        if has_normals:
-            stored = np.array(geometry.vertex_normals)
-        elif promised:
-            lost += len(np.unique(triangles))
-        if not np.array_equal(matrix, np.eye(4)):
-            rotation = np.array(matrix[:3, :3])
-            # The cofactors are the inverse transpose times the determinant, and exist if it is 0.
-            cofactors = np.cross(np.roll(rotation, -1, axis=0), np.roll(rotation, -2, axis=0))
-            mirrored = np.linalg.det(rotation) < 0
-            part = part @ rotation.T + matrix[:3, 3]
-            stored = transformed(stored, -cofactors if mirrored else cofactors)
-            triangles = triangles[:, ::-1] if mirrored else triangles
-        metadata = geometry.metadata if painted else {}
-        colors.append(_colors(metadata.get("colors"), triangles, found))
-        coordinates.append(_coordinates(metadata.get("coordinates"), triangles))
-        kind = 4 * number + 2 * (colors[-1] is not None) + (coordinates[-1] is not None)
-        faces.append(triangles + offset)
-        material.append(np.full(len(triangles), kind))
-        vertices.append(part)
-        normals.append((stored, np.full(len(part), has_normals)))
-        offset += len(part)
-    loaded = _finish(
-        np.concatenate(vertices),
-        np.concatenate(faces),
-        np.concatenate(material),
-        np.concatenate([stored for stored, _ in normals]),
-        np.concatenate([flag for _, flag in normals]),
-        _joined(colors, vertices, np.ones((1, 3))),
-        _joined(coordinates, vertices, np.zeros((1, 2))),
-        path.stem,
-        lost,
-        crease_angle,
-    )
-    return _with_materials(loaded, found)
-
-
-def _colors(given: np.ndarray | None, faces: np.ndarray, found: Found) -> np.ndarray | None:
-    """Colours of a part's vertices, 0 to 1; colours over 1 are told."""
-    if given is None:
-        return None
-    used = np.unique(faces)
-    seen = given[used]
-    if wrong := np.flatnonzero(~(np.isfinite(seen) & (seen >= -_ROUNDED)).all(axis=1)).tolist():
-        text = " ".join(f"{channel:g}" for channel in seen[wrong[0]].tolist())
-        raise Refused(f"a vertex has the colour {text!r}, not three numbers from 0", ONE_MATERIAL)
-    over = int((seen > 1 + _ROUNDED).any(axis=1).sum())
-    found.tell("vertex colour's part over 1", "vertex colours' parts over 1", over)
-    result = np.ones(given.shape)
-    result[used] = np.clip(seen, 0, 1)
-    return result
-
-
-def _coordinates(given: np.ndarray | None, faces: np.ndarray) -> np.ndarray | None:
-    """Texture coordinates of a part's vertices, finite."""
-    if given is None:
-        return None
-    used = np.unique(faces)
-    if wrong := np.flatnonzero(~(np.abs(given[used]) <= _FARTHEST).all(axis=1)).tolist():
-        text = " ".join(f"{number:g}" for number in given[used[wrong[0]]].tolist())
-        raise Refused(
-            f"a vertex has the texture coordinates {text!r}, not numbers to {_FARTHEST:,.0f}", ONE_MATERIAL
-        )
-    result = np.zeros(given.shape)
-    result[used] = given[used]
-    return result
-
-
-def _joined(parts: list[np.ndarray | None], vertices: list[np.ndarray], other: np.ndarray) -> np.ndarray:
-    """Values of all vertices, with another value where a part has none; no rows if no part has any."""
-    if all(part is None for part in parts):
-        return other[:0]
-    return np.concatenate(
-        [
-            np.repeat(other, len(of), axis=0) if part is None else part
-            for part, of in zip(parts, vertices, strict=True)
-        ]
-    )
-
-
-def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
-    """Matrix into the world, and name, of the geometry of every node that has one.
-
-    The time of trimesh's own function grows with the cube of a node's depth in the tree.
-    """
-    graph = scene.graph.transforms
-    below = {}
-    for (parent, child), edge in graph.edge_data.items():
-        below.setdefault(parent, []).append((child, edge["matrix"]))
-    frames = [(scene.graph.base_frame, np.eye(4))]
-    for frame, matrix in frames:
-        frames += [(child, matrix @ step) for child, step in below.get(frame, [])]
-    names = [(matrix, graph.node_data[frame].get("geometry")) for frame, matrix in frames]
-    return [(matrix, name) for matrix, name in names if name is not None]
-
-
-def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
-    """The mesh with the materials that its faces use, numbered from 0, equal ones merged.
-
-    The faces have four times the number of their material in the file, plus 2 if their vertices have colours,
-    plus 1 if these have texture coordinates.
-    """
-    used = np.unique(loaded.mesh.material).tolist()
-    read = {number: found.read(number) for number in sorted({kind // 4 for kind in used})}
-    materials = {}
-    for kind in used:
-        material = read[kind // 4]
-        # White vertices are white, and not of the colour of a default.
-        colored = kind & 2 > 0 and (len(loaded.mesh.colors) > 0 or material.diffuse is None)
-        material = replace(material, colored=colored)
-        if material.texture is not None and not kind & 1:
-            found.tell("texture of a part without coordinates", "textures of parts without coordinates")
-            material = replace(material, texture=None)
-        if material.has_albedo and 0 < (material.metallic or 0.0) < 1:
-            found.tell("the exact highlights of colours that are partly metallic")
-        materials[kind] = material
-    loaded = merged(loaded, materials)
-    mesh = loaded.mesh
-    if all(material.texture is None for material in loaded.materials):
-        mesh = replace(mesh, coordinates=mesh.coordinates[:0])
-    return replace(loaded, mesh=mesh, ignored=found.ignored)
-
-
-def merged(loaded: LoadedMesh, of: Mapping[int, FileMaterial]) -> LoadedMesh:
-    """A mesh with materials numbered from 0, equal ones merged; its faces have the keys of these materials.
-
-    Raises
-    ------
-    Refused
-        If there are more than 1024.
-    """
-    used, of_face = np.unique(loaded.mesh.material, return_inverse=True)
-    places: dict[FileMaterial, int] = {}
-    materials: list[FileMaterial] = []
-    of_used = []
-    for number in used.tolist():
-        material = of[number]
-        place = places.setdefault(replace(material, name=""), len(materials))
-        if place == len(materials):
-            materials.append(material)
-        elif not materials[place].name:
-            materials[place] = material
-        of_used.append(place)
-    if len(materials) > MAX_MATERIALS:
-        raise Refused(f"it has {len(materials)} materials; the limit is {MAX_MATERIALS}", ONE_MATERIAL)
-    return replace(
-        loaded,
-        mesh=replace(loaded.mesh, material=np.array(of_used)[of_face.ravel()]),
-        materials=tuple(materials),
-    )
-
-
-def _finish(
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    material: np.ndarray,
-    normals: np.ndarray,
-    has_normals: np.ndarray,
-    colors: np.ndarray,
-    coordinates: np.ndarray,
-    name: str,
-    lost: int,
-    crease_angle: float,
-) -> LoadedMesh:
-    """Mend stored normals, compute the others; materials keep the file's numbers.
-
-    Faces without area stay where their sides join others, and are dropped where they join none.
-    """
-    used = np.unique(faces)
-    broken = len(used) - np.isfinite(vertices[used]).all(axis=1).sum()
-    if broken:
-        raise Refused(f"{broken} of its vertices are NaN or infinite")
-    if not np.ptp(vertices[used], axis=0).any():
-        raise Refused("all its vertices are at one point")
-
-    # Tiny and huge models would under- and overflow in the products below.
-    scaled = vertices / np.abs(vertices[used]).max()
-    directions, found, solid = face_directions(scaled, faces)
-    if not solid.any():
-        raise Refused("none of its faces has an area")
-    dropped = int(len(faces) - found.sum())
-    faces, material, directions = faces[found], material[found], directions[found]
-
-    kept = has_normals[faces[:, 0]]
-    if (colors == 1).all():
-        colors = colors[:0]
-    looks = np.concatenate([given for given in (colors, coordinates) if len(given)] or [colors], axis=1)
-    corner, smooth_faces, smooth_normals = crease_normals(
-        scaled, faces[~kept], directions[~kept], crease_angle, looks
-    )
-    own = np.unique(faces[kept])
-    own_normals, repaired = repaired_normals(scaled, faces[kept], directions[kept], normals, own)
-    renumbered = np.searchsorted(own, faces[kept])
-    kept_vertices = np.concatenate([own, corner])
-    mesh = Mesh(
-        vertices=vertices[kept_vertices],
-        faces=np.concatenate([renumbered, smooth_faces + len(own)]).astype(np.int64),
-        normals=np.concatenate([own_normals, smooth_normals]),
-        material=np.concatenate([material[kept], material[~kept]]).astype(np.int64),
-        colors=colors[kept_vertices] if len(colors) else colors,
-        coordinates=coordinates[kept_vertices] if len(coordinates) else coordinates,
-    )
-    opposed = (np.einsum("fki,fi->fk", own_normals[renumbered], directions[kept]) < 0).all(axis=1).sum()
-    return LoadedMesh(mesh, name, repaired + lost, dropped, int(opposed))

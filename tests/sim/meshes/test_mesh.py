@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 
-import blysk.sim.meshes.mesh
+import blysk.sim.meshes.loaded_mesh
 from blysk.golden.reference.geometry import normalise
 from blysk.sim.errors import InputError
+from blysk.sim.meshes.loaded_mesh import LoadedMesh
 from blysk.sim.meshes.materials import FileMaterial
-from blysk.sim.meshes.mesh import LoadedMesh, load_mesh
+from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.meshes.mesh_path import SUFFIXES
 
 from .files import (
@@ -220,7 +221,7 @@ def test_small_and_large_models(tmp_path, sphere, scale):
 
 
 def test_too_many_triangles(tmp_path, monkeypatch):
-    monkeypatch.setattr(blysk.sim.meshes.mesh, "MAX_FACES", 100)
+    monkeypatch.setattr(blysk.sim.meshes.loaded_mesh, "MAX_FACES", 100)
     nodes = [{"children": list(range(1, 11))}] + [{"mesh": 0} for _ in range(10)]
     box = trimesh.creation.box()
     document = mesh_gltf(box.vertices, box.faces, None, nodes)
