@@ -51,6 +51,7 @@ _TITLES = {
     "normals": "Normals of a span",
     "cosines": "Cosines without normals",
     "methods": "Whole methods",
+    "albedo": "Colour of a pixel",
     "lighting": "Light",
     "video": "From a mesh in memory to a monitor",
     "bus": "Buses of other designs",

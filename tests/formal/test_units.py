@@ -26,6 +26,7 @@ pytestmark = pytest.mark.prove
 # Of each record the default variant, and others that have another control.
 FURTHER = {
     "arccos": ("refitted, sequential",),
+    "attributes": ("both, interval 3",),
     "local_chord_interpolator": ("gated",),
     "intensity": ("2 lights, compact", "albedo, compact"),
     "light": ("cosquad, interval 3",),
@@ -68,7 +69,7 @@ COUNTED = [
     name
     for name in UNITS
     if name.partition("-")[0]
-    in ("chord_accumulator", "difference_accumulator", "line_accumulator", "recurrence")
+    in ("attribute_spans", "chord_accumulator", "difference_accumulator", "line_accumulator", "recurrence")
 ]
 
 
