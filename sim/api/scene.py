@@ -125,13 +125,15 @@ def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
     told += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
     if not any(material.has_albedo for material in materials):
         return loaded
-    plain = {"texture": None, "colored": False}
     loaded = replace(
         loaded,
         mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2))),
         ignored=(*loaded.ignored, *told),
     )
-    return merged(loaded, {number: replace(of, **plain) for number, of in enumerate(materials)})
+    return merged(
+        loaded,
+        {number: replace(material, texture=None, colored=False) for number, material in enumerate(materials)},
+    )
 
 
 def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:
