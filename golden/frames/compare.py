@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from blysk.golden.frames.frame import Picture
+from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
@@ -199,7 +200,8 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
 
         arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
 
-    The half is the rounding of the pixel. The quarter is the tolerance of cut spans. It is checked at some
+    The half is the rounding of the pixel. The quarter is the tolerance of cut spans. For codes of sRGB
+    ``chord-local`` divides it by a slope of the transfer, see `HighlightLimits`. It is checked at some
     places of a span; a proof for all places is missing (docs/theory/chord.md#where-spans-are-cut). The
     sixteenth holds the rounding of operands and terms. It is at least 1/128, for the ambient operand.
 
@@ -310,7 +312,9 @@ def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
             reflected = material.diffuse + material.reflection(distant_cosine(light, viewer))
             total += light.color * reflected
         brightness = max(brightness, float(total.max()))
-    return 0.5 + max(brightness / 16, 1 / 128) + brightness / 4
+    # Spans of an exact curve are not cut for its error.
+    steepest = 1.0 if design.interpolator.curve_is_exact else HighlightLimits.of(scene, design).slope
+    return 0.5 + max(brightness / 16, 1 / 128) + brightness / 4 / steepest
 
 
 def highlight_step(scene: Scene, model: ReflectionModel) -> float:

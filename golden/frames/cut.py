@@ -63,7 +63,7 @@ class _Cutter:
 
     @property
     def _limits(self) -> HighlightLimits:
-        return HighlightLimits.of(self.scene.materials, self.design)
+        return HighlightLimits.of(self.scene, self.design)
 
     def by_error(self) -> tuple[Raster, int]:
         return cut_by_error(self.scene, self.raster, self.design.interpolator, self._limits)
@@ -293,7 +293,7 @@ def cut_by_error(
     raster, cut
         As of `cut_spans`.
     """
-    limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
+    limits, scene = limits or HighlightLimits.of(scene), scene.lit
     cosines = np.cos(np.radians([interpolator.widest_span(exponent) for exponent in limits.exponents]))
 
     def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:

@@ -9,9 +9,10 @@ import numpy as np
 
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.lobes import curve_lines
 from blysk.golden.reference.reflection import ReflectionModel
+from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import slope
 
 __all__ = ["HighlightLimits"]
 
@@ -27,31 +28,31 @@ class _Curve:
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Arguments u, ascending; and for each u the steepest ``|dS/du|`` and the largest S from it on."""
-        u, value, slope = curve_lines(self.reflection, self.parameter)
-        u, slope = np.ldexp(u, self.scale), np.ldexp(slope, -self.scale)
-        return u, *(np.maximum.accumulate(of[::-1])[::-1] for of in (slope, value))
+        u, value, slopes = curve_lines(self.reflection, self.parameter)
+        u, slopes = np.ldexp(u, self.scale), np.ldexp(slopes, -self.scale)
+        return u, *(np.maximum.accumulate(of[::-1])[::-1] for of in (slopes, value))
 
     def _from(self, values: np.ndarray, u: np.ndarray) -> np.ndarray:
         return values[np.clip(np.searchsorted(self._points[0], u, "right") - 1, 0, None)]
 
     def tolerance(self, u: np.ndarray) -> np.ndarray:
         """As of `HighlightLimits`."""
-        slope = np.maximum(self._from(self._points[1], u), 2.0**-self.scale)
-        found: np.ndarray = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * slope)
+        steepest = np.maximum(self._from(self._points[1], u), 2.0**-self.scale)
+        found: np.ndarray = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * steepest)
         return found
 
     @cached_property
     def turn(self) -> float:
         """As of `HighlightLimits`, for one material."""
-        u, _, slope = curve_lines(self.reflection, self.parameter)
+        u, _, slopes = curve_lines(self.reflection, self.parameter)
         # A slope belongs to the interval up to the next argument.
-        steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slope)).max()
+        steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slopes)).max()
         found: float = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * max(steepest, 1 / 255))
         return found
 
-    def is_lit(self, u: np.ndarray) -> np.ndarray:
-        """As of `HighlightLimits`."""
-        return (self._from(self._points[2], u) > 1 / 1020) & (u < 1)
+    def is_lit(self, u: np.ndarray, least: float) -> np.ndarray:
+        """As of `HighlightLimits`, for the least highlight that counts."""
+        return (self._from(self._points[2], u) > least) & (u < 1)
 
 
 @dataclass(frozen=True)
@@ -61,27 +62,34 @@ class HighlightLimits:
     For a polynomial or a power the tolerance follows from the exponent, as in `LocalChordInterpolator`. For a
     lobe it is `LocalChordInterpolator.HIGHLIGHT_BUDGET`, divided by the curve's steepest slope from u on.
 
+    These budgets are errors of linear light. For codes of sRGB every tolerance is divided by the slope of the
+    transfer at the least ambient light of the scene. A scene with albedo may be black, with the slope 12.92.
+
     Parameters
     ----------
     exponents : float array, shape (materials,)
         Exponent, or `ReflectionModel.steepness`, of each material.
     curves : sequence of _Curve or None
         Curve of each material; ``None`` for a material without a lobe.
+    slope : float
+        Largest slope of the transfer of the design, by which tolerances are divided.
 
     Source: docs/theory/chord.md#where-spans-are-cut.
     """
 
     exponents: np.ndarray
     curves: Sequence[_Curve | None]
+    slope: float = 1.0
 
     STEEPEST: ClassVar[float] = 0.77
 
     @classmethod
-    def of(cls, materials: Sequence[Material], design: ShadingPipeline | None = None) -> "HighlightLimits":
-        """Limits of materials with the specular unit of a design.
+    def of(cls, scene: Scene, design: ShadingPipeline | None = None) -> "HighlightLimits":
+        """Limits of a scene's materials with the specular unit and the transfer of a design.
 
-        Without a design the exponents give the limits.
+        Without a design the exponents give the limits, for linear light.
         """
+        materials = scene.materials
         if design is None or design.specular is None:
             exponents = [float(material.exponent) for material in materials]
         else:
@@ -95,7 +103,9 @@ class HighlightLimits:
                 if parameter not in made:
                     made[parameter] = _Curve(lobe.reflection, parameter, lobe.scale)
                 curves[index] = made[parameter]
-        return cls(np.asarray(exponents, dtype=np.float64), tuple(curves))
+        transfer = "linear" if design is None else design.transfer
+        steepest = slope(0.0 if scene.has_albedo else _least_light(scene), transfer)
+        return cls(np.asarray(exponents, dtype=np.float64), tuple(curves), steepest)
 
     def tolerance(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Largest error of u that keeps `LocalChordInterpolator.HIGHLIGHT_BUDGET`, where no smaller u occurs.
@@ -107,7 +117,7 @@ class HighlightLimits:
         u : array, shape (pieces, lights)
             Least value of u, at least 0.
         """
-        return self._of("tolerance", LocalChordInterpolator().highlight_tolerance, material, u)
+        return self._of("tolerance", LocalChordInterpolator().highlight_tolerance, material, u) / self.slope
 
     def turn(self, material: np.ndarray) -> np.ndarray:
         """Angle in radians by which a normal may turn, for every u.
@@ -127,7 +137,7 @@ class HighlightLimits:
         for index, curve in enumerate(self.curves):
             if curve is not None:
                 of_material[index] = curve.turn
-        found: np.ndarray = of_material[material]
+        found: np.ndarray = of_material[material] / self.slope
         return found
 
     def is_lit(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -135,18 +145,29 @@ class HighlightLimits:
 
         Parameters are those of `tolerance`.
         """
-        return self._of("is_lit", LocalChordInterpolator.is_lit, material, u)
+        return self._of("is_lit", LocalChordInterpolator.is_lit, material, u, 1 / (1020 * self.slope))
 
     def _of(
         self,
         name: str,
-        by_exponent: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        by_exponent: Callable[..., np.ndarray],
         material: np.ndarray,
         u: np.ndarray,
+        *settings: float,
     ) -> np.ndarray:
-        result = by_exponent(self.exponents[material][:, np.newaxis], u)
+        result = by_exponent(self.exponents[material][:, np.newaxis], u, *settings)
         for curve in dict.fromkeys(self.curves):
             if curve is not None:
                 rows = np.array([other is curve for other in self.curves])[material]
-                result[rows] = getattr(curve, name)(u[rows])
+                result[rows] = getattr(curve, name)(u[rows], *settings)
         return result
+
+
+def _least_light(scene: Scene) -> float:
+    """The least channel of ambient light and emission of a lit material; 1 if all are unlit."""
+    found = [
+        float((material.ambient_term(scene.ambient_light) + material.emission).min())
+        for material in scene.materials
+        if not material.unlit
+    ]
+    return min(found, default=1.0)

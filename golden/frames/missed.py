@@ -63,7 +63,7 @@ def _missed(
     by_curve, by_words : bool arrays, shape (spans,)
         A span is at most one of the two: if it is ``by_words``, it is not ``by_curve``.
     """
-    limits, scene = limits or HighlightLimits.of(scene.materials), scene.lit
+    limits, scene = limits or HighlightLimits.of(scene), scene.lit
     by_curve, by_words = np.zeros((2, len(raster.length)), dtype=bool)
     for origin in chunks(len(raster.length)):
         span = np.arange(len(raster.length))[origin]
@@ -103,7 +103,7 @@ def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dic
     """
     drawn, pieces, _ = renderer.geometry.pieces(sent.triangles, sent.frame)
     design = renderer.design
-    limits = HighlightLimits.of(scene.materials, design)
+    limits = HighlightLimits.of(scene, design)
     turn = _turn(drawn, pieces, renderer)
     axes = triangle_axes(scene, design)
     raster = _raster(pieces, sent.source[drawn.source], np.eye(3) if axes is None else axes)

@@ -63,7 +63,7 @@ class Pieces:
 
         def too_far(off: Mapping[str, np.ndarray], inner: np.ndarray) -> np.ndarray:
             least = np.maximum(curves["highlight"].least - inner, 0)
-            wrong = off["diffuse"] > LocalChordInterpolator().diffuse_tolerance
+            wrong = off["diffuse"] > LocalChordInterpolator().diffuse_tolerance / limits.slope
             wrong = wrong | (off["highlight"] > limits.tolerance(material, least))
             found: np.ndarray = wrong & (curves["diffuse"].largest + off["diffuse"] >= 0)
             return found
@@ -106,7 +106,7 @@ class Pieces:
             errors["highlight"] += setup.highlight_error(*highlight.sizes)
         in_front = diffuse.largest + errors["diffuse"] >= 0
         least = np.maximum(highlight.least - margin / LocalChordInterpolator.MARGIN * misses["highlight"], 0)
-        too_far = errors["diffuse"] > LocalChordInterpolator().diffuse_tolerance
+        too_far = errors["diffuse"] > LocalChordInterpolator().diffuse_tolerance / limits.slope
         tolerance, lit = limits.tolerance(material, least), limits.is_lit(material, least)
         # For a light that fades every pixel is checked, below.
         too_far |= (errors["highlight"] > tolerance) & ~fading
@@ -114,7 +114,7 @@ class Pieces:
         if fading.any():
             chosen = np.flatnonzero(between[:, 0] & ~wrong)
             shares = errors["highlight"][chosen] / tolerance[chosen], lit[chosen]
-            wrong[chosen] = (self._fades_wrong(chosen, curves, *shares) & fading).any(axis=1)
+            wrong[chosen] = (self._fades_wrong(chosen, curves, *shares, limits.slope) & fading).any(axis=1)
         turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & lit
         chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
         if setup:
@@ -123,6 +123,7 @@ class Pieces:
                 self.scene,
                 self.raster,
                 *(field[chosen] for field in (self.origin, self.first, self.last, turns_dark, *kept)),
+                limits.slope,
             )
         return wrong
 
@@ -132,6 +133,7 @@ class Pieces:
         curves: "Mapping[str, _Quadratic]",
         highlight_share: np.ndarray,
         lit: np.ndarray,
+        slope: float,
     ) -> np.ndarray:
         """Whether a light's factor, or the factor times N·L, is too far off at any pixel of a piece.
 
@@ -145,6 +147,8 @@ class Pieces:
             Error of u as a share of its tolerance.
         lit : bool array, shape (chosen, lights)
             Whether a light may have a highlight.
+        slope : float
+            `HighlightLimits.slope`.
 
         Returns
         -------
@@ -158,9 +162,9 @@ class Pieces:
         words = {name: method.setup.diffuse_error(*curve.sizes) for name, curve in curves.items()}
         # A light that fades may be brighter than white where it is near.
         bright = np.array([max(1.0, *light.color) for light in self.scene.lights])
-        factor = np.where(lit, 255 * bright * (misses["factor"] + words["factor"]), 0)
+        factor = np.where(lit, 255 * slope * bright * (misses["factor"] + words["factor"]), 0)
         total = factor + method.HIGHLIGHT_BUDGET * highlight_share * largest * bright
-        wrong = bright * (misses["diffuse"] + words["diffuse"]) > method.diffuse_tolerance
+        wrong = slope * bright * (misses["diffuse"] + words["diffuse"]) > method.diffuse_tolerance
         found: np.ndarray = wrong | ((factor > method.FACTOR_BUDGET) | (total > method.HIGHLIGHT_BUDGET)) & (
             largest > 0
         )
@@ -318,6 +322,7 @@ def _mistakes_sign(
     left: np.ndarray,
     slope: np.ndarray,
     curvature: np.ndarray,
+    transfer_slope: float,
 ) -> np.ndarray:
     """Whether N·L of a pixel of a span might have the wrong sign, for the lights in ``lights``."""
     result = np.zeros(len(origin), dtype=bool)
@@ -328,6 +333,7 @@ def _mistakes_sign(
         wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
         # Nearer to 0 no word tells the sign. The little light of a light that fades may be shown or not.
         wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
-        wrong &= (exact.factor > LocalChordInterpolator.FACTOR_BUDGET / 255) & lights[of_pixel]
+        least = LocalChordInterpolator.FACTOR_BUDGET / (255 * transfer_slope)
+        wrong &= (exact.factor > least) & lights[of_pixel]
         result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0
     return result

@@ -1,5 +1,6 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -360,7 +361,7 @@ class LocalChordInterpolator(Interpolator):
         return found
 
     @staticmethod
-    def is_lit(exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def is_lit(exponent: np.ndarray, u: np.ndarray, least: float = 1 / 1020) -> np.ndarray:
         """Whether a highlight may be over a quarter of an LSB, for this u or any larger u.
 
         Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``. From ``x = 7`` on this is under a quarter of
@@ -372,8 +373,10 @@ class LocalChordInterpolator(Interpolator):
             n, 1 to 1000.
         u : array
             Least value of u, at least 0.
+        least : float
+            Least highlight that counts, by default a quarter of an LSB of linear light.
         """
-        found: np.ndarray = (np.asarray(exponent) - 1) * u < 7
+        found: np.ndarray = (np.asarray(exponent) - 1) * u < 7 - math.log(1020 * least)
         return found
 
     @property

@@ -7,6 +7,7 @@ import pytest
 
 from blysk.bench.units.operands import pairs_at
 from blysk.golden.frames.cut import cut_by_angle, cut_by_ends, cut_by_error, cut_spans
+from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import local_values
 from blysk.golden.presets import METHODS, preset
 from blysk.golden.reference.camera import Camera
@@ -101,6 +102,36 @@ def test_errors_of_the_chord_method_are_in_the_budgets(case):
         print(f"{case}, n = {n}: {largest:.3f} LSB")
         assert largest <= METHOD.HIGHLIGHT_BUDGET
     assert specular[front].max() > 0.1
+
+
+def test_dark_scenes_of_srgb_are_cut_finer():
+    """Both budgets are divided by the slope of the curve at the least ambient light, 0.02."""
+    rng = np.random.default_rng(5)
+    scene, raster = lit_spans(rng, 1000, rng.uniform(0, 10, 1000), 40, 0.05)
+    dark = tuple(replace(of, ambient=(0.3, 0.02, 1.0)) for of in scene.materials)
+    scene = replace(scene, material=dark)
+    made = preset("chord-local", "cosquad", 2, materials=len(EXPONENTS))
+    linear, srgb = (HighlightLimits.of(scene, replace(made, transfer=of)) for of in ("linear", "srgb"))
+    assert linear.slope == 1
+    assert srgb.slope == pytest.approx(1.055 / 2.4 * 0.02 ** (1 / 2.4 - 1))
+    unlit = replace(scene, material=tuple(replace(of, unlit=True, diffuse=(0,) * 3) for of in dark))
+    assert HighlightLimits.of(unlit, replace(made, transfer="srgb")).slope < 0.5
+    cosine, u = exact_operands(scene, raster)
+    exponent = np.array(EXPONENTS)[raster.triangle[raster.span]]
+    parts = []
+    for limits in (linear, srgb):
+        cut, _ = cut_by_error(scene, raster, METHOD, limits)
+        parts.append(len(cut.length))
+        operands, front = chord_operands(scene, cut), cosine > 2.0**-24
+        # Spans of three pixels have no pixel between the places of their curve.
+        front &= (cut.length[cut.span] > 3)[:, np.newaxis]
+        diffuse = 255 * np.abs(operands.cosine.values / ONE_VALUE - cosine)[front].max()
+        terms = [reflected(value, exponent) for value in (operands.highlight.values / ONE_VALUE, u)]
+        specular = 255 * np.abs(terms[0] - terms[1])[front].max()
+        print(f"slope {limits.slope:.2f}: {diffuse:.3f}, {specular:.3f} LSB, {parts[-1]} spans")
+        assert diffuse <= METHOD.DIFFUSE_BUDGET / limits.slope
+        assert specular <= METHOD.HIGHLIGHT_BUDGET / limits.slope
+    assert 1.1 < parts[1] / parts[0] < 2
 
 
 @pytest.mark.parametrize("case", ["narrow", "wide"])
