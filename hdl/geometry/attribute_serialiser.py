@@ -1,4 +1,4 @@
-"""Attribute serialiser: a triangle's attributes one by one, and a bound on its normals' length."""
+"""Attribute serialiser: a triangle's attributes one after the other, and a bound on its normals' length."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
@@ -13,7 +13,7 @@ from blysk.hdl.core.views import copy
 __all__ = ["AttributeSerialiserUnit", "corner_attributes_shape", "serial_attribute_shape"]
 
 _GIVES = 8
-"""Step at which the first attribute goes to the output. From this step on the bound is known."""
+"""Step at which the first attribute goes to the output. The bound is known from this step on."""
 
 
 def corner_attributes_shape() -> data.StructLayout:
@@ -44,7 +44,8 @@ class AttributeSerialiserUnit(wiring.Component):
     Parameters
     ----------
     skid : bool
-        Whether the output has a skid buffer. Else it has a register that stands until its payload is taken.
+        Whether the output has a skid buffer. Else it has a register that keeps its payload until this is
+        taken.
 
     Members
     -------
@@ -88,7 +89,7 @@ class AttributeSerialiserUnit(wiring.Component):
             m.d.sync += [step.eq(self.i.valid), free.eq(~self.i.valid)]
             for k, words in enumerate(corners):
                 values = [Value.cast(value) for value in self.i.payload.normal[k]]
-                # The depth less half its range: its first bit inverted.
+                # The depth minus half its range, made by inverting its first bit.
                 depth = Value.cast(self.i.payload.depth[k])
                 values.append(Cat(depth[:-1], ~depth[-1]))
                 m.d.sync += [Value.cast(word).eq(value) for word, value in zip(words, values, strict=True)]
@@ -108,7 +109,7 @@ class AttributeSerialiserUnit(wiring.Component):
         return m
 
     def _least(self, m: Module, step: Signal, words: list) -> Signal:
-        """The bound, from one component of each corner a cycle; it is there from step `_GIVES` on."""
+        """The bound, from one component of each corner a cycle. It is known from step `_GIVES` on."""
         bits = AttributeSerialiser.FRACTION_BITS + 1
         sign = Value.cast(words[0])[-1]
         turned = [(Value.cast(word)[-bits:] ^ sign.replicate(bits)).as_signed() for word in words]

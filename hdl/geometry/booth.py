@@ -13,7 +13,7 @@ def booth_term(value: Value, bits: Value) -> Value:
     value : Value
         Signed.
     bits : Value
-        Three bits, the lowest first, which are the bit below the digit and the digit's two bits.
+        Three bits, lowest first: the bit below the digit, then the digit's two bits.
 
     Returns
     -------

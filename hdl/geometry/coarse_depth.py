@@ -17,7 +17,7 @@ from blysk.hdl.core.views import copy, copy_fields
 
 __all__ = ["CoarseDepthUnit", "deep_span_shape"]
 
-# As in the depth test: more bits than a depth or a step has.
+# As in the depth test, this has more bits than a depth or a step.
 _SUM_BITS = 37
 
 
@@ -29,12 +29,12 @@ def deep_span_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 
 
 class CoarseDepthUnit(wiring.Component):
-    """Tells spans that are hidden for their whole length. `CoarseDepth` is the bit-accurate model.
+    """Finds spans that are hidden for their whole length. `CoarseDepth` is the bit-accurate model.
 
     A span takes a cycle for each of its blocks. The answer for a span of one block is on the output 8 cycles
     after the span was taken in. The word of a block is read, compared and written. Words of the last three
-    blocks are not in the memory yet, and are forwarded. Products with a number of pixels are sums of shifts,
-    without multipliers.
+    blocks are not in the memory yet, so they come from registers. Products with a number of pixels are sums
+    of shifts, without multipliers.
 
     A span with another ``picture`` than the span before begins the next picture. It waits until all words of
     the spans before it are written, and `CoarseDepth.swept` words are cleared, one a cycle. After a reset
@@ -51,7 +51,8 @@ class CoarseDepthUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(deep_span_shape(x_bits, y_bits)))`
-        Spans of one pixel or more. A span that goes out of the largest picture is kept, and bounds nothing.
+        Spans of one pixel or more. A span that goes out of the largest picture counts as visible, and changes
+        no bound.
     o : :py:`Out(stream.Signature(1))`
         For each span, in order, 1 if it is hidden.
 
@@ -107,7 +108,7 @@ class CoarseDepthUnit(wiring.Component):
 
         part = Signal(bound.shape(), name="part")
         there = Signal(word, name="there", reset_less=True)
-        # Words that the memory did not have yet when the word of the part was read.
+        # Words that were written after the word of the part was read.
         late = data.StructLayout({"valid": 1, "place": range(given.blocks), "word": word})
         written = [Signal(late, name=f"written_{k}") for k in range(3)]
         same = [Signal(name=f"same_{k}") for k in range(3)]
@@ -153,7 +154,7 @@ class CoarseDepthUnit(wiring.Component):
         return m
 
     def _pictures(self, m: Module, tag: Signal, empty: Signal) -> tuple:
-        """The span taken in, and whether it must wait for its picture; the words that are cleared."""
+        """The span taken in, whether it must wait for its picture, and the words that are cleared."""
         given = self.model
         shape = {"x": self.x_bits, "last": self.x_bits, "line": range(given.blocks), "picture": 1}
         shape |= {"depth": SPAN_DEPTH.width, "step": DEPTH_STEP.width, "outside": 1}
@@ -266,7 +267,8 @@ class CoarseDepthUnit(wiring.Component):
                 *copy_fields(ends, steps, (*common, "falls", "outside")),
                 *(ends[name].eq(steps.depth + steps[name]) for name in both),
                 *copy_fields(bound, ends, common),
-                # A span outside is never behind a bound and never in front of it, so words stay as they are.
+                # A span outside the picture is neither behind a bound nor in front of it, so words stay as
+                # they are.
                 bound.lo.eq(Mux(ends.outside, 0, self._upper(Mux(ends.falls, ends.far, ends.near)))),
                 bound.hi.eq(
                     Mux(ends.outside, given.deepest, self._upper(Mux(ends.falls, ends.near, ends.far)))
@@ -282,7 +284,7 @@ class CoarseDepthUnit(wiring.Component):
 
 
 def _times(value: ValueLike, count: Value) -> Value:
-    """A product as a sum of shifts, for the ones of a constant ``value`` or for the bits of ``count``."""
+    """A product as a sum of shifts, one for each 1 of a constant ``value``, or for each bit of ``count``."""
     if isinstance(value, int):
         return sum((count << k for k in range(value.bit_length()) if value >> k & 1), start=Const(0))
     return sum((Mux(count[k], value << k, 0) for k in range(len(count))), start=Const(0))

@@ -45,7 +45,7 @@ def picture_shape(x_bits: int, y_bits: int) -> data.StructLayout:
 
 
 def is_inside(place: data.View, size: tuple[int, int]) -> Value:
-    """Whether a place is in a picture. A side that is beyond all codes needs no comparison."""
+    """Whether a place is in a picture. A side of the picture that no code can exceed needs no comparison."""
     sides = [
         place[name] < side for name, side in zip("xy", size, strict=True) if side >> len(place[name]) == 0
     ]
@@ -82,9 +82,10 @@ class DepthMemory(wiring.Signature):
 class DepthTesterUnit(wiring.Component):
     """Drops pixels behind the pixels drawn before. `DepthTester` is the bit-accurate model.
 
-    The initiation interval is 1. The latency of a drawn pixel, `latency`, is 3 cycles. A memory outside gives
-    its words through a register, and the latency is 4. A pixel is also compared with the pixels of the last
-    two or three cycles at the same place. They are not in the memory yet. The unit has no multipliers.
+    The initiation interval is 1. The latency of a drawn pixel, `latency`, is 3 cycles. With a memory outside
+    of the unit, words come through a register, and the latency is 4. A pixel is also compared with the pixels
+    of the last two or three cycles at the same place. They are not in the memory yet. The unit has no
+    multipliers.
 
     With ``clears`` the unit writes `DepthTester.CLEARED` to each place of the picture, one a cycle. It does
     so when the first pixel comes after a reset, and after each change of ``picture.number``. Pixels wait
@@ -173,7 +174,7 @@ class DepthTesterUnit(wiring.Component):
         code = total.as_signed() >> SPAN_DEPTH.fraction_bits
         depth = Mux(code < 0, 0, Mux(code > DepthTester.FARTHEST, DepthTester.FARTHEST, code))
         nearer, drawn = Signal(name="nearer"), Signal(name="drawn")
-        # Written after the read, or on the clock of the read.
+        # These words are written after the read, or on the clock of the read.
         late = [(valid[last], stages[last])] + [
             (Signal(name=f"before_valid_{k}"), Signal.like(stages[last], name=f"before_{k}"))
             for k in range(last - 1)
@@ -183,9 +184,9 @@ class DepthTesterUnit(wiring.Component):
             there = Signal.like(port.read_data, name="there")
             with m.If(advance):
                 m.d.sync += there.eq(port.read_data)
-        # The memory's word comes late, so it is compared before it is known which depth counts.
+        # The memory's word comes late. So it is compared before the unit knows which depth counts.
         m.d.comb += [nearer.eq(judged.depth < there), drawn.eq(valid[last - 1] & nearer)]
-        # Whether places are the same is known a cycle before.
+        # The comparison of places is ready a cycle before.
         nexts = [judged, *(pixel for _, pixel in late[:-1])]
         same = [Signal(name=f"same_{k}") for k in range(last)]
         for (written, pixel), flag in reversed(list(zip(late, same, strict=True))):
@@ -217,7 +218,7 @@ class DepthTesterUnit(wiring.Component):
             *copy_fields(port.write_place, stages[last], "xy"),
         ]
         if self.clears:
-            # Empty means also: no pixel is left with which pixels of the next picture would be compared.
+            # An empty unit has no pixel left that could be compared with pixels of the next picture.
             empty = ~Cat(valid, *(written for written, _ in late)).any()
             m.d.comb += held.eq(self._clear(m, empty))
         m.d.sync += missed.eq(advance & valid[last - 1] & ~drawn)

@@ -27,9 +27,9 @@ def true_spans_shape() -> data.StructLayout:
 class EdgeNormalsUnit(wiring.Component):
     """Normalises the ends of a piece one after the other. `EdgeNormals` is the model.
 
-    A piece of one pixel takes one cycle, a longer piece two, one for each normal. The span of one pixel is
-    offered `latency` cycles, 20, after its piece is taken in, a longer span one cycle later. The six
-    multipliers are those of `VectorNormaliserUnit`.
+    A piece of one pixel takes one cycle. A longer piece takes two cycles, one for each normal. A span of one
+    pixel is offered `latency` cycles, 20, after its piece is taken in. A longer span is offered one cycle
+    later. The six multipliers are those of `VectorNormaliserUnit`.
 
     In the *compact* style a normal takes `COMPACT_INTERVAL` cycles and the latency is 32. The three
     multipliers are those of `SharedVectorNormaliserUnit`. The other words of a span stay in a FIFO until the
@@ -75,7 +75,10 @@ class EdgeNormalsUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Sends a piece's vectors one by one; its other words wait in a FIFO; then collects its normals."""
+        """Sends a piece's vectors one after the other, and collects its normals.
+
+        Other words wait in a FIFO.
+        """
         m = Module()
         m.submodules.normaliser = normaliser = self._normaliser
         rest_shape = _rest_shape()
@@ -90,7 +93,10 @@ class EdgeNormalsUnit(wiring.Component):
         return m
 
     def _send(self, m: Module, normaliser, rest) -> None:
-        """Send the left vector of the piece in the register, and the right one of more than one pixel."""
+        """Send the left vector of the piece in the register.
+
+        If it has several pixels, also send the right vector.
+        """
         busy, turn, last = Signal(name="busy"), Signal(name="turn"), Signal(name="last_turn")
         piece, moves = Signal(self.i.payload.shape(), name="piece"), Signal(name="moves")
         m.d.comb += [
@@ -105,8 +111,8 @@ class EdgeNormalsUnit(wiring.Component):
         ]
         begins = moves & ~turn
         if self.compact:
-            # A cycle later. The piece stays for at least one more cycle, and the next piece begins after
-            # that.
+            # This is a cycle later. The piece stays for at least one more cycle, and then the next piece
+            # begins.
             begun = Signal(name="begun")
             m.d.sync += begun.eq(begins)
             begins = begun
@@ -153,7 +159,7 @@ class EdgeNormalsUnit(wiring.Component):
         return moves & lost
 
     def _collect_in_place(self, m: Module, normaliser, words, rest) -> Value:
-        """The same without a register for the result: the other words of a span come from the FIFO itself."""
+        """Collect without a register for the result. The other words of a span come from the FIFO itself."""
         valid, result = Signal(name="valid"), self.o.payload
         good = Signal(normal_shape(), name="good", init=_init())
         left = Signal(normal_shape(), name="left_normal")

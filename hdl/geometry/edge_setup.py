@@ -15,7 +15,7 @@ from blysk.hdl.geometry.triangles import first_centre, tag_shape
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
 
 _DIVISORS = (0, "divisor"), (1, "triple")
-"""Numbers k, and registers of 2 k bits more than a divisor: the divisor, and three times the divisor."""
+"""Registers of a divisor and of three times a divisor, with a number k: 2 k bits more than a divisor."""
 
 ALONG_BITS = 9
 """Bits of `Edges.along`. It is 0 to 511, because n of `EdgeSetup` is 2 only where its b is over 0."""
@@ -48,7 +48,7 @@ def edges_shape(grid: Grid = GRID) -> data.StructLayout:
 
 @dataclass(frozen=True)
 class _Ages:
-    """Stages of a beat (`PipelinedUnit.at`) at which an edge's division and start are loaded, and done."""
+    """Stages of a beat (`PipelinedUnit.at`): an edge's division and start are loaded, and are done."""
 
     divide: int
     start: int
@@ -59,7 +59,7 @@ class EdgeSetupUnit(PipelinedUnit):
     """Quotients, remainders and starts of three edges. `EdgeSetup` is the bit-accurate model.
 
     For each edge a non-restoring division of the difference in x by the height gives quotient and remainder.
-    Then the start is summed up from them, bit by bit. The division of the long edge goes on for the 32 bits
+    Then the start is computed from both, bit by bit. The division of the long edge goes on for the 32 bits
     of the fraction. Three dividers work on the edges of a triangle side by side. With one divider the edges
     take turns. On a grid of 1/256 pixel `latency` is 31 cycles with three dividers of two bits. It is 49 with
     one divider of two bits, and 79 with one divider of one bit. The unit has no multipliers.
@@ -73,9 +73,9 @@ class EdgeSetupUnit(PipelinedUnit):
     bits_per_cycle : int
         Quotient bits that a divider finds in a cycle: 1 or 2.
     initiation_interval : int or None
-        Least number of cycles from a triangle to the next. ``None``: the least possible, `least_interval`.
-        This is 16 with three dividers of two bits, 37 with one of two bits, 67 with one of one bit (1/256
-        pixel).
+        Least number of cycles from a triangle to the next. ``None`` stands for the least possible interval,
+        `least_interval`. With 1/256 pixel this is 16 for three dividers of two bits, 37 for one divider of
+        two bits, and 67 for one divider of one bit.
     skid : bool
         As in `PipelinedUnit`.
 
@@ -108,7 +108,7 @@ class EdgeSetupUnit(PipelinedUnit):
             raise ValueError(f"bits_per_cycle must be 1 or 2, not {bits_per_cycle!r}")
         self.grid, self.dividers, self.bits_per_cycle = grid, dividers, bits_per_cycle
         steps = grid.bits // bits_per_cycle
-        # A divider is loaded, takes its steps, and is read; then the next edge.
+        # A divider is loaded, takes its steps, and is read. Then the next edge has its turn.
         turn = max(steps, grid.subpixel_bits) + 2
         loads = [2 + (0 if dividers == 3 else k * turn) for k in range(3)]
         self._ages = [_Ages(load, load + steps + 2, load + steps + 4 + grid.subpixel_bits) for load in loads]
@@ -132,14 +132,14 @@ class EdgeSetupUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """Differences, divisions, starts; early results are kept until the last one is found."""
+        """Differences, divisions, starts. Early results are kept until the last result is found."""
         grid = self.grid
         result = Signal(self.o.payload.shape())
         x, y = ([Value.cast(operands[name][k]) for k in range(3)] for name in "xy")
 
         def keep(value, name, age):
-            # From stage `age` on, a word stays in its register for one interval. It is copied until a copy is
-            # still there at the stage `latency`.
+            # From stage `age` on, a word stays in its register for one interval. Copies keep the word up to
+            # the stage `latency`.
             register = value
             while True:
                 register = self.register(m, register, f"{name}_{age}", when=self.at(age))
@@ -179,7 +179,7 @@ class EdgeSetupUnit(PipelinedUnit):
         return result
 
     def _divide(self, m: Module, number: int, members: list[int], edges: list, result, keep) -> None:
-        """One divider, and the start that follows it, for the edges that take turns at it."""
+        """A divider and the computation of the start behind it. Some edges share both in turns."""
         grid, ages = self.grid, [self._ages[k] for k in members]
         bits = grid.bits
 
@@ -189,8 +189,8 @@ class EdgeSetupUnit(PipelinedUnit):
                 value = Mux(self.at(moment), other, value)
             return value
 
-        # A remainder from -d to d - 1, and a word: above, the dividend bits to come; below, the quotient bits
-        # found so far.
+        # A remainder from -d to d - 1, and a word. The upper part of the word has the dividend bits to come.
+        # The lower part has the quotient bits found so far.
         load = [age.divide for age in ages]
         rest, word = Signal(signed(bits + 1), name=f"rest_{number}"), Signal(bits, name=f"word_{number}")
         negative = Signal(name=f"negative_{number}")
@@ -209,7 +209,7 @@ class EdgeSetupUnit(PipelinedUnit):
             after, quotient = self._steps(rest, word, divisor, triple)
             m.d.sync += [rest.eq(after), word.eq(quotient)]
 
-        # The remainder is corrected; the start follows from it.
+        # The remainder is corrected, and gives the start.
         corrected = Mux(rest < 0, rest + divisor, rest)[:bits]
         quotient = Cat(word, negative).as_signed()
         read = [age.start - 1 for age in ages]
@@ -224,7 +224,7 @@ class EdgeSetupUnit(PipelinedUnit):
             m.d.comb += result.fraction.eq(keep(fraction, "fraction", self._fraction_read))
 
     def _start(self, m, number, members, edges, division, result, keep) -> None:
-        """``b`` and ``u`` of `EdgeSetup` bit by bit, lowest first; then x and error."""
+        """``b`` and ``u`` of `EdgeSetup` are computed bit by bit, lowest first, and then x and the error."""
         grid, (step, error_step, height) = self.grid, division
         ages = [self._ages[k] for k in members]
         load = [age.start for age in ages]
@@ -308,10 +308,10 @@ class EdgeSetupUnit(PipelinedUnit):
     def _steps(self, rest: Value, word: Value, divisor: Value, triple: Value) -> tuple[Value, Value]:
         """One or two steps of a division: ``rest`` takes in a bit of ``word``, minus or plus the divisor.
 
-        The sign of ``rest`` decides between minus and plus. The second step is computed for both signs of the
-        first one's result, from ``rest``, with one or three times the divisor. Returns ``rest`` and ``word``.
+        The sign of ``rest`` decides between minus and plus. The second step is computed from ``rest`` for
+        both signs of the first result, with one or three times the divisor. Returns ``rest`` and ``word``.
         """
-        # For an unsigned number the comparison with 0 would be constant.
+        # An unsigned number would make the comparison with 0 constant.
         subtract = rest >= 0 if rest.shape().signed else Const(1)
 
         size = len(divisor) + 1

@@ -88,7 +88,7 @@ class EdgeWalkUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The long edge, the short edge, the lower edge that waits; counters; a register for the result."""
+        """Long edge, short edge, the lower edge that waits, counters, and a register for the result."""
         m = Module()
         triangle, advance, load = self.i.payload, Signal(), Signal()
         active, last = Signal(name="active"), Signal(name="last_row", init=1)
@@ -102,7 +102,7 @@ class EdgeWalkUnit(wiring.Component):
                 skid_buffer(m, self.o, valid, row) if self._skid else stop_output(m, self.o, active, row)
             ),
             self.i.ready.eq(advance & last),
-            # An input that is not valid leads to no active scanline.
+            # An invalid input makes no scanline active.
             load.eq(self.i.ready),
         ]
 
@@ -137,7 +137,7 @@ class EdgeWalkUnit(wiring.Component):
         return m
 
     def _edge(self, m: Module, name: str, last, sources, advance, turns=None, lower=None):
-        """Registers of an edge: loaded while ``last``, else stepped with ``advance``.
+        """Registers of an edge. They are loaded while ``last`` is high, and else stepped with ``advance``.
 
         ``sources`` are conditions, each with the index of the edge to load. On ``turns`` the registers take
         the words of the edge ``lower``. An edge without ``advance`` is loaded, and not stepped.
@@ -185,7 +185,7 @@ class EdgeWalkUnit(wiring.Component):
 
 
 class _Edge:
-    """Registers of an edge; ``lack`` is the height less the step of the error."""
+    """Registers of an edge. ``lack`` is the height minus the step of the error."""
 
     def __init__(self, name: str, bits: int):
         self.x, self.step = (Signal(signed(X_BITS), name=f"{name}_{word}") for word in ("x", "step"))

@@ -33,8 +33,8 @@ from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 __all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
 
 PORT_DESCRIPTIONS = {
-    "normal_left": "unit normal at the first pixel; of a true line its end, N/W",
-    "normal_right": "unit normal at the last pixel; of a true line its end, N/W",
+    "normal_left": "unit normal at the first pixel; or N/W, the end of a true line",
+    "normal_right": "unit normal at the last pixel; or N/W, the end of a true line",
     "start": "N/W at the first pixel, in the frame of the light",
     "step": "its step to the next pixel, times 2^exponent",
     "exponent": "exponent of the step",
@@ -54,22 +54,25 @@ PORT_DESCRIPTIONS = {
 WAITING_TRIANGLES = 512
 """Triangles between sort and setup, in block RAMs, in the throughput style.
 
-Dropped triangles come in runs, of up to hundreds where a mesh turns its back. Meanwhile the setup works on
-the waiting triangles.
+Dropped triangles come in runs. Where a mesh shows its back, a run may have hundreds. Meanwhile the setup
+works on the waiting triangles.
 """
 
 BLOCK_WORDS = 64
-"""Least words of a memory that is a block RAM. Fewer words would take look-up tables."""
+"""Least number of words of a memory in a block RAM. A memory of fewer words takes look-up tables."""
 
 _COMPACT_GRADIENT = 12
 """Initiation interval of an attribute in the compact style: the number of its products."""
 
 _INSIDE_BITS = 10
-"""Bits of the counters of triangles. They count modulo more triangles than the unit holds."""
+"""Bits of the counters of triangles.
+
+The counters wrap only beyond the number of triangles inside the unit.
+"""
 
 
 class _TriangleSetup(wiring.Component):
-    """From sorted triangles to edges for the walk and to planes: one of the lanes of `GeometryUnit`.
+    """One of the lanes of `GeometryUnit`: it makes edges for the walk, and planes, from sorted triangles.
 
     Parameters
     ----------
@@ -120,7 +123,7 @@ class _TriangleSetup(wiring.Component):
         _fork(m, edges.o, corners, walks)
         for to in (corners.payload, walks.payload):
             m.d.comb += copy_fields(to, edges.o.payload)
-        # Registers end the chain of readies from the assembler to the sort.
+        # These registers end the combinational chain of readies from the assembler to the sort.
         connect_register(m, "waiting_corners", corners, planes.i)
         if self._compact:
             connect_register(m, "waiting_walk", walks, wiring.flipped(self.walks))
@@ -174,11 +177,11 @@ class GeometryUnit(wiring.Component):
     - in the walk one cycle for each scanline without pixels in the picture;
     - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits. These are at least 1 for
       1 pixel, 2 for 2 pixels and 3 for more, and never more than its pixels. With ``lines`` or ``vectors``
-      the least is 1 for any number of pixels. For n pixels cut off at the long edge it takes as many cycles
-      more as n has bits. In the compact style it takes four cycles for each scanline and for every two of
-      these bits. At the same time the normals take three cycles each. With ``vectors`` each time that a span
-      does not fit, and each piece behind the first, takes two cycles (`SpanHalverUnit`). In the compact style
-      a piece takes 13 cycles or more at the same time (`SerialVectorsUnit`).
+      the least is 1 for any number of pixels. If n pixels are cut off at the long edge, the scanline takes
+      one more cycle for each bit of n. In the compact style a scanline takes four cycles, and four more for
+      every two of these bits. At the same time the normals take three cycles each. With ``vectors`` each time
+      that a span does not fit, and each piece behind the first, takes two cycles (`SpanHalverUnit`). In the
+      compact style a piece takes 13 cycles or more at the same time (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` or ``vectors``
     4 and 2. The second lane adds 4, in the compact style 2.
@@ -274,7 +277,7 @@ class GeometryUnit(wiring.Component):
         return m
 
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
-        """From the sort, through the lanes in turns, to edges for the walk and to planes."""
+        """Connect the sort, through the lanes in turns, to the edges for the walk and to the planes."""
         drawn = _between("drawn", self._sort.o)
         if self.compact:
             connect(m, self._sort.o, drawn)
@@ -307,7 +310,7 @@ class GeometryUnit(wiring.Component):
         return tuple(merged)
 
     def _walk_planes(self, m: Module, planes: stream.Interface) -> stream.Interface:
-        """Scanlines and planes to the span attributes: a triangle's first scanline waits for its planes.
+        """Connect scanlines and planes to the attributes; a triangle's first scanline waits for its planes.
 
         Returns the scanlines as the attributes take them.
         """
@@ -337,7 +340,7 @@ class GeometryUnit(wiring.Component):
         return rows
 
     def _watch(self, m: Module, rows: stream.Interface) -> None:
-        """Whether anything is inside: triangles up to their last scanline, and pieces of their spans."""
+        """Whether anything is inside: triangles until their last scanline, and pieces of their spans."""
         sort = self._sort
         dropped = sum(sort.status[name] for name in ("empty", "zero_area", "culled"))[:_INSIDE_BITS]
         taken, walked = (Signal(_INSIDE_BITS, name=name) for name in ("taken", "walked"))
@@ -353,7 +356,7 @@ class GeometryUnit(wiring.Component):
         m.d.comb += self.idle.eq(((taken - walked)[:_INSIDE_BITS] == dropped) & idle)
 
     def _count(self, m: Module) -> None:
-        """Counters of the units; a counter that two units have is their sum."""
+        """Counters of the units. If two units have the same counter, the counters are added."""
         sliver = Signal(unsigned(len(self.status.sliver)), name="slivers")
         m.d.sync += sliver.eq(sliver + sum(lane.sliver for lane in self._lanes))
         sort, attributes = self._sort.status, self._attributes.status

@@ -40,10 +40,10 @@ def gradient_shape() -> data.StructLayout:
 class GradientSetupUnit(PipelinedUnit):
     """Start and steps of an attribute. `GradientSetup` is the bit-accurate model.
 
-    The twelve multiplications of an attribute take turns at ``ceil(12 / I)`` multipliers of 18x18 bits, I the
-    initiation interval: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter. The sum of the
-    start takes four turns at an adder, two bits of both factors a turn. The latency, `latency`, follows from
-    the schedule: 40 cycles for an interval of 4, 52 for 12.
+    Let I be the initiation interval. The twelve multiplications of an attribute take turns at ``ceil(12 /
+    I)`` multipliers of 18x18 bits: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter. The
+    sum of the start takes four turns at an adder, two bits of both factors a turn. The latency, `latency`,
+    follows from the schedule: 40 cycles for an interval of 4, 52 for 12.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class GradientSetupUnit(PipelinedUnit):
         high, crossed = three_products(g, "part", f, inward, p.FRACTION_LOW, p.PRODUCT_LOW, 40)
         part = g.register("part", lambda a, b: (a + b).wrap(SQ(2, 40)), high, crossed)
 
-        # The other two are shifted after this one: their operands are narrower, and cheaper to keep.
+        # The other two words are shifted later, because their operands are narrower and cheaper to keep.
         shifter = self._shifter()
         part = g.use(shifter, "part_shifted", (part, column_shift), self._to_shift)
         row, step = (
@@ -152,7 +152,7 @@ class GradientSetupUnit(PipelinedUnit):
         return result
 
     def _shifter(self):
-        """Right by 0 to 31 places, in two registers, then rounded half up in a third."""
+        """Shift right by 0 to 31 places in two registers. A third register rounds half up."""
         format = GradientSetup.SHIFTED_FORMAT
         bits = format.width + _ROUND
 
@@ -170,7 +170,7 @@ class GradientSetupUnit(PipelinedUnit):
         return Cat(Const(0, _ROUND), Value.cast(word)).as_signed(), amount
 
     def _start(self, first, short, step, right):
-        """``(k short + n inward) / 256`` in four digits of two bits, lowest first; then the rest of n."""
+        """``(k short + n inward) / 256``: four digits of two bits, lowest first, then n's upper bits."""
         g, p = self._graph, GradientSetup
         point = p.START_FORMAT.fraction_bits
         down, along = (g.input(name, lambda o, name=name: o[name]) for name in ("down", "along"))

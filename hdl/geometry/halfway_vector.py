@@ -14,8 +14,8 @@ __all__ = ["HalfwayVectorUnit"]
 class HalfwayVectorUnit(wiring.Component):
     """Half-way vectors by a sum and a normaliser. `HalfwayVector` is the bit-accurate model.
 
-    Latency, `latency`, and initiation interval are those of `VectorNormaliserUnit`, 18 cycles and 1. So are
-    the multipliers, six.
+    The latency, `latency`, is 18 cycles, the initiation interval 1, and there are six multipliers, as in
+    `VectorNormaliserUnit`.
 
     Parameters
     ----------
@@ -41,7 +41,10 @@ class HalfwayVectorUnit(wiring.Component):
         super().__init__({"i": In(stream.Signature(given)), "o": Out(stream.Signature(made))})
 
     def elaborate(self, platform):
-        """The sum; half of it has the same bits, with another binary point. H is 0 if the sum is lost."""
+        """Half of the sum has the same bits as the sum, with another binary point.
+
+        H is 0 if the sum is lost.
+        """
         m = Module()
         m.submodules.normaliser = normaliser = self._normaliser
         vector, normal = normaliser.i.payload.vector, normaliser.o.payload.normal

@@ -32,8 +32,9 @@ class LightAdapterUnit(wiring.Component):
 
     Each component of start and step has a multiplier, which takes x, y and z in turns and adds the products.
     So the initiation interval is 3. In the *serial* form one multiplier makes all components one after the
-    other, 6 cycles each. A span is taken in on the last cycle of its interval, and offered 4 cycles later. If
-    it waits at the output until the next span is made, the next span waits a cycle longer.
+    other. Each component takes 6 cycles. A span is taken in on the last cycle of its interval, and offered 4
+    cycles later. If a span still waits at the output when the next span is made, the next span waits a cycle
+    longer.
 
     Axes are in memories, so they take no registers. Reset does not clear them.
 
@@ -54,7 +55,7 @@ class LightAdapterUnit(wiring.Component):
     i : :py:`In(stream.Signature(shape))`
         Spans with vectors in the frame of the first light.
     o : :py:`Out(stream.Signature(with_components(shape, 3 + lights * rows)))`
-        The same with the components of further lights behind.
+        The same spans, with the components of further lights behind the first light's.
     write : :py:`In(stream.Signature(write_shape()))`
         Writes of frame constants, always accepted. The unit takes the axes, see `FrameConstants.writes`. They
         are constant while spans are inside.
@@ -81,7 +82,7 @@ class LightAdapterUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Turns; operands; products; sums, the last of which ends a span; words that wait beside them."""
+        """Turns, operands, products, sums, and words that wait beside them. The last sum ends a span."""
         m = Module()
         given, made = self.i.payload, self.lights * self.rows
         result = Signal(self.o.payload.shape(), name="result")
@@ -119,7 +120,7 @@ class LightAdapterUnit(wiring.Component):
                 m.d.sync += signal.eq(value)
             return signal
 
-        # Of a span of one pixel the start takes the place of the step, which has no meaning.
+        # In a span of one pixel the step has no meaning, and the start takes its place.
         single = ~given.length[1:].any()
         start, step = (
             Array(Value.cast(given[name][k]).as_signed() for k in range(_AXES))[axis]
@@ -143,7 +144,7 @@ class LightAdapterUnit(wiring.Component):
                     m.d.sync += light.eq(Mux(ends_all, 1, light + 1))
                     with m.If(ends_all):
                         m.d.sync += of_step.eq(~of_step)
-            # As many low bits of a light's number as tell the lights apart.
+            # The low bits of a light's number that distinguish all lights.
             place = Cat(axis, row, light[: (self.lights - 1).bit_length()])
             code = self._axes(m, "axes", place, of_axes & (of_light > 0) & (of_light <= self.lights))
             vector = register(Mux(of_step, step, start).as_signed(), "vector")
@@ -170,7 +171,7 @@ class LightAdapterUnit(wiring.Component):
                 for k, code in enumerate(codes):
                     product = register(vector * code, f"product_{name}_{k}")
                     sums.append(self._sum(m, advance, product, begins, f"sum_{name}_{k}"))
-        # No span ends within three cycles of another: their other words wait in one register.
+        # Ends of spans are at least three cycles apart, so one register is enough for their other words.
         words = {
             name: register(Value.cast(given[name]), f"kept_{name}", self.i.valid & last)
             for name in given.shape().members
@@ -181,7 +182,7 @@ class LightAdapterUnit(wiring.Component):
         return m
 
     def _axes(self, m: Module, name: str, place: Value, chosen: Value) -> Value:
-        """Code at a place of a memory of axes. ``chosen`` tells whether a write is for this memory."""
+        """Code of an entry in a memory of axes. ``chosen`` tells whether a write is for this memory."""
         write, width = self.write, LightAdapter.FORMAT.width
         m.submodules[name] = memory = Memory(shape=width, depth=1 << len(place), init=[])
         writes, reads = memory.write_port(), memory.read_port(domain="comb")

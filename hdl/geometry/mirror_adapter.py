@@ -21,9 +21,9 @@ def mirror_constants_shape() -> data.StructLayout:
 class MirrorAdapterUnit(wiring.Component):
     """Two components of vectors in place of y. `MirrorAdapter` is the bit-accurate model.
 
-    Two multipliers take the start and then the step of a span. So the initiation interval is 2, for a span of
-    one pixel 1. In the *serial* form one multiplier makes the four products, and the interval is 4. A span is
-    taken in on the last cycle of its interval, and offered 3 cycles later.
+    Two multipliers take the start and then the step of a span. So the initiation interval is 2. For a span of
+    one pixel it is 1. In the *serial* form one multiplier makes the four products, and the interval is 4. A
+    span is taken in on the last cycle of its interval, and offered 3 cycles later.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class MirrorAdapterUnit(wiring.Component):
     i : :py:`In(stream.Signature(shape))`
         Spans of `VectorAdapterUnit` or `LightAdapterUnit`.
     o : :py:`Out(stream.Signature(with_components(shape, components + 1)))`
-        The same with the components x, y cos a, z, the components of further lights, y sin a.
+        The same spans, with the components x, y cos a, z, the components of further lights, y sin a.
     constants : :py:`In(mirror_constants_shape())`
         sin a and cos a, constant while spans are inside.
 
@@ -60,7 +60,7 @@ class MirrorAdapterUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Turns of the operands; products; their rounding; the last four of them are those of a span."""
+        """Turns of the operands, products, and their rounding. The last four products belong to a span."""
         m = Module()
         p, given = MirrorAdapter(), self.i.payload
         turns, bits = 4 // self.multipliers, p.FORMAT.fraction_bits
@@ -123,7 +123,7 @@ class MirrorAdapterUnit(wiring.Component):
         return m
 
     def _delayed(self, register, given, single: Value) -> dict[str, Value]:
-        """All that is no product, two stages on."""
+        """All words that are not multiplied, two stages later."""
         words = {
             name: Value.cast(given[name]) for name in given.shape().members if name not in ("start", "step")
         }

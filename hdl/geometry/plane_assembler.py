@@ -52,7 +52,7 @@ class PlaneAssemblerUnit(wiring.Component):
     model : PlaneAssembler
         Bit-accurate model.
     serial : bool
-        Whether attributes are offered one by one.
+        Whether attributes are offered one after the other.
 
     Members
     -------
@@ -77,7 +77,7 @@ class PlaneAssemblerUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Collected words; bound times limit; sum and largest of the sizes; the search."""
+        """Collected words, bound times limit, sum and maximum of the sizes, and the search."""
         m = Module()
         gradient, result = self.i.payload, Signal(planes_shape(), name="result")
         count, full, accept = Signal(2, name="count"), Signal(name="full"), Signal()
@@ -115,7 +115,7 @@ class PlaneAssemblerUnit(wiring.Component):
         return m
 
     def _allowed(self, m: Module, begins: Value, least: Value) -> tuple[Signal, Value]:
-        """Bound times limit, two bits of the limit a cycle; and whether the product is finished."""
+        """Bound times limit, two bits of the limit a cycle, and whether the product is finished."""
         bits = AttributeSerialiser.BITS + LIMIT_BITS
         allowed, factor = Signal(bits, name="allowed"), Signal(AttributeSerialiser.BITS, name="factor")
         rest, left = Signal(LIMIT_BITS, name="rest"), Signal(range(LIMIT_BITS // 2 + 1), name="left")
@@ -133,7 +133,10 @@ class PlaneAssemblerUnit(wiring.Component):
 
     @staticmethod
     def _search(m: Module, accept, count, size, allowed, multiplied, piece) -> Signal:
-        """The largest exponent that fits, its first bit first; returns whether it is found."""
+        """Find the largest exponent that fits, from its first bit on.
+
+        Returns whether the search is finished.
+        """
         bits = GradientSetup.SIZE_BITS
         largest, total = Signal(bits, name="largest"), Signal(bits + 2, name="total")
         norm, step = Signal(max(bits + 2, len(allowed)), name="norm"), Signal(3, name="search_step")
@@ -154,10 +157,11 @@ class PlaneAssemblerUnit(wiring.Component):
         with m.If(step == 1):
             m.d.sync += [norm.eq(largest + total), exponent.eq(0)]
         with m.Elif(step != 0):
-            # By 8, 4, 2 and 1 places: the answers are the bits of the exponent, the first bit first.
+            # Shifts by 8, 4, 2 and 1 places are tried. The answers are the bits of the exponent, first bit
+            # first.
             turn = (step - 2)[:2]
             more = Mux(turn[1], Mux(turn[0], norm << 1, norm << 2), Mux(turn[0], norm << 4, norm << 8))
-            # A subtraction, for its carry chain: the mapper makes look-up tables of a comparison.
+            # A subtraction gets a carry chain. The mapper would make look-up tables of a comparison.
             fits = ~(allowed - more)[-1]
             m.d.sync += exponent.eq(Cat(fits, exponent))
             with m.If(fits):

@@ -35,8 +35,8 @@ def scales_shape() -> dict:
 class PlaneSetupUnit(PipelinedUnit):
     """``1/D`` and ``1/W`` as mantissas and exponents. `PlaneSetup` is the bit-accurate model.
 
-    One shifter normalises height and area, and one table serves both reciprocals. The seven multiplications
-    take turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency,
+    One shifter normalises height and area, and one table serves both reciprocals. Let I be the initiation
+    interval. The seven multiplications take turns at ``ceil(7 / I)`` multipliers of 18x18 bits. The latency,
     `latency`, follows from the schedule: 26 cycles for an interval of 16.
 
     Parameters
@@ -93,8 +93,8 @@ class PlaneSetupUnit(PipelinedUnit):
             name: g.input(name, lambda o, name=name: o[name]) for name in ("fraction", "down", "along")
         }
 
-        # A word shifted left to its first 1, and the places. Steps: which bytes have a 1; shift by bytes; by
-        # bits.
+        # A word shifted left to its first 1, and the number of places. The steps are: find the bytes with a
+        # 1, shift by bytes, shift by bits.
         def normalise(register, word):
             used = register(Cat(byte.any() for byte in _bytes(word)), "used")
             word = register(word, "given")
@@ -111,7 +111,7 @@ class PlaneSetupUnit(PipelinedUnit):
         shifter = g.share("shifter", (unsigned(bits),), 3, normalise)
         top = g.use(shifter, "height_moved", (height,), lambda h: (Cat(Const(0, grid.bits), h),))
         wide = g.use(shifter, "area_moved", (area,), lambda a: (a,))
-        # The shifter holds a result for one cycle only, and the result is needed for longer.
+        # The shifter holds a result for one cycle only. A register keeps it, because it is needed for longer.
         top, wide = (g.register(f"{w.name}_kept", lambda v: v, w) for w in (top, wide))
 
         def mantissa(view):
@@ -185,7 +185,10 @@ def _bytes(word: Value) -> list[Value]:
 
 
 def _move(word: Value, step: int, moved: list) -> tuple[Value, list]:
-    """Left by ``step`` places if the first ``step`` bits are 0. ``moved`` gets a bit that tells this."""
+    """Shift left by ``step`` places if the first ``step`` bits are 0.
+
+    ``moved`` gets a bit that is 1 if shifted.
+    """
     empty = ~word[-step:].any()
     return Mux(empty, (word << step)[: len(word)], word), [*moved, empty]
 

@@ -16,7 +16,7 @@ _BITS = GradientSetup.FORMAT.width
 
 
 class AttributeTurns:
-    """Control of the turns of attributes. All come on one cycle; *serial*: in four turns, one a cycle.
+    """Control of the turns of attributes. All come on one cycle, or *serially* in four turns.
 
     In the serial form the first attribute decides for all four whether a scanline comes in. The control of
     the walk moves on with the last attribute, `ends`. With ``ahead`` registers tell whether the walk
@@ -53,7 +53,7 @@ class AttributeTurns:
         with m.If(rows.valid):
             m.d.sync += has_pixels.eq(covered)
         if ahead:
-            # It is known a cycle before whether the output lets the walk advance.
+            # A register tells a cycle before whether the output lets the walk advance.
             stays, advances = Signal(name="stays_busy"), Signal(name="advances")
             self.advances = advances
             m.d.comb += stays.eq(Mux(self.goes, self.loads | (busy & ~self.leaves), busy))
@@ -64,7 +64,7 @@ class AttributeTurns:
             m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(self.accepts)]
 
     def late(self, m: Module, value: ValueLike, name: str) -> Value:
-        """*Serial*: the value on the step before, from a register; else the value itself."""
+        """In the *serial* form the value on the step before, from a register. Else the value itself."""
         if not self.serial:
             return Value.cast(value)
         register = Signal(len(Value.cast(value)), name=name)
@@ -74,7 +74,7 @@ class AttributeTurns:
 
 
 class AttributeRing:
-    """A register of one attribute. *Serial*: a ring with a word of each attribute; every step moves it on.
+    """A register of one attribute. *Serial*: a ring with a word of each attribute, moved on every step.
 
     A *late* word is replaced one step later, on its way round the ring, by values from
     `AttributeTurns.late`.
@@ -94,21 +94,21 @@ class AttributeRing:
                 ]
 
     def becomes(self, m: Module, value: ValueLike) -> None:
-        """Replace the word; a word that is not replaced stays."""
+        """Replace the word. A word that is not replaced stays."""
         m.d[self._domain] += self._next.eq(value)
 
 
 class ScanlineWalk:
     """Control of the walk along a scanline: first pixels to skip, then pieces, one or two bits a step.
 
-    A mask is the pixels of a whole piece, less one: ``loaded_mask`` for the span that comes in, ``mask`` for
-    the span inside.
+    A mask is the number of pixels of a whole piece, minus 1: ``loaded_mask`` for the span that comes in,
+    ``mask`` for the span inside.
     """
 
     def __init__(
         self, m: Module, row, tag, loaded_mask: Value, mask: Signal, loads: Signal, busy: Signal, turns
     ):
-        # ``left``: pixels of the span that are left, less one; ``bits``: bits of a number still to be walked.
+        # ``left``: pixels of the span that are left, minus 1; ``bits``: bits of a number still to be walked.
         left, bits = Signal(PIXEL_BITS, name="left"), Signal(PIXEL_BITS, name="bits")
         self.pixels, begin = Signal(PIXEL_BITS, name="pixels"), Signal(PIXEL_BITS, name="begin")
         self.turns = turns
@@ -124,7 +124,7 @@ class ScanlineWalk:
             self.gives.eq(busy & self.ends & ~self.skipping),
             self.emits.eq(self.gives & turns.advance & turns.steps),
         ]
-        # A whole piece that is not the last takes one pixel more than the mask: minus mask, minus 1.
+        # A whole piece that is not the last has one pixel more than the mask. So mask and 1 are subtracted.
         after = (left + ~mask)[:PIXEL_BITS]
         count = row.length - 1
         if turns.serial:
@@ -211,7 +211,7 @@ class ScanlineWalk:
         The attribute's step is ``inward`` when a span is loaded, and ``following_step`` later. Without
         ``cuts`` no piece follows another. So the values of a span are not read once the span is found.
         """
-        # The sums take a whole cycle, so the choice is behind their registers.
+        # The sums take a whole cycle, so the choice between them comes after their registers.
         nears, totals = (
             AttributeRing(m, f"{name}_{word}", self.turns, late=True) for word in ("near", "total")
         )
@@ -246,6 +246,6 @@ class ScanlineWalk:
 
 
 def _piece(left: Value, mask: Value) -> tuple[Value, Value]:
-    """Pixels of the next piece, less one, and whether another piece follows it."""
+    """Pixels of the next piece, minus 1, and whether another piece follows."""
     more = (left & ~mask).any()
     return Mux(more, mask, left), more

@@ -35,10 +35,10 @@ class SerialVectorsUnit(wiring.Component):
 
     Each component of a vector goes through one shifter, a subtraction, another shifter and a rounding.
 
-    A piece takes 13 cycles. Each time that it does not fit it takes six more. Each time that the shift
-    differs from the shift before it takes five more. Steps 3 and 4 of the next piece begin when this piece
-    was taken. Steps 1 and 2 go on meanwhile. A span that fits is offered at most `latency` cycles after its
-    last attribute was taken. The unit has no multipliers.
+    A piece takes 13 cycles. Each time that it does not fit, it takes six more cycles. Each time that its
+    shift differs from the shift before, it takes five more cycles. Steps 3 and 4 of the next piece begin when
+    this piece was taken. Steps 1 and 2 go on meanwhile. A span that fits is offered at most `latency` cycles
+    after its last attribute was taken. The unit has no multipliers.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class SerialVectorsUnit(wiring.Component):
         self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
-        """The rings and their turns; what decides; the pieces of a span; the words."""
+        """The rings and their turns, the decisions, the pieces of a span, and the words."""
         m = Module()
         # The steps of the turns. `settles` takes a cycle without a turn, as does a span that does not fit.
         names = "loads", "settles", "repeats", "tests", "starts", "steps", "renews"
@@ -136,8 +136,8 @@ class SerialVectorsUnit(wiring.Component):
             for name in ("near", "far", "last", "step")
         }
         near, far, last, step = (ring[0] for ring in rings.values())
-        # Behind a piece: the next pixel. After a try that does not fit: one pixel less, or the mean of both
-        # ends.
+        # After a piece the next pixel follows. After a try that does not fit, the end moves to one pixel
+        # less, or to the mean of both ends.
         other = Mux(leaves, step, Mux(odd, near, ~step))
         total = Signal(_WIDTH + 1, name="total")
         m.d.comb += total.eq(far.as_signed() + other.as_signed() + (~leaves & ~odd))
@@ -183,7 +183,7 @@ class SerialVectorsUnit(wiring.Component):
         return tag, pixels, uncut, words | {"length": pixels, "material": tag["material"]}
 
     def _test(self, m: Module, heads, kinds, place, pixels, results) -> Signal:
-        """Whether the piece fits, from the third cycle behind its last component on; returns its shift.
+        """Decide whether the piece fits, from the third cycle after its last component on. Returns its shift.
 
         The test uses the shift of the piece before. If the piece's own shift differs, the piece is tested
         again.
@@ -212,7 +212,7 @@ class SerialVectorsUnit(wiring.Component):
         with m.If(settles):
             m.d.sync += shift.eq(Cat(chosen))
 
-        # Of a component the first bits at both ends, and whether its sign is the same.
+        # The first bits of a component at both ends, and whether both signs are the same.
         shape = data.StructLayout({"near": bits, "far": bits, "keeps": 1})
         size, before, zeroth = (Signal(shape, name=name) for name in ("size", "size_before", "size_0"))
         tested, begins = Signal(name="tested"), Signal(name="tested_first")
@@ -246,7 +246,10 @@ class SerialVectorsUnit(wiring.Component):
         return shift
 
     def _words(self, m: Module, heads, kinds, place, shift, tag, words) -> None:
-        """Each component through the shifts and the rounding; depths, and what passes."""
+        """Send each component through the shifts and the rounding.
+
+        Also send the depths and the words that pass.
+        """
         p, is_component = VectorAdapter(self.rotates), ~place.all()
         (tests, starts, steps, turns), right = kinds, tag["right"]
         bits, low = p.STEP_BITS + 1, SPAN_STEP.fraction_bits - SPAN_NORMAL.fraction_bits
@@ -268,7 +271,8 @@ class SerialVectorsUnit(wiring.Component):
 
         m.d.sync += [copy(after, before) for before, after in pairwise(notes)]
 
-        # Both have the fraction bits of the step: the first pixel's value, under 1, and the step modulo 2.
+        # Both words have the fraction bits of the step: the first pixel's value, under 1, and the step modulo
+        # 2.
         value, step = Mux(right, heads["far"], heads["near"]), heads["step"]
         beyond, sign = value[-1] ^ value[-2], value[-1]
         value = Cat(Mux(beyond, (~sign).replicate(bits - 1), value[: bits - 1]), sign)

@@ -69,16 +69,16 @@ def whole_span_shape() -> data.StructLayout:
 class SpanAttributesUnit(wiring.Component):
     """Walks attributes down the long edge and along the spans. `SpanAttributes` is the bit-accurate model.
 
-    A scanline without pixels takes a cycle. Other scanlines take, for every piece of p pixels, as many cycles
-    as ``p - 1`` has bits, at least one. For n pixels cut off at the long edge they take as many cycles more
-    as n has bits. So a piece never takes more cycles than it has pixels. A span of one or two pixels leaves
-    soonest, if it is one piece and no pixel is cut off at the long edge. It is offered `latency` cycles, 3,
-    after its scanline was taken in. The unit adds shifted steps, modulo 4, and has no multipliers.
+    A scanline without pixels takes a cycle. Every piece of p pixels takes as many cycles as ``p - 1`` has
+    bits, but at least one. If n pixels are cut off at the long edge, the scanline takes one more cycle for
+    each bit of n. So a piece never takes more cycles than it has pixels. The fastest spans have one or two
+    pixels in one piece, and no pixel cut off at the long edge. They are offered `latency` cycles, 3, after
+    their scanline was taken in. The unit adds shifted steps, modulo 4, and has no multipliers.
 
     In the *serial* form one attribute after the other goes through the same adders, and its words through
-    rings of registers. A scanline comes four times, each time with another attribute's plane. It takes four
-    cycles without pixels, and else four cycles for every two bits of the numbers above. `latency` is 6,
-    counted from the fourth time. A piece also waits until the piece before it has been taken.
+    rings of registers. A scanline comes four times, each time with another attribute's plane. A scanline
+    without pixels takes four cycles. Else it takes four cycles for every two bits of the numbers above.
+    `latency` is 6, counted from the fourth time. A piece also waits until the piece before it has been taken.
 
     With ``whole`` spans are not cut. They leave as the walk finds them, a cycle earlier: `latency` is 2. In
     the serial form they leave attribute by attribute. The first attribute is offered `latency` cycles, 3,
@@ -99,8 +99,8 @@ class SpanAttributesUnit(wiring.Component):
     o : :py:`Out(stream.Signature(pieces_shape()))`
         Pieces. With ``whole`` spans, in `whole_spans_shape`, serial in `whole_span_shape`.
     status : :py:`Out(counters_shape("empty", "cut"))`
-        Number of triangles without a span, and of spans of more than one piece, since the reset. With
-        ``whole`` only the first.
+        Number of triangles without a span, and number of spans of more than one piece, since the reset. With
+        ``whole`` only the number of triangles.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class SpanAttributesUnit(wiring.Component):
         self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
-        """The long edge's values; the walk along a scanline; the pieces' words."""
+        """The long edge's values, the walk along a scanline, and the pieces' words."""
         m = Module()
         row, planes = self.i.payload.row, self.i.payload.planes
         first, drawn = Signal(name="first", init=1), Signal(name="drawn")
@@ -134,7 +134,7 @@ class SpanAttributesUnit(wiring.Component):
         with m.If(turns.goes & turns.loads):
             m.d.sync += copy_fields(tag, row, ("y", "right", "flip", "material"))
 
-        # A whole span is the last piece of its own.
+        # A whole span is a single piece, so it is the last piece.
         longest = Mux(first, _mask(planes.piece), mask)
         if self.whole:
             longest = mask = Const((1 << PIXEL_BITS) - 1)
@@ -234,7 +234,10 @@ class SpanAttributesUnit(wiring.Component):
         return base, inward.value
 
     def _convert(self, m: Module, valid: Signal, walked, result) -> None:
-        """Left and right end from near and far end; components cut, depth made unsigned, all saturated."""
+        """The near and far end become left and right end.
+
+        Components are cut, the depth becomes unsigned, and all values saturate.
+        """
         right, components = walked.tag.right, ATTRIBUTES - 1
         for k in range(len(walked.near)):
             near, far = (
@@ -283,5 +286,5 @@ def _code(value) -> Value:
 
 
 def _mask(piece: Value) -> Value:
-    """Pixels of a whole piece, less one: ``2^piece - 1``."""
+    """Pixels of a whole piece, minus 1: ``2^piece - 1``."""
     return Cat(piece > k for k in range(PIXEL_BITS))

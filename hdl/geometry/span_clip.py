@@ -56,7 +56,8 @@ class SpanClipUnit(PipelinedUnit):
             Mux(first, frame.left - operands.begin, 0),
         )
         cut = self.register(m, cut[:PIXEL_BITS], "cut")
-        # Both columns also against the opposite borders: a scanline beside the picture has no pixel.
+        # Both columns are also compared with the opposite borders, so a scanline beside the picture has no
+        # pixel.
         inside = (operands.y >= frame.top) & (operands.end > frame.left) & (operands.begin < frame.right)
         inside = self.register(m, inside, "inside")
         y = self.register(m, (operands.y - frame.top)[:PIXEL_BITS], "line")

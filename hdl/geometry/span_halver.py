@@ -76,7 +76,7 @@ class SpanHalverUnit(wiring.Component):
         self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
-        """The piece that is tried; the bits that tell whether it fits; what is tried next."""
+        """The piece that is tried, the bits that tell whether it fits, and the next try."""
         m = Module()
         given, result = self.i.payload, self.o.payload
         # ``known``: the bits of the test belong to its ends; ``whole``: it reaches to the end of the span.
@@ -155,8 +155,8 @@ class SpanHalverUnit(wiring.Component):
             for name in ("near", "far", "last", "step")
         )
         signed_far, signed_near = far.as_signed(), near.as_signed()
-        # Behind a piece: the next pixel. After a try that does not fit: one pixel less, or the mean of both
-        # ends.
+        # After a piece the next pixel follows. After a try that does not fit, the end moves to one pixel
+        # less, or to the mean of both ends.
         other = Mux(fits, step.as_signed(), Mux(odd, signed_near, ~step.as_signed()))
         total = Signal(SPAN_STEP.width + 1, name=f"total_{k}")
         m.d.comb += total.eq(signed_far + other + (~fits & ~odd))
@@ -177,7 +177,7 @@ class SpanHalverUnit(wiring.Component):
         """Registers: the shift, the first bits of the sizes, whether signs are the same."""
         bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
 
-        # Each stage is a signal: an expression that is used twice would be made twice.
+        # Each stage is a signal, because an expression that is used twice would be built twice.
         def wire(value, name):
             signal = Signal(Value.cast(value).shape(), name=name)
             m.d.comb += signal.eq(value)
@@ -253,7 +253,7 @@ def size_of(code: Value) -> Value:
 
 
 def shorter(pixels: Value) -> Value:
-    """Pixels of the next piece to try: one less than an even number, the larger half of an odd number."""
+    """Pixels of the next piece to try: an even number minus 1, or the larger half of an odd number."""
     odd = pixels[0]
     return (Mux(odd, pixels >> 1, pixels) + Mux(odd, 1, (1 << PIXEL_BITS) - 1))[:PIXEL_BITS]
 
@@ -279,5 +279,5 @@ def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
 def is_apart(keeps: Value, first: Value, last: Value) -> Value:
     """Whether a component's ends are too far apart for a span of two pixels, from the first bits of both."""
     most = int(SpanHalver.STEEP * (1 << SpanHalver.BITS))
-    # Of a negative code the first bits are one less than the size's, with the other sign.
+    # The first bits of a negative code are the size's first bits minus 1, with the other sign.
     return Mux(keeps, (first - last > most) | (last - first > most), first + last >= most)

@@ -24,8 +24,8 @@ def vector_spans_shape(components: int = 3) -> data.StructLayout:
 class VectorAdapterUnit(PipelinedUnit):
     """Vectors and steps for a method that takes them. `VectorAdapter` is the bit-accurate model.
 
-    The latency is 4 cycles (the shift of all; the margin to 1, and the bits that the step uses; the step's
-    own shift; sign and rounding). The initiation interval is 1. The unit has no multipliers.
+    The latency is 4 cycles: the shared shift; the margin to 1 with the bits that the step uses; the step's
+    own shift; sign and rounding. The initiation interval is 1. The unit has no multipliers.
 
     Parameters
     ----------
@@ -97,7 +97,8 @@ def rounded(code: Value, flip: Value, point: int) -> Value:
     format = VectorAdapter.FORMAT
     cut = point - format.fraction_bits
     kept, half, rest = code[cut:], code[cut - 1], code[: cut - 1].any()
-    # Minus a code is its inverted bits and 1. The 1 reaches the kept bits unless over half a step is cut.
+    # The negative of a code is its inverted bits plus 1. The 1 reaches the kept bits unless more than half a
+    # step is cut.
     return ((kept ^ flip.replicate(len(kept))) + Mux(flip, ~(half & rest), half))[: format.width]
 
 
@@ -126,5 +127,5 @@ def used_bits(model: VectorAdapter, codes: list[Value]) -> Value:
     p, used = model, 0
     for code in codes:
         used = used | (code[: p.STEP_BITS] ^ code[-1].replicate(p.STEP_BITS))[-p.LARGEST_EXPONENT :]
-    # If vectors turn into other frames, a step is shifted by one place less, but never by less than 0.
+    # If vectors turn into other frames, a step is shifted by one place less, and at least by 0 places.
     return Cat(1, used[:-2], used[-2:].any()) if p.rotates else used

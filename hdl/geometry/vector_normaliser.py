@@ -32,10 +32,10 @@ def vectors_shape(model: VectorNormaliser) -> tuple[data.StructLayout, data.Stru
 class VectorNormaliserUnit(PipelinedUnit):
     """Unit vector along a vector of any length. `VectorNormaliser` is the bit-accurate model.
 
-    The latency is 18 cycles, 3 in `DotProductUnit` and 15 others: four for shift and rounding; one for the
-    segment, two for the table, three for ``c0 - c1 u``, one for e; four for ``v + e v``. The initiation
-    interval is 1. There are six multipliers of 18x18 bits, for three squares and three scalings. ``c1 u`` is
-    a sum of Booth digits. The table holds 512 words of 32 bits.
+    The latency is 18 cycles. Shift and rounding take four, `DotProductUnit` three, the segment one, the table
+    two, ``c0 - c1 u`` three, e one, and ``v + e v`` four. The initiation interval is 1. There are six
+    multipliers of 18x18 bits, for three squares and three scalings. ``c1 u`` is a sum of Booth digits. The
+    table holds 512 words of 32 bits.
 
     Parameters
     ----------
@@ -125,7 +125,8 @@ class VectorNormaliserUnit(PipelinedUnit):
         rest = register(m, s[:bits], "rest")
         large = self._delay(m, large, "large", 6)
         c0, c1 = self._coefficients(m, segment)
-        # In half steps. The number is always odd: half a step stands for the bits that were cut.
+        # The number counts half steps. It is always odd, because half a step stands for the bits that were
+        # cut.
         u = self._delay(m, _offset(rest), "u", 2)
         # c1 is unsigned: a zero above it completes its last Booth digit.
         digits = Cat(Const(0, 1), Value.cast(c1), Const(0, 2))
@@ -138,7 +139,10 @@ class VectorNormaliserUnit(PipelinedUnit):
         return register(m, _excess(p, f, large), "e")
 
     def _coefficients(self, m: Module, segment: Value) -> tuple[FixedValue, FixedValue]:
-        """``c0`` and ``c1`` of the segment, two cycles later: a block RAM's output is late in its cycle."""
+        """``c0`` and ``c1`` of the segment.
+
+        They take two cycles, because a block RAM's output is late in its cycle.
+        """
         layout = _row_shape(self.model)
         rows = zip(*(column.values.tolist() for column in self.model.coefficients), strict=True)
         rows = [dict(zip(("c0", "c1"), row, strict=True)) for row in rows]
@@ -152,9 +156,9 @@ class VectorNormaliserUnit(PipelinedUnit):
 class SharedVectorNormaliserUnit(PipelinedUnit):
     """`VectorNormaliserUnit` for vectors some cycles apart. Components and products take turns.
 
-    One shifter and one unit for the last rounding serve the three components. The seven multiplications take
-    turns at ``ceil(7 / I)`` multipliers of 18x18 bits, I the initiation interval. The latency, `latency`,
-    follows from the schedule: 30 cycles for an interval of 3 or 4.
+    One shifter and one unit for the last rounding serve the three components. Let I be the initiation
+    interval. The seven multiplications take turns at ``ceil(7 / I)`` multipliers of 18x18 bits. The latency,
+    `latency`, follows from the schedule: 30 cycles for an interval of 3 or 4.
 
     Parameters
     ----------
@@ -262,7 +266,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return g.register("places", fine, g.register("coarse_ones", coarse, g.register("ones", ones, vector)))
 
     def _shifter(self):
-        """Left by 0 to 15 places in two registers, then rounded to 18 bits in a third."""
+        """Shift left by 0 to 15 places in two registers. A third register rounds to 18 bits."""
         width = self.model.format.width
 
         def shift(register, word, amount):
@@ -274,7 +278,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return self._graph.share("shifter", (signed(width), unsigned(4)), 3, shift)
 
     def _last(self, format):
-        """``v + e v``, negated or not, rounded: three registers."""
+        """``v + e v``, negated if asked for, and rounded. This takes three registers."""
 
         def last(register, product, word, flip):
             total = register(FixedValue(COMPONENT, word) + FixedValue(format, product), "total")
@@ -339,7 +343,7 @@ def _excess(p: VectorNormaliser, f: Value, large: Value) -> FixedValue:
 
 
 def _turned(total: FixedValue, flip: Value) -> Value:
-    """A component of the result before it is clipped, negated where ``flip``, rounded half up."""
+    """A component of the result before it is clipped. It is negated if ``flip``, and rounded half up."""
     code = Value.cast(total)
     half = Value.cast(FixedValue.constant(SQ(2, 34), 0.5 * COMPONENT.step))
     turned = (code[:] ^ flip.replicate(len(code))).as_signed() + flip + half

@@ -114,7 +114,7 @@ class VertexSortUnit(wiring.Component):
                 m.d.sync += step.eq(step + 1)
         takes = step == 0
         if not self.compact:
-            # The next triangle comes in on the cycle on which one leaves the first stage.
+            # The next triangle comes in on the cycle on which a triangle leaves the first stage.
             takes |= leaves | ((step == 4) & ~covered)
         m.d.comb += self.i.ready.eq(takes)
         order = self._exchange(m, corners, odd, step, takes)
@@ -132,7 +132,7 @@ class VertexSortUnit(wiring.Component):
         Returns the comparisons of `_PAIRS`. On the second cycle they compare the corners in the given order.
 
         First corners 0 and 1, then 1 and 2, then 0 and 1 again. All three pairs are compared on the first
-        cycle, before any exchange; the exchanges so far decide which comparison the next one needs.
+        cycle, before any exchange. The exchanges so far decide which comparison the next exchange needs.
         """
         turn, same, other = (Signal(name=name) for name in ("turn", "same", "other"))
         # The sign bit of x is inverted, so that y and x together are one signed number.
@@ -141,9 +141,9 @@ class VertexSortUnit(wiring.Component):
             Cat(x[:-1], ~x[-1], Value.cast(corner.y)).as_signed()
             for x, corner in zip(columns, corners, strict=True)
         ]
-        # ``same`` and ``other``: the last corner against the second one, and against the first one.
+        # ``same`` and ``other`` compare the last corner with the second corner and with the first corner.
         with m.If(step == 1):
-            # A subtraction, for its carry chain: the mapper makes look-up tables of a comparison.
+            # A subtraction gets a carry chain. The mapper would make look-up tables of a comparison.
             for flag, (upper, lower) in zip((turn, same, other), _PAIRS, strict=True):
                 m.d.sync += flag.eq((key[lower] - key[upper])[-1])
         with m.Elif(step == 2):
@@ -168,8 +168,8 @@ class VertexSortUnit(wiring.Component):
     ) -> None:
         """Whether the box and the picture have a pixel's centre in common, and the digits of the height.
 
-        The order of the corners is that of their centres, so that the comparisons do not wait for the sums of
-        `first_centre`.
+        The corners' order stands for the order of their centres. So the comparisons do not wait for the sums
+        of `first_centre`.
         """
         frame, inside = self.constants, []
         columns = [Value.cast(corner.x).as_signed() for corner in corners]
@@ -198,7 +198,7 @@ class VertexSortUnit(wiring.Component):
                     m.d.sync += digits.eq(count)
 
     def _area(self, m, corners, tag, odd, digits, leaves, free, ends) -> tuple[Value, Value]:
-        """The second stage; returns whether a triangle without area, or a culled one, ends on this cycle.
+        """The second stage. Returns whether a triangle that has no area, or is culled, ends now.
 
         ``tag`` has the index of the material and whether the triangle is two-sided.
         """
@@ -212,7 +212,7 @@ class VertexSortUnit(wiring.Component):
         terms = []
         for k, (across, height) in enumerate(((1, 2), (2, 1))):
             width = Signal(signed(grid.bits + 1), name=f"width_{k}")
-            # With one bit below for the first Booth digit.
+            # One more bit below is for the first Booth digit.
             rest = Signal(DIGIT_BITS * most + 1, name=f"rest_{k}")
             down = (y[height] - y[0])[: grid.bits]
             with m.If(leaves):
@@ -256,7 +256,7 @@ class VertexSortUnit(wiring.Component):
         found, positive, zero = (Signal(name=name) for name in ("found", "positive", "zero"))
         flags = [positive.eq(~total[-1]), zero.eq(~total.any())]
         if self.compact:
-            # Sign and zero of the area are registers.
+            # The sign of the area, and whether the area is 0, are registers.
             m.d.sync += [found.eq(sums & ~busy), done.eq(found), *flags]
         else:
             m.d.sync += done.eq(sums & ~busy)
@@ -295,8 +295,7 @@ class VertexSortUnit(wiring.Component):
 def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Value]:
     """Value times a Booth digit (`booth_term`), negated if ``negative``; without a carry.
 
-    A negated multiple has inverted bits and so is 1 too small: the second result tells where this 1 is to be
-    added.
+    A negated multiple has inverted bits, so it is 1 too small. The second result tells where to add this 1.
     """
     low, middle, high = bits
     one, two = low ^ middle, (low == middle) & (middle != high)

@@ -15,7 +15,10 @@ __all__ = ["halves", "three_products", "wide_product"]
 
 
 def halves(low_bits: int) -> tuple[Callable[[Any], FixedValue], Callable[[Any], FixedValue]]:
-    """Functions from a number to its high part, signed, and its low part, unsigned. Both are wiring."""
+    """Two functions of a number, which give its signed high part and its unsigned low part.
+
+    Both are wiring.
+    """
 
     def high(value: FixedValue) -> FixedValue:
         return value.truncate(value.format.fraction_bits - low_bits)
