@@ -8,7 +8,7 @@ __all__ = ["leading_zeros", "select"]
 
 
 def leading_zeros(code: Value) -> Value:
-    """Number of leading zeros, found by halves.
+    """Number of leading zeros, found by halving the word.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def leading_zeros(code: Value) -> Value:
 
 
 def select(words: Sequence[Value], index: Value) -> Value:
-    """Word at an index, chosen by halves; beyond the end the last word. This maps to wide multiplexers.
+    """Word at an index, or the last word beyond the end. Halves are chosen, which maps to wide multiplexers.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ _LONG, _WIDE = 4, 4
 
 @dataclass(frozen=True, eq=False)
 class FunctionalUnit:
-    """Equal instances of hardware that operations of a graph share.
+    """Equal instances of hardware, which operations of a graph share.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ class FunctionalUnit:
     latency : int
         Registers from the operand registers to the result.
     make : callable
-        Makes an instance and returns its result. Its arguments are a function that makes a register (value,
-        name), and the operands.
+        Function that makes an instance and returns its result. The first argument is a function that makes a
+        register from a value and a name. The operands follow.
     """
 
     graph: "Dataflow"
@@ -70,9 +70,9 @@ class FunctionalUnit:
 class Dataflow:
     """The words of a `PipelinedUnit` and their functions of other words, before there is any hardware.
 
-    Words are described first, each after its operands. The first request for a word's stage, or for the
-    number of instances, calls `place`. This puts the words on cycles, and on shared functional units such as
-    multipliers. `build` makes the hardware. It copies a word that is read after its lifetime.
+    All words are described first, and each word after its operands. The first request for a word's stage, or
+    for the number of instances, calls `place`. This puts the words on cycles, and on shared functional units
+    such as multipliers. `build` makes the hardware. It copies a word that is read after its lifetime.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class Dataflow:
 
     @property
     def schedule(self) -> Schedule:
-        """The words in time and on instances. After the first read no word can be added."""
+        """The words' cycles and instances. After the first read no word can be added."""
         if self._schedule is None:
             self._schedule = place(self._words, self.interval, self.spaced)
         return self._schedule
@@ -129,7 +129,10 @@ class Dataflow:
         return word
 
     def input(self, name: str, read: Callable[[Any], Any], formula: str | None = None) -> Word:
-        """A word of the beat, ``read(operands)``. Formulas show ``formula``, or `SYMBOLS`, or its name."""
+        """A word of the beat, ``read(operands)``.
+
+        Formulas show ``formula``, else its symbol in `SYMBOLS`, else its name.
+        """
         first = 0 if self.interval == 1 else 1
         word = Word(name, (), 0, self.interval, since=first, text=formula or SYMBOLS.get(name, name))
         word.make = lambda build: read(build.operands)
@@ -149,7 +152,7 @@ class Dataflow:
         since: int | Word = 0,
         formula: str | None = None,
     ) -> Word:
-        """A register of ``function`` of the words' values: one cycle.
+        """A register with ``function`` of the words' values. It takes one cycle.
 
         Parameters
         ----------
@@ -160,8 +163,8 @@ class Dataflow:
         *words : Word
             Operands of the register.
         since : int or Word
-            Earliest stage of the word, or another word with the same stage. If a word is made late and read
-            late, it needs no copies.
+            Earliest stage of the word, or another word whose stage is the earliest. A word that is made late
+            and read late needs no copies.
         formula : str or None
             Formula in drawings. ``None``: the formula read from ``function``.
         """
@@ -291,7 +294,7 @@ class Dataflow:
         registered: bool = False,
         formula: str | None = None,
     ) -> Word:
-        """Word of a table at an address: one cycle, or two with the register that an FPGA's memories have.
+        """Word of a table at an address. It takes one cycle, or two with the register of an FPGA's memory.
 
         Parameters
         ----------
@@ -304,7 +307,7 @@ class Dataflow:
         address : Word
             Unsigned address, with as many bits as needed.
         registered : bool
-            Whether there is a register behind the memory, enabled with it.
+            Whether there is a register behind the memory. Memory and register have the same enable.
         formula : str or None
             Formula of the word in drawings; ``None``: the name.
         """
@@ -322,7 +325,7 @@ class Dataflow:
         return self._add(word)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[..., Any]:
-        """Make the hardware; the returned function gives a word's value at a stage (`_Build.at`).
+        """Make the hardware. Returns a function that gives a word's value at a stage (`_Build.at`).
 
         Parameters
         ----------
@@ -358,7 +361,7 @@ def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> A
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:
-    """An initiation interval from 1 to ``longest``, the interval of one multiplier for all products.
+    """An initiation interval from 1 to ``longest``. With ``longest`` one multiplier makes all products.
 
     ``None`` means ``default``, or ``longest`` without a default.
 
@@ -409,7 +412,7 @@ class _Build:
         return copies[first]
 
     def issue(self, functional_unit: FunctionalUnit, use: Word, operands: Sequence[Any]) -> Any:
-        """Issue operands to an instance of a functional unit; return its result, which all its uses read."""
+        """Issue operands to an instance of a functional unit. Returns its result, which all its uses read."""
         placement = self.graph.schedule.placements[use]
         instance, when = placement.instance, self.when(placement.read)
         key = functional_unit, instance
@@ -429,8 +432,8 @@ class _Build:
     def connect(self) -> None:
         """Connect each instance's operand registers, which have no enable.
 
-        No two uses meet, so their operands are gated and merged by OR. A chain with a multiplexer for each
-        use would be larger.
+        No two uses fall on the same cycle, so their operands are gated and merged by OR. A chain with a
+        multiplexer for each use would be larger.
         """
         for key, uses in self._issued.items():
             for k, to in enumerate(self._instances[key][0]):

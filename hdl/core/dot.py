@@ -13,7 +13,10 @@ __all__ = ["dot", "shared_sums"]
 
 
 def shared_sums(graph: Dataflow, product: Format) -> FunctionalUnit:
-    """Adders of the three products of a dot product, in the format ``product``: two cycles; see `dot`."""
+    """Adders of the three products of a dot product, in the format ``product``.
+
+    They take two cycles; see `dot`.
+    """
     shapes = FixedShape(product + product), FixedShape(product)
     return graph.share("sum", shapes, 1, lambda register, x, y: register(x + y, "total"))
 

@@ -31,7 +31,7 @@ SYMBOLS = {
 """Symbols of a beat's fields in formulas. Other fields appear by their names."""
 
 LONGEST = 14
-"""Largest length of a formula that other formulas repeat. They replace a longer formula by its word's name.
+"""Largest length of a formula that other formulas repeat. If it is longer, they show its word's name.
 """
 
 _SUM, _PRODUCT, _ATOM = range(3)
@@ -49,7 +49,7 @@ class Formula(FixedValue):
     text : str
         Formula. The formula of a vector begins with a capital letter.
     binding : int
-        Binding of its outermost operation: 0 for a sum, 1 for a product, else 2.
+        Binding strength of the outermost operation: 0 for a sum, 1 for a product, else 2.
     """
 
     def __init__(self, text: str, binding: int = _ATOM):
@@ -79,7 +79,7 @@ class Formula(FixedValue):
         return self.as_value()
 
     def within(self, binding: int) -> str:
-        """Text as an operand of an operation with this binding."""
+        """Text as an operand of an operation with this binding strength, in parentheses if needed."""
         return self.text if self._binding >= binding else f"({self.text})"
 
     def _sum(self, sign: str, other: Any, swapped: bool = False) -> "Formula":
@@ -184,7 +184,7 @@ def _cast(value: Any) -> Formula:
         return Formula(f"{value}")
     if isinstance(value, FixedValue):
         code = value.as_value()
-        # A constant that is read as signed or unsigned.
+        # A constant that code reads as signed or unsigned.
         code = code.operands[0] if getattr(code, "operator", "") in ("s", "u") else code
         if isinstance(code, Const):
             number = int(value.format.wrap(np.array(code.value))) * value.format.step

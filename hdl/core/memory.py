@@ -27,7 +27,7 @@ LATE_FIFO_LATENCY = 4
 """Cycles that a payload takes through the empty FIFO of `connect_late_fifo`."""
 
 UNCOUNTED = 3
-"""Largest number of payloads that `connect_late_fifo` has taken and that its level does not count yet."""
+"""Largest number of payloads inside `connect_late_fifo` that its level does not count yet."""
 
 
 def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: int) -> Memory:
@@ -54,7 +54,7 @@ def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: 
 
 
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> ValueLike:
-    """Words that pass beside a unit while its beats are inside, in their order, without handshakes.
+    """Words that wait beside a unit while its beats are inside. They keep their order and have no handshakes.
 
     The words are in a memory with a write and a read address. The unit's own handshakes tell when a word is
     there, so no level is counted.
@@ -66,14 +66,15 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
     word : ValueLike
         Word of the incoming beat.
     written, taken : Value
-        Whether a beat enters the unit, and leaves it. A beat is inside for two cycles or more.
+        Whether a beat enters the unit, and whether a beat leaves the unit. A beat is inside for two cycles or
+        more.
     depth : int
         Largest number of beats inside.
 
     Returns
     -------
     ValueLike
-        Word of the beat that leaves next, while one is inside, in the shape of ``word``.
+        Word of the beat that leaves next, in the shape of ``word``. It is valid while a beat is inside.
     """
     bits = (depth - 1).bit_length()
     words = words_in_turn(m, name, word, written, 1 << bits)
@@ -83,7 +84,7 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
     m.d.comb += [first.addr.eq(address), second.addr.eq(following)]
     with m.If(taken):
         m.d.sync += [address.eq(following), following.eq(following + 1)]
-    # It is known late whether a beat leaves, so both words are read before.
+    # The unit knows late whether a beat leaves, so both possible words are read before.
     m.d.sync += leaves.eq(Mux(taken, second.data, first.data))
     return of_shape(word, leaves)
 
@@ -95,7 +96,7 @@ def registered_read(
     wanted: Value,
     write: WritePort | None = None,
 ) -> tuple[Signal, Value]:
-    """Word of a memory, two cycles after its address; both registers move by one enable.
+    """Word of a memory, two cycles after its address. Both registers have the same enable.
 
     A memory gives its word late in a cycle, and the register behind it gives the word early. FPGAs differ in
     the word read on a cycle that writes to the same address. On this cycle the registers stand still. So no
@@ -131,17 +132,17 @@ def registered_read(
 
 
 def turn_of(m: Module, cycles: int) -> Signal:
-    """Address for `delayed`, which words of one delay share. It counts from 0 to ``cycles - 2``."""
+    """Address for `delayed`. Words with the same delay share it. It counts from 0 to ``cycles - 2``."""
     turn = Signal(range(cycles - 1), name=f"turn_{cycles}")
     m.d.sync += turn.eq(Mux(turn == cycles - 2, 0, turn + 1))
     return turn
 
 
 def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Signal:
-    """A word some cycles later, from a memory of look-up tables before a register.
+    """A word delayed by some cycles, by a memory of look-up tables and a register behind it.
 
     Only cycles on which the module is enabled count. On each of them the memory is read at an address, and
-    then written there. After a reset words from before the reset come, in any order.
+    then written there. After a reset, words from before the reset come first, in any order.
 
     Parameters
     ----------
@@ -154,7 +155,7 @@ def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Sig
     cycles : int
         At least 3.
     turn : Value
-        From `turn_of` with the same cycles, in the same module.
+        Address from `turn_of` with the same number of cycles, in the same module.
 
     Returns
     -------
@@ -179,7 +180,7 @@ def connect_late_fifo(
 ) -> Value:
     """Connect two streams through a FIFO in a memory, between registers.
 
-    A register before the memory ends the source's handshake. Behind the memory are the registers of
+    A register before the memory completes the source's handshake. Behind the memory are the registers of
     `registered_read`. The source's ready is a register that depends on the FIFO's level alone. `UNCOUNTED`
     payloads of the depth are reserved for payloads that the level does not count yet. A payload takes
     `LATE_FIFO_LATENCY` cycles through the empty FIFO.
@@ -204,7 +205,8 @@ def connect_late_fifo(
     payload = Signal(width, name=f"{name}_payload", reset_less=True)
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
     level = Signal(range(depth + 1), name=f"{name}_level")
-    # ``came``, ``gone``: what the level does not count yet. ``one``, ``more``: how many wait in the memory.
+    # ``came`` and ``gone`` are not counted by the level yet. ``one`` and ``more`` tell how many payloads wait
+    # in the memory.
     came, gone, one, more = (Signal(name=f"{name}_{word}") for word in ("came", "gone", "one", "more"))
     # Whether the memory's word is valid, and whether the word behind it is valid.
     read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
@@ -217,7 +219,7 @@ def connect_late_fifo(
         source.ready.eq(room),
         port.data.eq(payload),
         port.en.eq(written),
-        # Where there is a word, none is written to its address.
+        # While a word waits, no word is written to its address.
         reads.eq(wanted & some),
         Value.cast(sink.payload).eq(word),
         sink.valid.eq(there),
@@ -228,7 +230,7 @@ def connect_late_fifo(
         room.eq(level < depth - UNCOUNTED),
         Cat(came, gone).eq(Cat(written, reads)),
         level.eq(level + came - gone),
-        # Whether the first payload is read is known late.
+        # The unit knows late whether the first payload is read.
         some.eq(written | more | (one & ~reads)),
         port.addr.eq(port.addr + written),
     ]
@@ -249,10 +251,10 @@ def connect_late_fifo(
 def connect_wide_fifo(
     m: Module, name: str, source: stream.Interface, sink: stream.Interface, depth: int = 2
 ) -> None:
-    """Connect two streams through a FIFO without registers for payloads; a wide payload costs memory alone.
+    """Connect two streams through a FIFO without registers for payloads. A wide payload takes only memory.
 
-    For a sink that takes payloads straight into registers. A payload takes `SLICE_LATENCY` cycles through the
-    empty FIFO. The source's ready and the sink's valid are registers.
+    Use it for a sink that takes payloads directly into registers. A payload takes `SLICE_LATENCY` cycles
+    through the empty FIFO. The source's ready and the sink's valid are registers.
 
     Parameters and errors are those of `connect_fifo`. The depth is 2 or more, as in a register slice.
     """
@@ -290,8 +292,8 @@ def connect_headed_fifo(
 ) -> Signal:
     """Connect two streams as `connect_wide_fifo` does, with some bits of the first payload in a register.
 
-    For a sink whose handshake depends on these bits. The payload is read late in a cycle. A payload takes
-    `HEADED_FIFO_LATENCY` cycles through the empty FIFO.
+    Use it for a sink whose handshake depends on these bits. The payload itself is read late in a cycle. A
+    payload takes `HEADED_FIFO_LATENCY` cycles through the empty FIFO.
 
     Parameters
     ----------
@@ -338,7 +340,8 @@ def connect_headed_fifo(
     ]
     m.d.sync += [
         some.eq(fetches | (some & ~sink.ready)),
-        # From registers alone, so one payload more may come. The pointers can count up to depth - 1 payloads.
+        # Ready comes from registers alone, so one more payload may come. The pointers can count up to depth -
+        # 1 payloads.
         room.eq((free - first)[:bits] < depth - 2),
     ]
     with m.If(comes):

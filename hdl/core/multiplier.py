@@ -33,16 +33,16 @@ class SteppedMultiplier:
         m.d.sync += self.product.eq(exact)
 
     def issue(self, at: int, factor: FixedValue, operand: FixedValue) -> None:
-        """Give two operands at a step, in the state or condition that is open in the module."""
+        """Give two operands at a step, in the open state or condition of the module."""
         self._taken.append(at)
         with self._m.If(self._step == at):
             self.load(factor, operand)
 
     def load(self, factor: FixedValue, operand: FixedValue) -> None:
-        """Give two operands at any step, in the state or condition that is open in the module."""
+        """Give two operands at any step, in the open state or condition of the module."""
         self._m.d.sync += [self._factor.eq(factor), self._operand.eq(operand)]
 
     @property
     def free(self) -> Value:
-        """Whether the present step issues no operands. Others can then be loaded on this cycle."""
+        """Whether the present step issues no operands. Then other operands can be loaded on this cycle."""
         return ~Cat(self._step == at for at in self._taken).any()

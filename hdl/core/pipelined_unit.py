@@ -1,4 +1,4 @@
-"""Pipelined unit: what every unit with a fixed latency and one common enable shares."""
+"""Pipelined unit: the base of every unit with a fixed latency and one common enable."""
 
 from collections.abc import Mapping
 
@@ -15,14 +15,14 @@ _UNGROUPED, _GROUP = 36, 12
 
 
 class PipelinedUnit(wiring.Component):
-    """A unit with a fixed latency and initiation interval, moved on by one common enable.
+    """A unit with a fixed latency and initiation interval. One common enable moves its beats.
 
     A beat is on the output ``latency`` cycles after it was accepted. If the output is stalled, the whole unit
-    is disabled and holds its payloads (`skid_buffer`). This begins in the cycle after the first refused beat.
-    While a beat is inside, the next is accepted a whole multiple of ``initiation_interval`` enabled cycles
-    after it. In a *spaced* unit the number of enabled cycles is any number, at least
-    ``initiation_interval``. ``i.ready`` and ``o.valid`` follow from the unit's registers alone. Reset empties
-    the unit.
+    is disabled and holds its payloads (`skid_buffer`). The unit is disabled from the cycle after the first
+    refused beat on. While a beat is inside, the next beat is accepted a whole multiple of
+    ``initiation_interval`` enabled cycles later. In a *spaced* unit the number of enabled cycles is any
+    number, at least ``initiation_interval``. ``i.ready`` and ``o.valid`` follow from the unit's registers
+    alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
     from the *stage* of a beat: `at` tells whether a beat was accepted a number of enabled cycles ago.
@@ -47,7 +47,7 @@ class PipelinedUnit(wiring.Component):
         the unit is disabled while a beat is on the output, for one cycle at least (`stop_output`). So without
         stalls a beat comes every ``initiation_interval + 1`` cycles.
     stands : bool
-        Whether the result of `datapath` stands for a cycle more, so that the skid buffer has no spare
+        Whether the result of `datapath` stays for one more cycle. Then the skid buffer needs no spare
         register. This needs an ``initiation_interval`` over 1.
 
     Members
@@ -135,7 +135,7 @@ class PipelinedUnit(wiring.Component):
         inner = Module()
         operands = self.i.payload
         if self.initiation_interval > 1:
-            # An operand that is not valid has no stage.
+            # An invalid operand has no stage.
             operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
@@ -167,11 +167,12 @@ class PipelinedUnit(wiring.Component):
         A register, computed a cycle ahead.
         """
         ready, turn = Signal(name="ready", init=1), Signal(range(self.initiation_interval))
-        # Whether a beat will be inside on the next cycle even if none comes on this one.
+        # Whether a beat will be inside on the next cycle even if no beat comes on this cycle.
         stays, opens = Signal(name="stays"), Signal(name="opens")
         inside = Cat(accept, self._stages)[: self.latency - 1]
         if self.latency > _UNGROUPED:
-            # In parts. Each is computed a cycle ahead, from the stages that come before its own.
+            # The valid bits are reduced in groups. Each group is computed a cycle ahead, from the stages
+            # before its own.
             parts = [Signal(name=f"inside_{k}") for k in range(-(-(self.latency - 3) // _GROUP))]
             with m.If(advance):
                 m.d.sync += [

@@ -26,7 +26,7 @@ def checked_length_bits(length_bits: int) -> int:
 
 
 def reciprocal_codes(length_bits: int = LENGTH_BITS, table: Fixed | None = None) -> list[int]:
-    """Codes of the table for lengths of ``length_bits`` bits, a part of the whole table.
+    """Codes of the table for lengths of ``length_bits`` bits. They are a part of the whole table.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def reciprocal_words(
 
 
 def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Word]:
-    """``dt^2 = 4 square 2^-square_shift``, as `step_words` rounds it: two cycles.
+    """``dt^2 = 4 square 2^-square_shift``, as `step_words` rounds it. It takes two cycles.
 
     Parameters
     ----------

@@ -1,14 +1,14 @@
 """The scheduler, which places operations of a unit in time and on shared functional units.
 
-It knows only operations, with the operands and the latency of each. It knows no widths of words and no
-Amaranth. `blysk.hdl.core.dataflow` describes the operations and makes registers of the schedule.
+The scheduler knows only operations, with the operands and the latency of each. It knows neither widths of
+words nor Amaranth. `blysk.hdl.core.dataflow` describes the operations and makes registers of the schedule.
 
 The scheduler guarantees, for every schedule:
 
 - An operation reads its operands when all of them are there, and not before its ``since``.
 - Two uses of an instance of a functional unit never meet, in any two beats that the interval allows.
 - A functional unit has as few instances as the interval allows, ``ceil(uses / interval)``. In a spaced
-  schedule of operations that depend on each other, it has as few as the search finds.
+  schedule of operations that depend on each other, the search finds the number.
 - The same operations in the same order give the same schedule.
 
 Source: docs/theory/scheduling.md.
@@ -22,7 +22,7 @@ from math import prod
 __all__ = ["Operation", "Placement", "Schedule", "place"]
 
 _MOST_SEARCHED = 500
-"""Largest number of ways to share instances that are tried, in a spaced schedule."""
+"""Largest number of ways to share instances that a spaced schedule tries."""
 
 
 @dataclass(eq=False)
@@ -140,7 +140,7 @@ def _earliest(operation: Operation, placements: dict) -> int:
 
 
 def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Schedule:
-    """Each use at the first free slot. If no slot is free within two intervals, another instance."""
+    """Put each use at the first free slot. If no slot is free within two intervals, add an instance."""
     placements: dict[Operation, Placement] = {}
     instances: dict[Hashable, list[set[int]]] = {}
     for resource in (o.resource for o in operations if o.resource is not None):
@@ -185,7 +185,7 @@ def _shared(
     """Spaced schedules with few instances. There are none if there are too many ways to search.
 
     The uses of a functional unit, sorted by their earliest stage, are divided into runs of neighbours. Each
-    run has an instance; its first uses wait until all uses of the run lie within the interval.
+    run has an instance. The first uses of a run wait until all its uses lie within the interval.
     """
     alone: dict[Operation, Placement] = {}
     for operation in operations:
@@ -216,7 +216,7 @@ def _shared(
 
 
 def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
-    """Sizes of the runs of neighbours, with the fewest runs first, then with one or two more."""
+    """Sizes of the runs of neighbours: first with the fewest runs, then with one or two more runs."""
 
     def parts(left: int, count: int) -> Iterator[tuple[int, ...]]:
         if count == 0:
@@ -236,7 +236,7 @@ def _runs(uses: int, interval: int) -> Iterator[tuple[int, ...]]:
 def _windows(
     operations: Sequence[Operation], interval: int, run_of: dict[Operation, tuple]
 ) -> dict[Operation, Placement] | None:
-    """Placements in which the uses of each run lie within an interval; ``None`` if there is no placement."""
+    """Placements in which the uses of each run lie within an interval. ``None`` if there is no placement."""
     starts: dict[tuple, int] = dict.fromkeys(run_of.values(), 0)
     for _ in range(2 * len(operations)):
         placements: dict[Operation, Placement] = {}
@@ -263,7 +263,7 @@ def _windows(
 def _delayed(
     operations: Sequence[Operation], placements: dict[Operation, Placement]
 ) -> dict[Operation, Placement]:
-    """Operations with hardware of their own, moved to the latest stage that needs no copy of an operand."""
+    """Move operations with hardware of their own to the latest stage that needs no copy of an operand."""
     placements = dict(placements)
     readers: dict[Operation, list[Operation]] = {o: [] for o in operations}
     for operation in operations:

@@ -1,4 +1,4 @@
-"""Streams behind one register. Half the registers of a slice, at half the rate or with a path of ready."""
+"""Streams behind one register: half the registers of a slice, but half the rate or a combinational ready."""
 
 from amaranth.hdl import Module, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
@@ -40,7 +40,7 @@ def connect_register(m: Module, name: str, source: stream.Interface, sink: strea
 
 
 def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
-    """Drive a stream from a register that stands until its payload is taken; return whether it may change.
+    """Drive a stream from a register that keeps its payload until it is taken. Returns whether it may change.
 
     This is `skid_buffer` without the spare register. So logic behind it sees the sink's ready on the same
     cycle. The parameters and errors are those of `skid_buffer`.

@@ -33,7 +33,7 @@ SLICE_LATENCY = 1
 
 
 def _require_payload(output: stream.Interface, payload: ValueLike) -> None:
-    """Refuse a payload of another shape than the stream's; bits without a format pass."""
+    """Refuse a payload of another shape than the stream's. Bits without a format are accepted."""
     if isinstance(payload, ValueCastable):
         require_same_shape(payload.shape(), output.payload.shape())
 
@@ -116,8 +116,8 @@ def skid_buffer(
     on the cycle on which ``valid`` rises. The payload is held while it waits. Reset empties the spare
     register.
 
-    A payload that *stands* is the same after the next ``advance``, and no payload follows it there. It needs
-    neither the spare register nor the multiplexer.
+    A payload that *stands* stays the same at the next ``advance``, and no payload follows it there. Then the
+    spare register and the multiplexer are not needed.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def skid_buffer(
     Raises
     ------
     TypeError
-        If the payload is a view, or a fixed-point value, of another shape than that of the stream.
+        If the payload is a view or a fixed-point value and has another shape than the stream.
     """
     _require_payload(output, payload)
     held, moves = Signal(name="held"), Signal(name="moves", init=1)
@@ -150,7 +150,7 @@ def skid_buffer(
         shown = Mux(held, spare, Value.cast(payload))
     m.d.comb += [output.valid.eq(held | valid), Value.cast(output.payload).eq(shown)]
     waits = output.valid & ~output.ready
-    # Two registers: one drives all enables, the other one selects the payload.
+    # There are two registers: one drives all enables, and the other selects the payload.
     m.d.sync += [held.eq(waits), moves.eq(~waits)]
     if not stands:
         with m.If(moves):
@@ -159,9 +159,9 @@ def skid_buffer(
 
 
 def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload: ValueLike) -> Value:
-    """Drive a stream from registers that stop with every beat until it is accepted, for one cycle at least.
+    """Drive a stream from registers that stop at every beat until it is accepted, at least for one cycle.
 
-    For units whose beats are some cycles apart. It is `skid_buffer` without the spare register and its
+    Use it for units whose beats are some cycles apart. It is `skid_buffer` without the spare register and its
     multiplexer.
 
     Parameters
@@ -193,7 +193,7 @@ def stop_output(m: Module, output: stream.Interface, coming: ValueLike, payload:
 
 
 def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -> None:
-    """Connect two streams through registers for two payloads; a payload takes `SLICE_LATENCY` cycles.
+    """Connect two streams through registers for two payloads. A payload takes `SLICE_LATENCY` cycles.
 
     The source's ready follows from registers alone.
 
@@ -210,7 +210,7 @@ def connect_slice(m: Module, source: stream.Interface, sink: stream.Interface) -
     require_same_shape(source.payload.shape(), sink.payload.shape())
     valid = Signal(name="valid")
     payload = Signal(Shape.cast(source.payload.shape()).width, name="payload", reset_less=True)
-    # With one payload waiting beyond the register there is room for one more in it.
+    # If one payload waits behind the register, the register has room for another payload.
     accepts = skid_buffer(m, sink, valid, payload) | ~valid
     m.d.comb += source.ready.eq(accepts)
     with m.If(accepts):
@@ -225,7 +225,7 @@ def moving(
     last: ValueLike = 1,
     dropped: ValueLike = 0,
 ) -> Value:
-    """Whether payloads are between two streams, because more went in than came out.
+    """Whether payloads are between two streams: whether more payloads went in than came out.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def moving(
     last : ValueLike
         Whether the outgoing beat is the last, or only, part of a payload.
     dropped : ValueLike
-        Whether a payload ends between the two.
+        Whether a payload ends between the two streams.
     """
     inside = Signal(10, name=f"{name}_inside")
     enters, leaves = source.valid & source.ready, sink.valid & sink.ready & last
@@ -266,7 +266,7 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
     -------
     active, ends : Signal
         ``active``: whether there is a pixel. ``ends``: whether the next span may begin, because there is no
-        pixel or the last pixel. Both are registers.
+        pixel, or the pixel is the last. Both are registers.
     """
     active, ends = Signal(name="active"), Signal(name="ends", init=1)
     remaining = Signal(len(length), name="remaining")

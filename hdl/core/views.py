@@ -1,4 +1,4 @@
-"""Copies of views, and choices between views: two shapes that differ in a field or a format are refused."""
+"""Copies of views, and choices between views. Two shapes that differ in a field or a format are refused."""
 
 from collections.abc import Iterable
 
@@ -13,7 +13,7 @@ __all__ = ["choose", "copy", "copy_fields", "of_shape", "require_same_shape"]
 def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> None:
     """Refuse two shapes that differ in a field, a width, a sign or a fixed-point format.
 
-    Amaranth assigns views by width alone, so that a moved binary point would pass.
+    Amaranth assigns views by width alone, and would accept a moved binary point.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def copy_fields(target, source, names: Iterable[str] | None = None) -> list:
     target, source : View or mapping of str to ValueLike
         Target and source of the copy. Both have the fields.
     names : iterable of str, optional
-        Names of the fields; all of the target without it.
+        Names of the fields. By default all fields of the target.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def copy_fields(target, source, names: Iterable[str] | None = None) -> list:
 
 
 def choose(condition: ValueLike, a, b):
-    """The view ``a`` where the condition holds, else ``b``: `Mux` of two values of one shape.
+    """The view ``a`` if the condition holds, else ``b``: a `Mux` of two values with one shape.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def choose(condition: ValueLike, a, b):
 
 
 def of_shape(like, bits: Value):
-    """Bits that come from a view, as a view of its shape again: from a memory, or from a `Mux`.
+    """A view made again from its bits, which passed through a memory or a `Mux`.
 
     Parameters
     ----------
