@@ -206,7 +206,7 @@ class AngularSetup:
     def reciprocals(self) -> tuple[Fixed, Fixed]:
         """Table of T for v from 0 to 1, ``1/(2 sqrt(v one))``, with the fall to the next word.
 
-        Words for v below 1/4 are 0; they are read only if ``w = 0``.
+        Words for v below 1/4 are 0. They are read only if ``w = 0``.
         """
         one = float(ONE_SQUARED.values)
         start = np.arange(1 << self.ADDRESS_BITS) / (1 << self.ADDRESS_BITS)
@@ -230,7 +230,10 @@ class AngularSetup:
         value_format: Format,
         change_format: Format,
     ) -> tuple[Fixed, Fixed]:
-        """Lines of nearly least maximum error, start and change: chords, lowered by half the sagitta."""
+        """Start and change of lines with nearly least maximum error.
+
+        They are chords, lowered by half the sagitta.
+        """
         low, middle, high = (function(start + width * part) for part in (0, 0.5, 1))
         value = np.clip(low - ((low + high) / 2 - middle) / 2, 0, value_format.max_code * value_format.step)
         return Fixed.round(value_format, value), Fixed.round(change_format, np.abs(high - low))
@@ -358,7 +361,7 @@ class AngularSetup:
         return x, Fixed(SQ(3, 28), direction).wrap(self.DIRECTION_FORMAT)
 
     def _step(self, angle: Fixed, shift: np.ndarray, length: np.ndarray) -> Fixed:
-        """Step ``psi/(m-1)``, cut to 40 fraction bits; the reciprocal is that of `reciprocal_table`."""
+        """Step ``psi/(m-1)``, cut to 40 fraction bits. `reciprocal_table` gives the reciprocal."""
         address, halvings = reciprocal_address(length - 1)
         leading = Fixed(UQ(18, 36), angle.codes << shift).round_half_up(18).saturate(self.MANTISSA_FORMAT)
         product = leading * reciprocal_table()[address]

@@ -127,7 +127,8 @@ class Arccos:
         )
         coefficients = self.coefficients.copy()
         if self.table == "refitted":
-            # The coarsest word is rounded first: the following fits compensate its rounding error.
+            # The coarsest word is rounded first, because the fits of the other words compensate its rounding
+            # error.
             for segment in range(5):
                 held: dict[int, float] = {}
                 for power in (2, 1, 0):

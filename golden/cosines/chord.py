@@ -15,8 +15,8 @@ __all__ = ["Chord"]
 class Chord:
     """Half the squared chord ``u = |a - b|^2 / 2``; for unit vectors ``1 - a . b``.
 
-    A length error e of a vector is an error e of the dot product. Of u it is only an error ``e^2/2 + e u``.
-    Near u = 0 the formula has no difference of nearly equal numbers.
+    A length error e of a vector gives an error e of the dot product. The error of u is only ``e^2/2 + e u``.
+    Near u = 0 the formula subtracts no nearly equal numbers.
 
     ========== ========== =======================================================================
     word       format     why

@@ -96,7 +96,8 @@ class ChordSetup:
     Parameters
     ----------
     fraction_bits : int
-        Fraction bits of the differences, 36 to 46. Even, because a span of twice the length needs two more.
+        Fraction bits of the differences, 36 to 46. The number is even, because a span of twice the length
+        needs two more bits.
 
     Raises
     ------
@@ -140,12 +141,15 @@ class ChordSetup:
 
     @property
     def longest(self) -> int:
-        """Longest span in pixels for which the error bounds hold: it drifts by less than 1.3e-7."""
+        """Longest span in pixels for which the error bounds hold. Such a span drifts by less than 1.3e-7."""
         return (1 << LENGTH_BITS - (46 - self.fraction_bits) // 2) - 1
 
     @property
     def shifted_format(self) -> Format:
-        """Format of products before their shift: one fraction bit more than the differences, for rounding."""
+        """Format of products before their shift.
+
+        It has one more fraction bit than the differences, for rounding.
+        """
         return SQ(2, self.fraction_bits + 1)
 
     def shifted(self, product: Fixed) -> Fixed:
@@ -213,9 +217,9 @@ class ChordSetup:
     def highlight_error(self, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
         """Largest error of u at any pixel of a span that is not flagged, against the exact quadratic.
 
-        In units of `ONE_SQUARED`, like u. The error of the three values is half a step, which the quadratic
-        multiplies by at most 1.25. The rounding of G is 2^-21. ``t (1 - t)``, at most 1/4, multiplies it, and
-        the ends stay. The rest is `walk_error`.
+        The error is in units of `ONE_SQUARED`, like u. The error of the three values is half a step, which
+        the quadratic multiplies by at most 1.25. The rounding of G is 2^-21. ``t (1 - t)``, at most 1/4,
+        multiplies this rounding, so both ends have no part of it. The rest is `walk_error`.
 
         Parameters
         ----------

@@ -38,7 +38,7 @@ class HalfChord:
     result       UQ(0, 36)    relative precision down to a chord of one step
     ============ ============ ==================================================================
 
-    Lengths count in units of `ONE`. The coefficients contain it.
+    Lengths are in units of `ONE`. The coefficients contain this unit.
 
     The error relative to the angle (beyond 90 degrees: to its supplement) is at most `RELATIVE_ERROR`, and
     the cut of the result adds 2^-36 turns. docs/theory/bounds.md#half-chord derives it.

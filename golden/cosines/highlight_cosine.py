@@ -140,7 +140,7 @@ class HighlightCosine:
                 f"not {phase.format}, {step.format}, {cos_beta.format}"
             )
         theta = phase.codes[span] - np.asarray(index, dtype=np.int64) * step.codes[span]
-        # Inverted bits stand for the negative, which would need a carry: an error of 2^-40 turns.
+        # Inverted bits replace the negative, which would need a carry. This is an error of 2^-40 turns.
         bits = theta & ((1 << 40) - 1)
         magnitude = np.where(bits >> 39 > 0, ~bits, bits) & ((1 << 39) - 1)
         back = magnitude >> 38 > 0
@@ -160,7 +160,7 @@ class HighlightCosine:
         factor = beta.round_half_up(16).saturate(self.FACTOR_FORMAT)
         operand = Fixed(self.FAR_FORMAT, np.where(near, v.codes, far.codes))
         product = operand * factor
-        # The operand below 1/32 has five fraction bits more.
+        # Below 1/32 the operand has five more fraction bits.
         aligned = Fixed(UQ(1, 26), np.where(near, product.codes >> 12, product.codes >> 7)).round_half_up(25)
         one = Fixed(UQ(1, 25), 1 << 25)
         total = np.where(back, (one + beta).codes - aligned.codes, (one - beta).codes + aligned.codes)

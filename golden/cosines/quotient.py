@@ -11,7 +11,7 @@ from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 __all__ = ["OCTAVES", "STEPS", "Quotient", "place_format"]
 
 OCTAVES, STEPS = 15, 16
-"""Octaves of a part of a lobe's table, beside a row for all smaller numbers, and steps of a row."""
+"""Octaves of a part of a lobe's table, and steps of a row. A further row has all smaller numbers."""
 
 FRACTION_BITS = 12
 """Bits of a place within a step."""
@@ -31,10 +31,10 @@ class Quotient:
     multiples of four. ``s = m r^2`` then has a leading one within the upper seven bits. Its octave and the 16
     bits behind the leading one are its place in the table (`QuotientLobe`).
 
-    *Two parts.* Where ``m > w``, the place is that of ``1 - s = w/q`` in a second part of the table. So both
-    ends of the range have octaves. With ``mirror`` there is one part, because a highlight of R·V ends at
-    ``s = 1/2``. From there on the place is past the end. Without ``mirror`` it is past the end where
-    ``z < 0``.
+    *Two parts.* If ``m > w``, the place is the place of ``1 - s = w/q`` in a second part of the table. So
+    both ends of the range have octaves. With ``mirror`` there is one part, because a highlight of R·V ends at
+    ``s = 1/2``. From there on the place is past the end. Without ``mirror`` it is past the end where ``z <
+    0``.
 
     *Row.* Octave ``[2^-(j+1), 2^-j)`` with j = 0 to 14 is row 15 - j. All smaller numbers are row 0, with
     equal steps.
@@ -105,7 +105,7 @@ class Quotient:
         q = np.maximum(np.arange(1 << self.TABLE_BITS) * step, 1.0)
         left, middle, right = ((q + step * t) ** -0.5 for t in (0, 0.5, 1))
         format = self.BASE_FORMAT
-        # The product of the slope is cut: r is half a step too large on average.
+        # The product of the slope is cut, so r would be half a step too large on average.
         half = 2.0 ** -(self.ROOT_FORMAT.fraction_bits + 1) - format.step / 2
         base = np.minimum(left + (middle - (left + right) / 2) / 2 + half, 1 - format.step)
         return Fixed.round(format, base), Fixed.round(self.SLOPE_FORMAT, left - right)
@@ -148,7 +148,7 @@ class Quotient:
         cosine : Fixed, shape (pixels, lights), SQ(2, 18)
             N·L.
         place : Fixed, shape (pixels, lights), `place_format`
-            Place of s, or of 1 - s, in a lobe's table; without highlights all past the end.
+            Place of s, or of 1 - s, in a lobe's table. Without highlights all places are past the end.
         too_small : bool array, shape (pixels,)
             Whether q is too small.
         """
@@ -194,7 +194,7 @@ class Quotient:
         octave = 4 * group - 2 * shift - 2 + zeros
         mantissa = (product << zeros) >> 17
         row = OCTAVES - octave
-        # Under the octaves the leading one counts, too.
+        # Below the octaves the leading 1 is a part of the position, too.
         low = np.minimum(np.maximum(octave - OCTAVES + 1, 0), 17)
         place = np.where(octave < OCTAVES, (row << 16) + (mantissa & 0xFFFF), mantissa >> low)
         return np.where(octave < 0, 1 << 20, place)

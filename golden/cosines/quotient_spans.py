@@ -12,8 +12,10 @@ __all__ = ["MARGIN", "PixelWords", "QuotientSpans", "QuotientWords", "SpanVector
 
 
 MARGIN = 4
-"""Least distance of a component from 1, in units of 2^-17. A component of 1 would wrap, and at the last pixel
-rounding may add up to 2.5 units."""
+"""Least distance of a component from 1, in units of 2^-17.
+
+A component of 1 would wrap, and rounding may add up to 2.5 units at the last pixel.
+"""
 
 
 class SpanVectors(NamedTuple):
@@ -52,8 +54,8 @@ class SpanVectors(NamedTuple):
         left, right : float64 arrays, shape (spans, components)
             Vectors at the first and the last pixel; not both 0.
         length : int array, shape (spans,)
-            Pixels m, 1 to 4095. In a span of one pixel the right end has no effect. The step of a span of two
-            pixels may not fit: give two spans of one pixel.
+            Pixels m, 1 to 4095. In a span of one pixel the right end has no effect. If the step of a span of
+            two pixels does not fit, give two spans of one pixel.
 
         Raises
         ------
@@ -73,7 +75,7 @@ class SpanVectors(NamedTuple):
         largest = np.maximum(np.abs(step).max(axis=1), 2.0**-60)
         fits = np.floor(-np.log2(largest * (1 + 2.0**-bits))).astype(np.int64)
         if (fits < 0).any():
-            raise ValueError("the step of a span of two pixels does not fit: give two spans of one")
+            raise ValueError("the step of a span of two pixels does not fit: give two spans of one pixel")
         exponent = np.minimum(fits, np.ceil(np.log2(steps)).astype(np.int64) + 3)
         return cls(
             Fixed.round(format, left * scale).codes,
@@ -94,7 +96,7 @@ class PixelWords(NamedTuple):
     line : Fixed, shape (pixels, lights)
         l of each light.
     away : bool array, shape (pixels, lights)
-        Whether ``z < 0``; ``False`` where z is not taken.
+        Whether ``z < 0``. It is ``False`` if z is not taken.
     """
 
     numerator: Fixed
@@ -111,7 +113,7 @@ class QuotientWords(NamedTuple):
     squares : tuple of three arrays, shape (spans, lights + 1)
         ``m`` of each light, and ``w`` last. Without highlights ``w`` alone.
     lines : tuple of two arrays, shape (spans, lights)
-        l of each light; no second difference.
+        l of each light. It has no second difference.
     heights : tuple of two arrays, shape (spans, lights)
         z of each light; no second difference. Empty without ``QuotientSpans.takes_heights``.
     """
@@ -300,7 +302,7 @@ class QuotientSpans:
         span, index = pixels_of(checked_lengths(length))
         index = index[:, np.newaxis]
         first, second = words.squares[1][span], words.squares[2][span]
-        # An int64 wraps modulo 2^64, the hardware modulo 2^width: the low bits agree.
+        # An int64 wraps modulo 2^64, and the hardware modulo 2^width. Their low bits agree.
         squares = words.squares[0][span] + index * first + index * (index - 1) // 2 * second
         squares = Fixed(self.square_format, self.square_format.wrap(squares))
         line, height = (start[span] + index * step[span] for start, step in (words.lines, words.heights))

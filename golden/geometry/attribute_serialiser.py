@@ -1,4 +1,4 @@
-"""Attribute serialiser: a triangle's attributes one by one, and a bound on its normals' length."""
+"""Attribute serialiser: a triangle's attributes one after the other, and a bound on its normals' length."""
 
 from dataclasses import dataclass
 

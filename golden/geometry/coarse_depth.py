@@ -29,12 +29,12 @@ class CoarseDepth:
       the block are marked, c is the new b and the mask is empty.
 
     Depths are compared by their upper bits: of two depths with different upper bits the larger is deeper. So
-    the test may keep a span that could be dropped, but never the reverse. A part of a span behind the bound
-    of its block leaves the block's word as it is. So a dropped span leaves no trace.
+    the test may keep a hidden span, but it never drops a visible span. A part of a span behind the bound of
+    its block leaves the block's word as it is. So a dropped span leaves no trace.
 
     A word also has a tag, the number of the picture in which it was written, modulo ``2^tag_bits``. A word
-    with the tag of another picture counts as cleared. With each picture `swept` words are cleared, the words
-    cleared longest ago first. So every word is cleared before its tag comes up again.
+    with the tag of another picture counts as cleared. With each picture `swept` words are cleared, beginning
+    with the words that were cleared longest ago. So every word is cleared before its tag is used again.
 
     Spans go on to shading and to `DepthTester` in the order in which they came. So the depths under a bound
     are stored before the depths of a later span are tested. Pictures with and without this test are equal.
@@ -42,7 +42,8 @@ class CoarseDepth:
     Parameters
     ----------
     width, height : int
-        Size of the largest picture, 1 to 4096. A span that goes out of it is kept, and bounds nothing.
+        Size of the largest picture, 1 to 4096. A span that goes out of it counts as visible, and changes no
+        bound.
     block : int
         Pixels of a block, one of `BLOCKS`. Pixels of the last block outside the picture count as marked.
     depth_bits : int

@@ -65,7 +65,8 @@ class DepthTester:
         """
         order = np.argsort(pixel, kind="stable")
         place, code = pixel[order], depth[order]
-        # Each place has lower values than the one before it, so that the running minimum starts anew there.
+        # Each place has lower values than the place before it. So the running minimum starts anew at each
+        # place.
         group = np.cumsum(np.r_[False, place[1:] != place[:-1]]) if len(place) else place
         value = code - (group << (DEPTH.width + 1))
         least = np.minimum.accumulate(np.r_[np.int64(1) << 62, value])[:-1]

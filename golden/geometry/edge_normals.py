@@ -89,8 +89,8 @@ class EdgeNormals:
     N/W is linear along a scanline, and normalising takes 1/W away. So both normals are perspective-correct.
 
     A normal is lost where opposite normals cancel, or where a corner has no normal. The normal before it
-    takes its place, in the order of the pieces and within a piece of left, right. Before the first normal
-    stands (0, 0, `ONE`), `FIRST`. These *repaired* normals are counted.
+    takes its place. Normals are in the order of the pieces, and left before right within a piece. For the
+    first normal, `FIRST` = (0, 0, `ONE`) is the normal before it. These *repaired* normals are counted.
 
     Parameters
     ----------

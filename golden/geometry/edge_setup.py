@@ -86,9 +86,8 @@ class EdgeSetup:
         x = ceil((X - h) / P) = ceil(((x0 - h) d + (x1 - x0) k) / (P d))
 
     From a scanline to the next k grows by P, and the numerator by ``P (x1 - x0)``. ``x`` is also
-    ``ceil(ceil(numerator / P) / d)``. So the factor P drops out, and the walk is
-    ``x += step; error += error_step; if error >= d: x += 1; error -= d`` with
-    ``step, error_step = divmod(x1 - x0, d)``, exactly.
+    ``ceil(ceil(numerator / P) / d)``. So the factor P cancels, and the walk is ``x += step; error +=
+    error_step; if error >= d: x += 1; error -= d`` with ``step, error_step = divmod(x1 - x0, d)``, exactly.
 
     The start needs no second division: with ``x0 - h = P c + g`` and ``down = k`` of the first scanline,
 

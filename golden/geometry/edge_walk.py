@@ -13,7 +13,7 @@ __all__ = ["EdgeWalk", "Rows"]
 
 @dataclass(frozen=True)
 class Rows:
-    """Scanlines of triangles: from the first of each down to its last, or to the last of the picture.
+    """Scanlines of triangles: each triangle's first down to its last, or to the picture's last.
 
     Parameters
     ----------
@@ -22,9 +22,10 @@ class Rows:
     y : int64 array, shape (R,)
         Scanline.
     begin, end : int64 arrays, shape (R,)
-        First covered column, and first column after the last; none is covered where ``end <= begin``.
+        First covered column, and first column after the last covered column. If ``end <= begin``, no column
+        is covered.
     carry : bool array, shape (R,)
-        From this scanline to the next the long edge moves by one column more than its whole step.
+        Whether the long edge moves by one column more than its whole step from this scanline to the next.
     last : bool array, shape (R,)
         The triangle has no further scanline.
     right, flip : bool arrays, shape (R,)

@@ -72,7 +72,7 @@ class Geometry:
     def rows(
         self, triangles: Triangles, frame: FrameSettings
     ) -> tuple[SortedTriangles, ClippedRows, np.ndarray, dict[str, int]]:
-        """Coverage alone: sorted triangles, their clipped scanlines, the triangle of each, counts so far."""
+        """Coverage alone: sorted triangles, clipped scanlines with their triangles, and counts so far."""
         drawn, counts = VertexSort(self.grid).compute(triangles, frame)
         edges = EdgeSetup(self.grid).compute(drawn)
         rows = EdgeWalk().compute(edges, drawn, frame)

@@ -24,10 +24,10 @@ class Gradients:
     short, long : Fixed, SQ(2, 32)
         Steps from a scanline to the next, without the long edge's carry and with it.
     inward : Fixed, SQ(2, 32)
-        Step from a pixel to the next one away from the long edge.
+        Step from a pixel to the next pixel, away from the long edge.
     size : int64 array
         Upper bound of ``|inward|`` before it is taken modulo 4, in 2^-20, 1 to ``2^20 - 1``. The largest
-        stands for all larger bounds.
+        value also stands for all larger bounds.
     """
 
     start: Fixed
@@ -53,15 +53,15 @@ class GradientSetup:
 
         r = (v2 - v0) / D,    g = (v1 - v0 - r D1) / W
 
-    D is the height, D1 the height of the middle corner, W the width there. Every value in the triangle is
-    ``v0 + r (y - y0) + g |x - X(y)|``. This is a mean of the corners' values, and its weights are off by
-    little even in a thin triangle.
+    D is the height, D1 the height of the middle corner, and W the width there. Every value in the triangle is
+    ``v0 + r (y - y0) + g |x - X(y)|``. This is a mean of the corners' values. Its weights have small errors
+    even in a thin triangle.
 
-    The pixel at the long edge moves by whole columns. So v moves by ``short = r - f g`` a scanline, ``f`` the
-    fraction of the edge's step, and by ``long = short + g`` with the walk's carry. If the edge is on the
-    right, g has the other sign in both: ``short = r + f g``, ``long = short - g``. The start is
-    ``v0 + (k short + n g) / 256`` with ``k = down`` of `Edges`, and with ``n = along`` if the edge is on the
-    left, ``n = 256 - along`` if it is on the right.
+    The pixel at the long edge moves by whole columns. Let ``f`` be the fraction of the edge's step. Then v
+    moves by ``short = r - f g`` a scanline, and by ``long = short + g`` with the walk's carry. If the edge is
+    on the right, g has the other sign in both: ``short = r + f g``, ``long = short - g``. The start is ``v0 +
+    (k short + n g) / 256`` with ``k = down`` of `Edges`, and with ``n = along`` if the edge is on the left,
+    ``n = 256 - along`` if it is on the right.
 
     D' and W' are the powers of two with ``1/2 < D'/D <= 1`` and ``1/2 <= W'/W < 1``; `PlaneSetup` gives these
     quotients and the exponents.
@@ -80,7 +80,7 @@ class GradientSetup:
     ============ ============ =====================================================================
 
     Finished sums are taken modulo 4. Attributes are in [-1, 1). So the values at covered pixels are right
-    even where a step or a value on the way wraps. `error` is the bound. The setup takes twelve
+    even if a step or an intermediate value wraps. `error` is the bound. The setup takes twelve
     multiplications.
 
     Source: docs/theory/geometry.md#normals; not in the documents.

@@ -13,7 +13,7 @@ __all__ = ["LightAdapter"]
 
 @dataclass(frozen=True)
 class LightAdapter:
-    """Components of `SpanVectors` in the frames of further lights, from x, y, z in the frame of the first.
+    """Components of `SpanVectors` in the frames of further lights, from x, y, z in the first light's frame.
 
     A component is the dot product of the vector and a row of three codes, an axis of the light's frame. The
     exact sum of three products of 18 bits is rounded half up to 17 fraction bits. Start and step have the
@@ -27,9 +27,9 @@ class LightAdapter:
     component  SQ(1, 17)    modulo 2; no axis makes it longer than the vector, so that none wraps
     ========== ============ =====================================================================
 
-    A code of an axis is off by 2^-18. For 1 and -1, where the axis's other codes are 0, it is off by 2^-17.
-    So a vector is turned, or stretched, by ``3 2^-18`` of its length at most. A component is rounded by half
-    a step. The rounding of the step's components counts as the step's own rounding, see `VectorAdapter`.
+    A code of an axis is off by 2^-18. The codes of 1 and -1 are off by 2^-17; then the axis's other codes are
+    0. So a vector is turned, or stretched, by ``3 2^-18`` of its length at most. A component is rounded by
+    half a step. The rounding of the step's components counts as the step's own rounding, see `VectorAdapter`.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

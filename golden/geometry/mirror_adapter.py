@@ -18,8 +18,8 @@ class MirrorAdapter:
     Components of further lights stay as they are, before ``y sin a``.
 
     The pipeline has the codes of sin a and cos a as direction to the light. Start and step are multiplied by
-    them, products of 18 bits, and rounded half up to 17 fraction bits. In a span of one pixel the step has no
-    meaning, and gets the products of the start.
+    these codes, in products of 18 bits. The products are rounded half up to 17 fraction bits. In a span of
+    one pixel the step has no meaning, and gets the products of the start.
 
     The codes are off by 2^-18, and both have the scale `QuotientSpans.ONE`. So y and a are off by less than
     2^-16 of themselves, and gamma by less than 2^-15. A product is rounded by half a step, beside the error

@@ -17,7 +17,7 @@ class Planes:
     Parameters
     ----------
     gradients : Gradients, shape (T, 4)
-        Of the components of N/W and of the depth.
+        Gradients of the components of N/W and of the depth.
     piece : int64 array, shape (T,)
         A piece of a span has at most ``2^piece`` pixels; 0 to 12.
     """

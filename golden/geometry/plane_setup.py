@@ -33,11 +33,11 @@ class PlaneScales:
         Mantissa of the reciprocal of the width; 0 for a sliver.
     row_shift, column_shift : int64 arrays, shape (T,)
         Places by which steps per scanline and per column are shifted right, 0 to 19. The column shift of a
-        sliver is any number modulo 32, without meaning.
+        sliver has no meaning.
     fraction, down, along, right
-        Of `Edges` and `SortedTriangles`, unchanged.
+        Unchanged fields of `Edges` and `SortedTriangles`.
     sliver : bool array, shape (T,)
-        Whether the triangle is nowhere wider than 1/256 pixel.
+        Whether the triangle is at most 1/256 pixel wide.
     """
 
     height_reciprocal: Fixed
@@ -64,7 +64,7 @@ class PlaneScales:
 
 @dataclass(frozen=True)
 class PlaneSetup:
-    """``1/D`` and ``1/W`` of a triangle, D its height, W its width at the middle corner, its largest width.
+    """``1/D`` and ``1/W`` of a triangle, where D is its height and W its largest width, at the middle corner.
 
     Let ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2. The width in pixels is
     ``a / (D 2^s)``, so ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and ``1/A``; A is cut to

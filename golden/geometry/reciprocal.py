@@ -11,7 +11,7 @@ __all__ = ["Reciprocal"]
 
 
 class Reciprocal:
-    """``1/x`` for ``1 <= x < 2``, as ``c0 - u (c1 - u c2)``, u the distance from the segment's middle.
+    """``1/x`` for ``1 <= x < 2``, as ``c0 - u (c1 - u c2)``. u is the distance from the segment's middle.
 
     ============ ============ =====================================================================
     word         format       why

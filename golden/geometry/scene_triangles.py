@@ -11,11 +11,11 @@ from blysk.golden.reference.scene import Scene
 __all__ = ["SceneTriangles", "scene_triangles"]
 
 _LARGEST = ATTRIBUTE.max_code
-# One less than the depth that a picture is cleared to.
+# The depth to which a picture is cleared, minus 1.
 _FARTHEST = DEPTH.max_code - 1
 
 _DEEPEST = 1000.0
-"""W over the least W of a frame from which on triangles are far."""
+"""W divided by the least W of a frame, from which on a triangle counts as far."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,8 @@ def scene_triangles(
     position = np.rint(records[..., :2] / w[..., np.newaxis] * grid.steps).astype(np.int64)
     position = np.clip(position, grid.coordinate.min_code, grid.coordinate.max_code)
     normal = records[..., 4:] * (w.min(axis=1, keepdims=True) / w)[..., np.newaxis]
-    # Normals of a mesh may be a little longer than 1; vectors in the frame of a light may not.
+    # Normals of a mesh may be a little longer than 1. Vectors in the frame of a light must not be longer than
+    # 1.
     longest = np.linalg.norm(normal, axis=2).max(axis=1)
     beyond = (longest > 1 + ATTRIBUTE.step) & (axes is not None)
     normal[beyond] /= longest[beyond, np.newaxis, np.newaxis]
@@ -138,17 +139,18 @@ def scene_triangles(
 
 
 def _turned(scene: Scene, triangles: Triangles, source: np.ndarray) -> Triangles:
-    """Triangles. Those without area in the world are turned to the side that their normals face.
+    """Triangles. Triangles without area in the world are turned to the side that their normals face.
 
-    Rounding alone gives these an orientation, by which the hardware negates normals. If the hardware culls,
-    triangles that rounding turns to the front stay, because they may close a seam.
+    Only rounding gives triangles without area an orientation, and the hardware negates normals by the
+    orientation. If the hardware culls, triangles that rounding turns to the front stay, because they may
+    close a seam.
     """
     plane, flat = planes_of(scene.mesh)
     chosen = np.flatnonzero(np.isin(source, flat))
     if not len(chosen):
         return triangles
     (dx, ex), (dy, ey) = ((v[chosen, 1:] - v[chosen, :1]).T for v in (triangles.x, triangles.y))
-    # y grows downwards: an area over 0 is clockwise, a back.
+    # y grows downwards. So an area over 0 means clockwise corners, which show the back.
     area = dx * ey - ex * dy
     behind = seen_from_behind(scene, plane)[source[chosen]]
     wrong = np.where(behind, (area < 0) & ~scene.culls[source[chosen]], area > 0)
@@ -162,9 +164,9 @@ def _turned(scene: Scene, triangles: Triangles, source: np.ndarray) -> Triangles
 def _clip(
     records: np.ndarray, source: np.ndarray, plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cut triangles by a plane; also which faces were cut.
+    """Cut triangles by a plane. Also returns the faces that were cut.
 
-    ``plane`` has four coefficients and a constant; a point is inside where the sum is not negative.
+    ``plane`` has four coefficients and a constant. A point is inside if the sum is not negative.
     """
     distance = records[..., :4] @ plane[:4] + plane[4]
     inside = distance >= 0
@@ -173,7 +175,7 @@ def _clip(
     crossed = (count > 0) & (count < 3)
     for corners_inside in (1, 2):
         chosen = np.flatnonzero(count == corners_inside)
-        # The odd corner out becomes the first, the winding stays.
+        # The corner that is alone on its side becomes the first corner. The winding stays.
         odd = (inside[chosen] == (corners_inside == 1)).argmax(axis=1)
         turn = (odd[:, np.newaxis] + np.arange(3)) % 3
         rows = chosen[:, np.newaxis]

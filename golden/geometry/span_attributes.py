@@ -48,7 +48,7 @@ class Pieces:
     step : Fixed, shape (S, 3), SQ(2, 32), optional
         Step of N/W to the next pixel away from the long edge; without meaning in a span of one pixel.
     turned : bool array, shape (S,), optional
-        Whether the way from the long edge leads to the left.
+        Whether the span goes to the left from the long edge.
     """
 
     x: np.ndarray
@@ -99,9 +99,9 @@ class WholeSpans:
     x, y, length : int64 arrays, shape (S,)
         As in `Pieces`.
     near, far : Fixed, shape (S, 4), SQ(2, 32)
-        Attributes at the first and the last pixel's centre, the first at the long edge; modulo 4.
+        Attributes at the first and the last pixel's centre, modulo 4. The first pixel is at the long edge.
     inward : Fixed, shape (S, 4), SQ(2, 32)
-        Their step from the first to the next pixel.
+        Step of the attributes from the first to the next pixel.
     right : bool array, shape (S,)
         Whether the long edge is on the right.
     flip, material, triangle
@@ -132,17 +132,17 @@ class WholeSpans:
 class SpanAttributes:
     """Accumulators along the long edge. From the long edge, shifts and additions go along each span.
 
-    From a scanline to the next `Gradients.short` is added to the value at the long edge's pixel, or, with the
-    walk's carry, `Gradients.long`. This takes no product. Along a scanline the value n pixels from the long
-    edge is ``n inward`` more, a sum of shifts of ``inward`` for the ones of n. Pixels that the picture's
+    From a scanline to the next `Gradients.short` is added to the value at the long edge's pixel. With the
+    walk's carry `Gradients.long` is added. This takes no product. The value n pixels from the long edge is
+    ``n inward`` more. This is a sum of shifts of ``inward``, one for each 1 of n. Pixels that the picture's
     border cuts off at the long edge are skipped in the same way.
 
     A span of more than ``2^piece`` pixels is cut into pieces of ``2^piece`` pixels, from the long edge on.
     The remaining pixels are the last piece. Each piece is a span of its own, with the true N/W at both its
     ends.
 
-    Values are exact sums of the gradients' codes, modulo 4. They are cut to the pieces' formats. Where errors
-    carry them out of range, they saturate.
+    Values are exact sums of the gradients' codes, modulo 4. They are cut to the pieces' formats. If errors
+    carry a value out of range, the value saturates.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class SpanClip:
     """``x = max(begin, left) - left``, ``length = min(end, right) - max(begin, left)``.
 
     Scanlines above the picture, and scanlines without a pixel in it, are passed on with length 0. For these
-    `SpanAttributes` steps down the long edge, and makes no span.
+    scanlines `SpanAttributes` steps down the long edge, and makes no span.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """

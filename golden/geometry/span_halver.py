@@ -18,11 +18,11 @@ __all__ = ["SpanHalver"]
 
 @dataclass(frozen=True)
 class SpanHalver:
-    """Pieces of spans along which N/W stays long, by repeated halving where a simple test asks for it.
+    """Pieces of spans along which N/W stays long. Spans are halved as long as a simple test asks for it.
 
-    The components of N/W at both ends of a span are shifted left by the places that none of them needs, at
-    most `LARGEST_SHIFT`. The test reads the first `BITS` bits ``m`` of each magnitude, which is at least
-    ``m 2^-BITS``. A span *fits* if at both ends
+    The components of N/W at both ends of a span are shifted left by the number of places that no component
+    needs, at most `LARGEST_SHIFT`. The test reads the first `BITS` bits ``m`` of each magnitude, which is at
+    least ``m 2^-BITS``. A span *fits* if at both ends
 
     - a component that keeps its sign has a magnitude of `AXIS` or more;
     - or the magnitudes of two components that keep their signs have the sum `PAIR` or more;
@@ -85,7 +85,7 @@ class SpanHalver:
             shorter = np.where(even, far - step, (near + far) >> 1)
             rest = left - tried
             goes_on = ~fits | (rest > 0)
-            # A piece that fits is followed by all pixels that are left.
+            # After a piece that fits, all remaining pixels are tried together.
             first = np.where(fits, first + tried, first)
             near = np.where(fits[:, np.newaxis], far + step, near)
             far = np.where(fits[:, np.newaxis], spans.far.codes[span], shorter)

@@ -42,10 +42,10 @@ class VectorAdapter:
 
     The components of both ends and of the step are shifted left by the same number s of places: the sign
     copies that all components of the ends have, `SpanHalver.shift`. Then each word x becomes ``x - 2^-14 x``,
-    cut. So 8 steps of 2^-17 are left to 1, which no pixel may reach, and nothing saturates. The step is
-    shifted left by e places more: as many as leave it under 1, at most 15. If ``flip`` is set, the start is
-    negated. If exactly one of ``flip`` and ``turned`` is set, the step is negated. Both are rounded half up
-    to 17 fraction bits.
+    cut. This leaves a margin of 8 steps of 2^-17 to 1. No pixel may reach 1, and nothing saturates. The step
+    is shifted left by e more places. e is the largest number up to 15 that leaves the step under 1. If
+    ``flip`` is set, the start is negated. If exactly one of ``flip`` and ``turned`` is set, the step is
+    negated. Both are rounded half up to 17 fraction bits.
 
     ========== ============ =====================================================================
     word       format       why
@@ -72,8 +72,8 @@ class VectorAdapter:
     ----------
     rotates : bool
         Whether vectors will be turned into other frames. Then the lengths of the vectors and of their steps
-        have to be under 1, and not components alone. If the shift and e are not 0, they are one less. N/W may
-        be at most 1 long, as `scene_triangles` makes it, and `SpanHalver` with ``rotates`` cuts spans. A
+        have to be under 1, not only their components. If the shift and e are not 0, they are one less. N/W
+        may be at most 1 long, as `scene_triangles` makes it, and `SpanHalver` with ``rotates`` cuts spans. A
         start keeps its rounding if the shift is 0. Else the rounding is twice as large for its length. The
         rounding of the step is an eighth of a step, or `ERROR` times twice the distance of the ends. The
         errors of both add up, so the margin is 2^-12, 32 steps of 2^-17.
@@ -111,7 +111,7 @@ class VectorAdapter:
         flip, turned = (np.asarray(flag, dtype=bool)[:, np.newaxis] for flag in (pieces.flip, pieces.turned))
         shift = self.shift(pieces)[:, np.newaxis]
         start = self._rounded(self._smaller(pieces.left.codes << shift), flip, SPAN_NORMAL.fraction_bits)
-        # Modulo 2: steps that are larger come in pieces of one pixel alone.
+        # Steps are taken modulo 2. Only pieces of one pixel have larger steps.
         whole = 1 << self.STEP_BITS
         shifted = (((step.codes << shift) + whole) & (2 * whole - 1)) - whole
         exponent = np.minimum(self.STEP_BITS - _used(shifted), self.LARGEST_EXPONENT)

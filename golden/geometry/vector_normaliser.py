@@ -42,7 +42,7 @@ class VectorNormaliser:
     The length of the result is off by at most `LENGTH_ERROR`, 2^-15.7, its direction by at most
     `DIRECTION_ERROR`, 2^-15.6. docs/theory/bounds.md#vector-normaliser derives both.
 
-    The unit takes six multiplications, and a product of 12 by 11 bits that is made of adders.
+    The unit takes six multiplications. Adders make a further product of 12 by 11 bits.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class VectorNormaliser:
 
     @cached_property
     def coefficients(self) -> tuple[Fixed, Fixed]:
-        """``c0, c1`` of the segments from 1/4 to 1, shape (512,) each; the first 128 are not used, and 0."""
+        """``c0, c1`` of the segments from 1/4 to 1, shape (512,) each. The first 128 are 0 and not used."""
         segments = 1 << self.SEGMENT_BITS
         middle = (np.arange(segments // 4, segments) + 0.5) / segments
         u = np.linspace(-0.5, 0.5, 65)[:, np.newaxis] / segments
@@ -101,7 +101,7 @@ class VectorNormaliser:
         c0, c1 = (c[segment] for c in self.coefficients)
         f = (c0 - (c1 * u).truncate(20)).wrap(self.C0_FORMAT).codes
         one = 1 << 20
-        # In steps of 2^-21: f is halved with all its bits.
+        # The result is in steps of 2^-21, so that f keeps all its bits when it is halved.
         e = Fixed(SQ(2, 21), np.where(large, f - 2 * one, 2 * (f - one)))
         return e.round_half_up(17).wrap(self.FACTOR_FORMAT)
 

@@ -11,7 +11,7 @@ __all__ = ["SortedTriangles", "VertexSort"]
 
 @dataclass(frozen=True)
 class SortedTriangles:
-    """Triangles to draw. Their corners go from top to bottom, and on one height from left to right.
+    """Triangles to draw, with corners from top to bottom, and at equal height from left to right.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class SortedTriangles:
     flip : bool array, shape (T,)
         Whether the normals have to be negated.
     source : int64 array, shape (T,)
-        Index of each in the triangles before the sort.
+        Index of each triangle among the triangles before the sort.
     """
 
     triangles: Triangles
@@ -74,7 +74,7 @@ class VertexSort:
         return np.argsort(key, axis=1, kind="stable")
 
     def compute(self, triangles: Triangles, frame: FrameSettings) -> tuple[SortedTriangles, dict[str, int]]:
-        """Triangles to draw, and the counts of the others.
+        """Triangles to draw, and the counts of the dropped triangles.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class VertexSort:
         )
         dx, dy = (values[:, 1:] - values[:, :1] for values in (kept.x, kept.y))
         area = dx[:, 0] * dy[:, 1] - dx[:, 1] * dy[:, 0]
-        # Of the six orders of three corners the odd ones exchange two, and leave one corner in its place.
+        # An odd order of three corners exchanges two corners and leaves one corner in its place.
         odd = (order == np.arange(3)).sum(axis=1) == 1
         back = (area > 0) ^ odd
         solid = area != 0

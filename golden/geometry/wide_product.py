@@ -17,13 +17,16 @@ def low_format(format: Format, low_bits: int) -> Format:
 
 
 def halves(value: Fixed, low_bits: int) -> tuple[Fixed, Fixed]:
-    """High part of a number, signed, and its low part of ``low_bits`` bits, unsigned; their sum is exact."""
+    """Signed high part of a number, and its unsigned low part of ``low_bits`` bits.
+
+    The sum of both is exact.
+    """
     low = low_format(value.format, low_bits)
     return value.truncate(value.format.fraction_bits - low_bits), Fixed(low, value.codes & low.max_code)
 
 
 def wide_product(a: Fixed, b: Fixed, a_low: int, b_low: int, fraction_bits: int) -> Fixed:
-    """``a b`` from three products of the halves; the product of the two low halves is omitted.
+    """``a b`` from three products of the halves. The product of the two low halves is omitted.
 
     Each product is cut to `GUARD_BITS` more than the result's fraction bits, and their sum rounded half up.
 

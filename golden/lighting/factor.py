@@ -21,7 +21,7 @@ class Factor:
     a S    UQ(0, 17) cut: at most S and at most a
     ====== ========= =============================================
 
-    The result is at most the exact product. It is less by under 2^-17, 0.002 LSB of a full channel.
+    The result is at most the exact product. The difference is under 2^-17, 0.002 LSB of a full channel.
 
     Source: docs/theory/chord.md#local-lights.
     """

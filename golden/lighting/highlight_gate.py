@@ -25,11 +25,11 @@ class GateLimits:
     Parameters
     ----------
     excess : float
-        Bound of the excess of N·H over that of the great circle.
+        Bound of the excess of N·H over the N·H of the great circle.
     shortest : float
         Least length of a normal on the method's curve. It is 1 without chords to H.
     angle : float
-        Largest angle of a span, in degrees, for which both hold, up to 45.
+        Largest angle of a span, in degrees, for which both bounds hold, up to 45.
     """
 
     excess: float
@@ -73,10 +73,10 @@ class HighlightGate(Gate):
 
     The margins cost little: for quadratic normals a span is let through only if
     ``M^2 >= tau^2 - 10 * 2^-17``. Ends must be unit vectors from `quantise`;
-    docs/theory/bounds.md#gate-of-unit-normals tells about others.
+    docs/theory/bounds.md#gate-of-unit-normals describes other vectors.
 
-    For exponents with terms over 0 down to N·H = tau <= 0, T is 0 and every span is lit. These are 1, and
-    with models of wide highlights 2 and 3.
+    If an exponent has terms over 0 down to N·H = tau <= 0, T is 0 and every span is lit. This holds for
+    exponent 1, and for 2 and 3 with models of wide highlights.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class HighlightGate(Gate):
         """T from the largest arguments with a term over 0, in steps of 2^-25; see also `LobeTable`."""
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25
         level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.limits.shortest
-        # In steps of 2^-34; one less, as the quotient is not exact.
+        # T is in steps of 2^-34. It is one step less, because the quotient is not exact.
         steps = np.floor(level * 2.0**34).astype(np.int64) - 1
         # Squares of 34 bits outgrow an int64.
         codes = [max(code, 0) ** 2 >> (68 - self.fraction_bits) for code in steps.tolist()]
@@ -222,7 +222,7 @@ class HighlightGate(Gate):
         return self.decide_by(cosine, dot(normal_left, halfway), dot(normal_right, halfway), threshold)
 
     def decide_by(self, cosine: Fixed, left: Fixed, right: Fixed, threshold: Fixed) -> np.ndarray:
-        """Decisions from dot products: of the normals, and of the left and the right one with H.
+        """Decisions from dot products: of both normals, of the left normal and H, of the right normal and H.
 
         Parameters
         ----------

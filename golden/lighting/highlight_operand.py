@@ -60,7 +60,7 @@ class HighlightOperand:
 
     @property
     def table_options(self) -> dict[str, Any]:
-        """Options of a lobe's tables that hold for every operand; empty without a table."""
+        """Options of a lobe's tables that do not depend on the operand. Empty without a table."""
         return {}
 
     @property
@@ -70,7 +70,7 @@ class HighlightOperand:
 
     @property
     def parts(self) -> int:
-        """Number of tables in a row, each of another argument, for a unit with tables."""
+        """Number of parts of a table, each with another argument, for a unit with tables."""
         return 1
 
     @property
@@ -88,7 +88,7 @@ class HighlightOperand:
         return 0.0
 
     def is_sharp(self, parameter: float | None) -> bool:
-        """Whether a lobe is so sharp that a frame has to tell of its `line_error`."""
+        """Whether a lobe is so sharp that a frame must report its `line_error`."""
         return False
 
     def for_operand(self, operand: Any, scale: int = 0) -> "HighlightOperand":
@@ -165,6 +165,6 @@ class HighlightOperand:
     def last_lit_arguments(self) -> np.ndarray:
         """Largest ``1 - cos gamma``, in steps of 2^-25, that may give a term over 0, for each exponent.
 
-        int64 array, shape (1024,). It is 2^27 where every argument may.
+        int64 array, shape (1024,). It is 2^27 if every argument may give a term over 0.
         """
         raise NotImplementedError

@@ -228,9 +228,7 @@ class Lobe(HighlightOperand):
 
     @property
     def cosines(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cosines at the entries and at the end, short of the right angle, where the curve is 0; and in the
-        middles.
-        """
+        """Cosines at entries and end, and in the middles of steps. The end is just before the right angle."""
         knots = np.ldexp(np.minimum(self.knots, 1 - 2.0**-40), -self.scale)
         return 1 - knots, 1 - (knots[1:] + knots[:-1]) / 2
 
@@ -242,8 +240,8 @@ class Lobe(HighlightOperand):
         """Table of the model for one parameter.
 
         Two lines meet at an entry. An entry is the value of the curve, moved against the error of these
-        lines, measured in the middle of each. It is moved by half of the larger error, but at most twice the
-        smaller error. If one line is too high and the other too low, the entry stays.
+        lines. This error is measured in the middle of each line. It is moved by half of the larger error, but
+        at most twice the smaller error. If one line is too high and the other too low, the entry stays.
 
         Parameters
         ----------
@@ -271,7 +269,7 @@ class Lobe(HighlightOperand):
         return LobeTable(self, values, parameter)
 
     def scale_of(self, parameters: Sequence[float | None]) -> int:
-        """Largest scale, up to `MOST_SCALE`, that serves all lobes; 0 if no lobe needs one.
+        """Largest scale, up to `MOST_SCALE`, that serves all lobes. It is 0 if no lobe needs a scale.
 
         A lobe needs a scale if its slope is over `SHARP`. A step of 2^-25 of u is then over 0.1 LSB. Scale s
         serves a lobe that is under a quarter of the least entry from ``u = 2^-s`` on.
@@ -288,7 +286,7 @@ class Lobe(HighlightOperand):
         return int(np.floor(-np.log2(np.clip(dark, 2.0**-self.MOST_SCALE, 1))))
 
     def for_parameters(self, parameters: Sequence[float | None]) -> "Lobe":
-        """The unit with `FINER` steps in place of the default ones, if the error of a table is over 1/4 LSB.
+        """The unit with `FINER` steps in place of the default steps, if the error of a table is over 1/4 LSB.
 
         This happens for lobes with a steep end near a right angle, such as Beckmann's with roughness 1. With
         one bank either size takes one block RAM. If a sharp lobe needs the default octaves, they stay.
@@ -383,7 +381,7 @@ class Lobe(HighlightOperand):
         return Fixed(self.RESULT_FORMAT, np.where(lit, term, 0))
 
     def check(self, table: "LobeTable") -> None:
-        """Refuse an object that is no table, or a table of another size or scale.
+        """Refuse an object that is not a table, and a table of another size or scale.
 
         Raises
         ------

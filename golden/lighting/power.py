@@ -30,9 +30,9 @@ class Power(HighlightOperand):
     ======= ========= ====================================================================
 
     The arithmetic error of the result for an exact argument is at most `ERROR`, and only makes the result
-    smaller (docs/theory/bounds.md#power). The term may rise where the cosine falls, by 5 steps of 2^-17 at
-    most, 0.01 LSB at intensity 1. With the operand ``cosine``, 1 is 2^-16 more than the square of a code's
-    length. So with n = 1 the term is one step in place of 0, up to 2^-17 past the right angle.
+    smaller (docs/theory/bounds.md#power). Where the cosine falls, the term may rise, but by at most 5 steps
+    of 2^-17, 0.01 LSB at intensity 1. With the operand ``cosine``, 1 is 2^-16 more than the square of a
+    code's length. So with n = 1 the term is one step in place of 0, up to 2^-17 past the right angle.
 
     Parameters
     ----------
@@ -62,7 +62,10 @@ class Power(HighlightOperand):
 
     @property
     def last_lit_arguments(self) -> np.ndarray:
-        """Argument of ``c^n = 2^-17``, as the result is never too large, and one step more for float64."""
+        """Argument with ``c^n = 2^-17``, because the result is never too large.
+
+        One more step is for float64.
+        """
         exponent = np.arange(1 << self.EXPONENT_BITS)
         argument = -np.expm1(-17 * np.log(2) / np.maximum(exponent, 1)) / self.ARGUMENT_FORMAT.step
         return np.where(exponent > 0, np.ceil(argument).astype(np.int64) + 1, 1 << 27)

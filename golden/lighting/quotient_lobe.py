@@ -20,7 +20,7 @@ class QuotientLobe(Lobe):
     The integer of a place is the address of a word, its fraction the position within the step. The table of a
     lobe of N·H has a part for ``s = sin^2 gamma`` and a part for ``1 - s``. The table of a lobe of R·V has
     one part, for ``s = sin^2 (gamma/2)``. A part has `OCTAVES` octaves of `STEPS` steps and a row for all
-    smaller numbers. A place past the end gives 0. Words, entries, writes and banks are those of `Lobe`.
+    smaller numbers. A place past the end gives 0. Words, entries, writes and banks are as for `Lobe`.
 
     *Error of the lines*, with rounding, at the possible places (s or 1 - s up to 1/2), in LSB:
 
@@ -106,8 +106,7 @@ class QuotientLobe(Lobe):
 
     @property
     def cosines(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cosines at the entries and the end, and in the middles. The end of a part is the start of the next
-        part.
+        """Cosines at entries and end, and in the middles of steps. A part ends where the next part starts.
 
         ``sqrt(1 - s)`` and ``sqrt(1 - (1 - s))``; ``1 - 2 s`` for a lobe of R·V.
         """
@@ -121,7 +120,7 @@ class QuotientLobe(Lobe):
     def _beside(self, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         left, right = super()._beside(high)
         if self.parts == 2:
-            # Before the border of the parts only the step behind 1/2 is used.
+            # Of the steps from 1/2 on, only the first step is used before the border of the parts.
             border = len(self.knots) - 1
             left[border] = right[border]
         return left, right

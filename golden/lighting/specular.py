@@ -61,7 +61,10 @@ class Chords:
 
 
 def _lowered(function: Callable[[np.ndarray], np.ndarray], entries: int) -> np.ndarray:
-    """Values at the ends of chords of a convex function on [0, 1], lowered by half of the largest error."""
+    """Values at the ends of chords of a convex function on [0, 1].
+
+    They are lowered by half of the largest error.
+    """
     ends = function(np.arange(entries + 1) / entries)
     high = (ends[1:] + ends[:-1]) / 2 - function((np.arange(entries) + 0.5) / entries)
     found: np.ndarray = np.maximum(ends - (np.r_[high[0], high] + np.r_[high, high[-1]]) / 4, 0)
@@ -124,8 +127,8 @@ class Specular(HighlightOperand):
         ``"cosine"`` or ``"one_minus_cosine"``; see `HighlightOperand`.
     as_published : bool
         Whether the unit has the comparator of figure 3.6 as published, for polynomials that are squared once.
-        It compares the *square*, with 2^-14 at every exponent. Up to the base's zero the terms are those of
-        the default to the bit. Past the zero the parabola rises again, and its second lobe comes through.
+        It compares the *square*, with 2^-14 at every exponent. Up to the base's zero the terms equal the
+        default's terms to the bit. Past the zero the parabola rises again, and its second lobe comes through.
         Squares over 1 saturate. So from ``k (1 - cos gamma) = 2`` on the surface is as bright as at the peak:
         at n = 20 from 37 degrees on. A highlight gate for this unit lets every span through.
 
@@ -222,7 +225,7 @@ class Specular(HighlightOperand):
 
     @property
     def cutoff(self) -> Fixed:
-        """Smallest base that is not cut off: its term is 2^-14 at most."""
+        """Smallest base that is not cut off. Its term is at most 2^-14."""
         if self.is_exponential:
             return Fixed(self.BASE_FORMAT, self.BASE_FORMAT.code(1 / 8))
         return Fixed(self.BASE_FORMAT, math.floor(2.0 ** (17 - 14 / 2**self.squarings)))
@@ -302,7 +305,8 @@ class Specular(HighlightOperand):
             largest = self.BASE_FORMAT.max_code - self.cutoff.codes
             codes = (((largest + 1) << 16) - 1) // np.maximum(scale.codes, 1)
             return Fixed(format, np.minimum(codes, format.max_code))
-        # By bisection: the base falls with the argument; the last argument of each shifted one counts.
+        # By bisection, because the base falls with the argument. For each shifted argument the last argument
+        # counts.
         boundary = np.zeros_like(exponent)
         for bit in reversed(range(format.width)):
             shifted = boundary | 1 << bit

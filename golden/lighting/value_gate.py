@@ -67,7 +67,7 @@ class ValueGate(Gate):
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:
         """Thresholds from the largest arguments with a term over 0, in steps of 2^-25; rounded up.
 
-        If every argument may be lit, the threshold is over 4, which is more than any `least`.
+        If every argument may be lit, the threshold is over 4. No `least` reaches this.
         """
         format = self.THRESHOLD_FORMAT
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25 + self.margin
@@ -109,8 +109,8 @@ class ValueGate(Gate):
     def lit(self, spans: Spans, halfway: np.ndarray, threshold: Fixed) -> np.ndarray:
         """Bit-accurate decisions from the values of spans, see `Gate.lit`; H has no effect.
 
-        Values without a pixel are replaced: the middle value of a span of two pixels, and the values behind
-        the first of a span of one pixel.
+        Values without a pixel are replaced. These are the middle value of a span of two pixels, and the
+        second and third value of a span of one pixel.
         """
         if spans.values is None:
             raise ValueError("a value gate takes spans with values")
