@@ -7,6 +7,7 @@ import numpy as np
 
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.spans import checked_lengths, pixels_of
+from blysk.golden.reference.texture import LARGEST_TEXTURE
 
 __all__ = ["LARGEST_RATIO", "MARGIN", "AttributeSpans", "AttributeWords", "SpanAttributes", "whole_texels"]
 
@@ -55,7 +56,7 @@ class SpanAttributes(NamedTuple):
     weight_start, weight_step : int64 arrays, shape (spans,), or None
         Codes of 1/W; ``None`` without perspective.
     base : int64 array, shape (spans, 2), or None
-        Whole texel from which texture coordinates count, -2048 to 2047.
+        Whole texel from which texture coordinates count, within `AttributeSpans.LARGEST_BASE` of 0.
     range : int64 array, shape (spans,), or None
         0 to 11: a texture coordinate is ``base + A 2^range`` texels of the span's level.
     level : int64 array, shape (spans,), or None
@@ -111,7 +112,8 @@ class SpanAttributes(NamedTuple):
             Level of the texture; all 0 without it.
         periodic : bool array, shape (spans, 2), or bool
             Whether u and v may change by multiples of `AttributeSpans.PERIOD` texels: with ``repeat`` and
-            ``mirror``. The base is then brought into its range.
+            ``mirror``. The base is then brought into its range. If not, a span whose ends are both beyond
+            `AttributeSpans.LARGEST_BASE` has this number instead: it has the border's texel all along.
 
         Raises
         ------
@@ -163,17 +165,17 @@ class SpanAttributes(NamedTuple):
     def _placed(ends: np.ndarray, periodic: np.ndarray | bool) -> tuple[np.ndarray, np.ndarray]:
         """Base and range; texture coordinates at both ends, shape (2, spans, 2), become attributes."""
         model = AttributeSpans
+        limit, half = model.LARGEST_BASE, model.PERIOD // 2
+        for outside, border in ((ends > limit, limit), (ends < -limit, -limit)):
+            ends[:, outside.all(axis=0) & ~np.asarray(periodic)] = border
         base, found = whole_texels(*ends)
         if found.size and found.max() > model.LARGEST_RANGE:
             raise ValueError(f"a span may cross at most {2 << model.LARGEST_RANGE} texels: cut it")
         ends -= base
         ends *= np.ldexp(1.0, -found)[:, np.newaxis]
-        half = model.PERIOD // 2
         base = np.where(periodic, (base + half) % model.PERIOD - half, base)
-        if base.size and not -half <= base.min() <= base.max() < half:
-            raise ValueError(
-                f"texture coordinates with clamp must be within {half} texels: cut the span, or move it"
-            )
+        if base.size and np.abs(base).max() > limit:
+            raise ValueError(f"the middle of a span may be {limit} texels from the border of u or v: cut it")
         return base, found
 
     @staticmethod
@@ -265,8 +267,11 @@ class AttributeSpans:
     RANGE_FORMAT = UQ(4, 0)
     LEVEL_FORMAT = UQ(4, 0)
     LARGEST_RANGE = 11
-    PERIOD = 4096
-    """Texels by which the base of a texture that repeats may change: twice the largest mirrored tile."""
+    PERIOD = 2 * LARGEST_TEXTURE
+    """Texels by which the base of a texture that repeats may change, also where tiles are mirrored."""
+
+    LARGEST_BASE = 1984
+    """So that no texture coordinate leaves its word: with A up to 33/32 it stays within 4096 texels."""
 
     def __post_init__(self) -> None:
         if not (self.colors or self.coordinates):

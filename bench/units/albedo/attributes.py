@@ -41,7 +41,7 @@ def any_words(
     format = model.WORD_FORMAT
     codes = np.clip(codes, format.min_code, format.max_code)
     of_weight = Fixed.round(format, weight)
-    base = rng.integers(-2048, 2048, (count, 2))
+    base = rng.integers(-model.LARGEST_BASE, model.LARGEST_BASE + 1, (count, 2))
     of_span = base, rng.integers(0, model.LARGEST_RANGE + 1, count), rng.integers(0, 16, count)
     exact = codes / (of_weight.codes[:, np.newaxis] if model.perspective else 1 << 23)
     return AttributeWords(Fixed(format, codes), of_weight, *of_span), exact

@@ -80,13 +80,21 @@ def test_without_perspective_words_are_the_attributes():
     assert words.numerators.codes.max() == 2**23 - 4
 
 
-def test_a_base_comes_into_its_range_by_whole_periods():
+def test_a_base_comes_into_its_range():
+    """By whole periods, or with clamp to the place from which on all is the border's texel."""
     model = AttributeSpans(colors=False, coordinates=True, perspective=False)
-    ends = np.array([[[5000.25, -2100.5]], [[5001.25, -2100.5]]])
+    ends = np.array([[[5000.25, -2100.5]], [[5001.25, -2099.5]]])
     spans = SpanAttributes.quantise(model, *ends, np.array([2]), periodic=True)
-    assert spans.base.tolist() == [[5001 - 4096, -2100 + 4096]]
-    with pytest.raises(ValueError, match="texture coordinates with clamp must be within 2048 texels: cut"):
-        SpanAttributes.quantise(model, *ends, np.array([2]), periodic=np.array([[True, False]]))
+    assert spans.base.tolist() == [[5001 - 2 * 2048, -2100 + 2048]]
+    assert (spans.step != 0).all()
+    spans = SpanAttributes.quantise(model, *ends, np.array([2]), periodic=np.array([[True, False]]))
+    assert spans.base.tolist() == [[5001 - 2 * 2048, -1984]]
+    assert spans.step[0, 1] == 0
+    ends = np.array([[[100, 0.0]], [[3900, 0.0]]])
+    with pytest.raises(
+        ValueError, match="the middle of a span may be 1984 texels from the border of u or v: cut"
+    ):
+        SpanAttributes.quantise(model, *ends, np.array([2]))
 
 
 def test_some_of_the_spans():

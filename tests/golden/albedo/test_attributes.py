@@ -75,6 +75,19 @@ def test_colours_saturate_and_reach_1():
     assert np.abs(colors.values - 1).max() <= 2.0**-16
 
 
+def test_coordinates_at_their_ends_do_not_wrap():
+    """U over w by six steps, as two words with their errors can be, at 1/W of every size, and both signs."""
+    unit = Attributes(AttributeSpans(colors=False, coordinates=True))
+    weight = np.unique(np.r_[np.arange(252, 600), np.floor(2.0 ** np.linspace(8, 22.999, 3000)).astype(int)])
+    numerator = np.minimum(weight + 6, (1 << 23) - 1)
+    codes, format, count = np.column_stack([numerator, -numerator]), SQ(1, 23), len(weight)
+    base, range_ = np.tile([1984, -1984], (count, 1)), np.full(count, 11)
+    words = AttributeWords(Fixed(format, codes), Fixed(format, weight), base, range_, np.zeros(count, int))
+    found = unit.compute(words).coordinates.values
+    error = np.abs(found - [1984 + 2048, -1984 - 2048]).max(axis=1)
+    assert (error <= unit.errors(words, np.full(count, 3 * 2.0**-23))[1]).all()
+
+
 def test_a_coordinate_outside_its_format_wraps():
     unit = Attributes(AttributeSpans(False, True, False), share_bits=8)
     format = SQ(1, 23)
