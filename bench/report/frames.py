@@ -20,7 +20,8 @@ from blysk.bench.report.perception import (
 )
 from blysk.bench.speed.cycle_model import frame_cycles, unit_of
 from blysk.bench.speed.renderer import timed
-from blysk.golden.frames.compare import border_mask, method_in_float64
+from blysk.golden.frames.border import border_mask
+from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.methods.interpolator import Operand

@@ -18,7 +18,7 @@ from blysk.bench.report.perception import (
 )
 from blysk.bench.report.section import Cell, Grade, Table
 from blysk.bench.tools.families import DEVICE
-from blysk.golden.frames.compare import BORDER
+from blysk.golden.frames.border import BORDER
 from blysk.golden.presets import METHODS, MIRROR_LOBES
 
 __all__ = [

@@ -22,7 +22,8 @@ from blysk.bench.tools.board_build import Built, build
 from blysk.bench.tools.board_design import BoardTop, gpu_of, least_cycles
 from blysk.bench.tools.boards import Board
 from blysk.bench.tools.tool_runner import ToolError
-from blysk.golden.frames.compare import BORDER, compare_image
+from blysk.golden.frames.border import BORDER
+from blysk.golden.frames.compare import compare_image
 from blysk.golden.gpu import Gpu
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.transfer import SPACES

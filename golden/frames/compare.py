@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from blysk.golden.frames.border import border_mask, highlight_step
 from blysk.golden.frames.frame import Picture
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands
@@ -18,14 +19,12 @@ from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.lighting.transfer import Transfer
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.golden.reference.fragments import fragment_normals
-from blysk.golden.reference.lighting import distant_cosine, halfway_vector
+from blysk.golden.reference.lighting import distant_cosine
 from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.renderer import (
-    fragment_positions,
     render,
     shade_operands,
     shade_spans,
@@ -36,22 +35,16 @@ from blysk.golden.reference.transfer import encode_frame, slope
 from blysk.golden.render import Renderer
 
 __all__ = [
-    "BORDER",
     "Comparison",
     "FrameErrors",
-    "border_mask",
     "compare",
     "compare_image",
     "compare_triangles",
     "encoded_bound",
     "error_bound",
-    "highlight_step",
     "method_in_float64",
     "target_of",
 ]
-
-BORDER = 0.002
-"""Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off."""
 
 
 @dataclass(frozen=True)
@@ -315,64 +308,6 @@ def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
     # Spans of an exact curve are not cut for its error.
     steepest = 1.0 if design.interpolator.curve_is_exact else HighlightLimits.of(scene, design).slope
     return 0.5 + max(brightness / 16, 1 / 128) + brightness / 4 / steepest
-
-
-def highlight_step(scene: Scene, model: ReflectionModel) -> float:
-    """Largest step of a light's highlight at N·H = 0 in LSB of linear light; 0 if it is a quarter or less.
-
-    ``ggx`` at a large roughness does not end in 0 there, and a curve of a file may not. Polynomials of a
-    small exponent go on behind, so they have no step.
-    """
-    brightest = max((max(light.color) for light in scene.lights), default=0.0)
-    steps = [0.0]
-    for material in scene.materials:
-        if material.unlit:
-            continue
-        before, behind = model.reflect(np.array([1e-6, -1e-6]), material.parameter(model))
-        steps.append(float(255 * (before - behind) * max(material.specular) * brightest))
-    return max(steps) if max(steps) > 0.25 else 0.0
-
-
-def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndarray:
-    """Shown pixels at the border of a light, where its term switches between on and off.
-
-    There ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if there is a `highlight_step`. An error there may be as
-    large as the term. An unlit surface has no border.
-
-    Parameters
-    ----------
-    scene : Scene
-        Lights, viewer and materials.
-    raster : Raster
-        The spans of `rasterise`.
-    model : ReflectionModel
-        The reflection model.
-
-    Returns
-    -------
-    bool array, shape (height, width)
-    """
-    mask = np.zeros(scene.height * scene.width, dtype=bool)
-    steps = highlight_step(scene, model) > 0
-    is_lit = np.array([not material.unlit for material in scene.materials])
-    shown = np.flatnonzero(raster.visible & is_lit[scene.mesh.material[raster.triangle]][raster.span])
-    for start in range(0, len(shown), _CHUNK):
-        which = shown[start : start + _CHUNK]
-        normals = fragment_normals(scene, raster, which)
-        points = fragment_positions(scene, raster, which) if scene.local else None
-        near = np.zeros(len(which), dtype=bool)
-        for light in (light for light in scene.lights if light.is_on):
-            direction = np.broadcast_to(light.towards(points), normals.shape)
-            near |= np.abs(np.einsum("ij,ij->i", normals, direction)) <= BORDER
-            if steps:
-                halfway = halfway_vector(direction, scene.view_vectors(points))
-                near |= np.abs(np.einsum("ij,ij->i", normals, halfway)) <= BORDER
-        mask[raster.pixel[which]] = near
-    return mask.reshape(scene.height, scene.width)
-
-
-# Number of fragments processed together; it limits the memory.
-_CHUNK = 1 << 15
 
 
 def compare(scene: Scene, design: ShadingPipeline, frame: Picture) -> Comparison:

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from blysk.golden.frames.compare import BORDER, Comparison
+from blysk.golden.frames.border import BORDER
+from blysk.golden.frames.compare import Comparison
 from blysk.golden.frames.frame import Picture
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.scene import Scene

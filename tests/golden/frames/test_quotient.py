@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blysk.golden.frames.compare import BORDER, compare, error_bound
+from blysk.golden.frames.border import BORDER
+from blysk.golden.frames.compare import compare, error_bound
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.presets import preset

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blysk.golden.frames.compare import border_mask, compare, compare_triangles
+from blysk.golden.frames.border import border_mask
+from blysk.golden.frames.compare import compare, compare_triangles
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.triangle_frame import triangle_frame
 from blysk.golden.presets import preset

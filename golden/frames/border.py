@@ -1,0 +1,72 @@
+"""Border of a light: the pixels where a light, or a highlight with a step, begins."""
+
+import numpy as np
+
+from blysk.golden.reference.fragments import fragment_normals
+from blysk.golden.reference.lighting import halfway_vector
+from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.reflection import ReflectionModel
+from blysk.golden.reference.renderer import fragment_positions
+from blysk.golden.reference.scene import Scene
+
+__all__ = ["BORDER", "border_mask", "highlight_step"]
+
+BORDER = 0.002
+"""Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off."""
+
+# Number of fragments processed together; it limits the memory.
+_CHUNK = 1 << 15
+
+
+def highlight_step(scene: Scene, model: ReflectionModel) -> float:
+    """Largest step of a light's highlight at N·H = 0 in LSB of linear light; 0 if it is a quarter or less.
+
+    ``ggx`` at a large roughness does not end in 0 there, and a curve of a file may not. Polynomials of a
+    small exponent go on behind, so they have no step.
+    """
+    brightest = max((max(light.color) for light in scene.lights), default=0.0)
+    steps = [0.0]
+    for material in scene.materials:
+        if material.unlit:
+            continue
+        before, behind = model.reflect(np.array([1e-6, -1e-6]), material.parameter(model))
+        steps.append(float(255 * (before - behind) * max(material.specular) * brightest))
+    return max(steps) if max(steps) > 0.25 else 0.0
+
+
+def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndarray:
+    """Shown pixels at the border of a light, where its term switches between on and off.
+
+    There ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if there is a `highlight_step`. An error there may be as
+    large as the term. An unlit surface has no border.
+
+    Parameters
+    ----------
+    scene : Scene
+        Lights, viewer and materials.
+    raster : Raster
+        The spans of `rasterise`.
+    model : ReflectionModel
+        The reflection model.
+
+    Returns
+    -------
+    bool array, shape (height, width)
+    """
+    mask = np.zeros(scene.height * scene.width, dtype=bool)
+    steps = highlight_step(scene, model) > 0
+    is_lit = np.array([not material.unlit for material in scene.materials])
+    shown = np.flatnonzero(raster.visible & is_lit[scene.mesh.material[raster.triangle]][raster.span])
+    for start in range(0, len(shown), _CHUNK):
+        which = shown[start : start + _CHUNK]
+        normals = fragment_normals(scene, raster, which)
+        points = fragment_positions(scene, raster, which) if scene.local else None
+        near = np.zeros(len(which), dtype=bool)
+        for light in (light for light in scene.lights if light.is_on):
+            direction = np.broadcast_to(light.towards(points), normals.shape)
+            near |= np.abs(np.einsum("ij,ij->i", normals, direction)) <= BORDER
+            if steps:
+                halfway = halfway_vector(direction, scene.view_vectors(points))
+                near |= np.abs(np.einsum("ij,ij->i", normals, halfway)) <= BORDER
+        mask[raster.pixel[which]] = near
+    return mask.reshape(scene.height, scene.width)
