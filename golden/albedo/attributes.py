@@ -141,9 +141,7 @@ class Attributes:
         """
         bits = weight.format.fraction_bits
         code = weight.codes & ((1 << bits) - 1)
-        shift = np.full(code.shape, self.SHIFTS)
-        for k in reversed(range(self.SHIFTS)):
-            shift[code >> (bits - 1 - k) > 0] = k
+        shift = np.minimum(bits - np.frexp(code.astype(np.float64))[1].astype(np.int64), self.SHIFTS)
         normal = (code << shift) & ((1 << (bits - 1)) - 1)
         fraction_bits = bits - 1 - self.TABLE_BITS
         entry = normal >> fraction_bits
