@@ -5,6 +5,7 @@ from typing import cast
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import SpanAttributes
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import SpanVectors
 
@@ -33,6 +34,8 @@ class Spans:
     vectors : SpanVectors, optional
         Vectors at the first pixel and their step, for methods that read no normals, see
         `QuotientInterpolator`.
+    attributes : SpanAttributes, optional
+        Vertex colours and texture coordinates, for a design with an albedo.
 
     Raises
     ------
@@ -49,6 +52,7 @@ class Spans:
     values: SpanValues | None = None
     factors: np.ndarray | None = None
     vectors: SpanVectors | None = None
+    attributes: SpanAttributes | None = None
 
     def __post_init__(self) -> None:
         material = np.asarray(self.material)
@@ -68,9 +72,11 @@ class Spans:
         chosen = {name: getattr(self, name)[which] for name in fields}
         factors = self.factors if self.factors is None else self.factors[which]
         found = Spans(**chosen, values=values, factors=factors)
-        return (
-            found if self.vectors is None else replace(found, vectors=cast(SpanVectors, self.vectors[which]))
-        )
+        if self.vectors is not None:
+            found = replace(found, vectors=cast(SpanVectors, self.vectors[which]))
+        if self.attributes is not None:
+            found = replace(found, attributes=cast(SpanAttributes, self.attributes[which]))
+        return found
 
 
 @dataclass(frozen=True)

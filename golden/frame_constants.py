@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import LoadedTextures, TextureDescriptor
 from blysk.golden.lighting.intensity import MAX_INTENSITY, MAX_LIGHTS, Intensity
 from blysk.golden.lighting.lobe import LobeTable
 from blysk.golden.number.fixed import Format
@@ -18,6 +20,7 @@ __all__ = [
     "AXES_ADDRESS",
     "AXIS_STRIDE",
     "BANK_ADDRESS",
+    "EMISSION_ADDRESS",
     "FIELDS_OF_A_FRAME",
     "FIELDS_OF_A_LIGHT",
     "LIGHT_STRIDE",
@@ -25,7 +28,11 @@ __all__ = [
     "MATERIAL_ADDRESS",
     "MAX_MATERIALS",
     "NOT_READ",
+    "TEXELS_ADDRESS",
+    "TEXEL_ADDRESS",
+    "TEXTURE_ADDRESS",
     "THRESHOLD_ADDRESS",
+    "TINTED_ADDRESS",
     "UNIT_VECTORS",
     "FrameConstants",
     "LightMeanings",
@@ -36,6 +43,18 @@ __all__ = [
 
 FIELDS_OF_A_FRAME = {"exponent": (0, 1), "ambient": (1, 3)}
 """First address and number of words of each field that a frame has once."""
+
+EMISSION_ADDRESS = 8
+"""First address of the emission, red green blue, in a pipeline with an albedo."""
+
+TINTED_ADDRESS = 11
+"""Address that tells whether a material is tinted, in a pipeline with tints."""
+
+TEXTURE_ADDRESS = 12
+"""First of two addresses of a material's texture, in a pipeline with textures; `TextureDescriptor.words`."""
+
+TEXELS_ADDRESS, TEXEL_ADDRESS = 14, 15
+"""Addresses that load texels, see `LoadedTextures.writes`: of an index, and of a value behind it."""
 
 FIELDS_OF_A_LIGHT = {"direction": (0, 3), "halfway": (3, 3), "diffuse": (6, 3), "specular": (9, 3)}
 """First address, from ``(light + 1) * LIGHT_STRIDE`` on, and number of words of each field of a light."""
@@ -98,6 +117,14 @@ class FrameConstants:
         Axes of the frame of each further light, in the frame of the first light, ``SQ(1, 17)``. The rows are
         x, y, z; with highlights of R·V x, ``y cos a``, z; without highlights z alone. For a renderer of
         triangles whose method takes vectors.
+    emission : int array, shape (3,), optional
+        Emission, ``UQ(11, 6)`` in LSB, for a design with an albedo.
+    tinted : bool, optional
+        Whether the material is tinted, for a design with tints.
+    texture : TextureDescriptor, optional
+        Texture of the material, for a design with textures.
+    texels : LoadedTextures, optional
+        Contents of the texel memory. Only the constants of the first material have them.
     """
 
     exponent: int
@@ -110,6 +137,10 @@ class FrameConstants:
     bank: int = 0
     threshold: int | None = None
     axes: np.ndarray | None = None
+    emission: np.ndarray | None = None
+    tinted: bool | None = None
+    texture: TextureDescriptor | None = None
+    texels: LoadedTextures | None = None
 
     @property
     def table(self) -> LobeTable:
@@ -240,6 +271,13 @@ class FrameConstants:
             beats = self.lobe.writes(self.bank)
             address += [LOBE_ADDRESS] * len(beats["value"])
             data += (beats["value"] | beats["begins"] << 17).tolist()
+        for first, words in self._albedo_words:
+            address += range(first, first + len(words))
+            data += words
+        if self.texels is not None:
+            beats = self.texels.writes()
+            address += np.where(beats["begins"], TEXELS_ADDRESS, TEXEL_ADDRESS).tolist()
+            data += beats["value"].tolist()
         for light in range(len(self.direction)):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():
@@ -250,6 +288,18 @@ class FrameConstants:
             address += [base + AXIS_STRIDE * row + k for row in range(len(rows)) for k in range(3)]
             data += np.ravel(rows).tolist()
         return {"address": np.array(address), "data": np.array(data) & 0x3FFFF}
+
+    @property
+    def _albedo_words(self) -> list[tuple[int, list[int]]]:
+        """First address and words of each constant of a design with an albedo."""
+        found: list[tuple[int, list[int]]] = []
+        if self.emission is not None:
+            found.append((EMISSION_ADDRESS, self.emission.tolist()))
+        if self.tinted is not None:
+            found.append((TINTED_ADDRESS, [int(self.tinted)]))
+        if self.texture is not None:
+            found.append((TEXTURE_ADDRESS, list(self.texture.words)))
+        return found
 
 
 def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
@@ -271,6 +321,11 @@ _MEANINGS = {
     "lobe": "next value of a table, UQ(0, 17); with bit 17 set, number of the bank whose table begins",
     "threshold": "of the table: where its highlight ends; {threshold}",
     "bank": "bank of the material's table",
+    "emission": "emission of the material, red green blue, UQ(11, 6)",
+    "tinted": "1: the albedo multiplies the specular sum of the material, too",
+    "texture": "texture of the material: sizes, wrap and filter; base",
+    "texels": "index from which the texels written next begin, in pairs of words",
+    "texel": "next half of a word of texels",
     "diffuse": "diffuse colour, red green blue, UQ(11, 6)",
     "specular": "specular colour, red green blue, UQ(11, 6)",
 }
@@ -317,6 +372,7 @@ def address_table(
     loads_tables: bool = False,
     of_a_light: LightMeanings = UNIT_VECTORS,
     axes: Sequence[str] = (),
+    albedo: Albedo | None = None,
 ) -> list[str]:
     """Lines of text with the address and format of every frame constant of a pipeline.
 
@@ -334,6 +390,8 @@ def address_table(
         Words for L and H, see `Interpolator.light_meanings`.
     axes : sequence of str
         Names of the axes that each further light has, see `FrameConstants.axes`.
+    albedo : Albedo or None
+        Albedo path of the design.
     """
     vectors = {name: f"{text}, SQ(1, 17)" for name, text in of_a_light.texts.items()}
     meanings = _MEANINGS | vectors
@@ -346,6 +404,13 @@ def address_table(
         rows.append((BANK_ADDRESS, 1, "bank"))
     if threshold is not None:
         rows.append((THRESHOLD_ADDRESS, 1, "threshold"))
+    if albedo is not None:
+        rows.append((EMISSION_ADDRESS, 3, "emission"))
+        if albedo.tints:
+            rows.append((TINTED_ADDRESS, 1, "tinted"))
+        if albedo.texture is not None:
+            rows.append((TEXTURE_ADDRESS, 2, "texture"))
+            rows += [(TEXELS_ADDRESS, 1, "texels"), (TEXEL_ADDRESS, 1, "texel")]
     for light in range(lights):
         base = (light + 1) * LIGHT_STRIDE
         rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]

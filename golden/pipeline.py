@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.beats import Pixels, Spans
 from blysk.golden.build import Build
 from blysk.golden.cosines.quotient_spans import QuotientSpans
@@ -57,6 +58,8 @@ class ShadingPipeline:
         Indices, in ascending order, of the lights that fade by their distance or as a spot. A factor
         multiplies the specular term of each. For methods that take values, with specular light. Other lights
         need no hardware for a factor.
+    albedo : Albedo or None
+        Albedo path: each pixel has a colour of the surface, of vertex colours and textures. ``None``: none.
     transfer : str
         Codes of the pixels: ``"linear"`` light, or encoded by the curve of ``"srgb"``, see `Transfer`.
     build : Build
@@ -73,7 +76,8 @@ class ShadingPipeline:
         - a lobe takes 1 - N·H with other than 25 fraction bits;
         - the method has a scale, and there is no lobe;
         - factors are not different lights in order, or lack specular light or a method that takes values;
-        - the transfer is unknown.
+        - the transfer is unknown;
+        - the albedo has tints, and there is no specular light.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -88,6 +92,7 @@ class ShadingPipeline:
     y_bits: int = 12
     length_bits: int = 12
     factors: tuple[int, ...] = ()
+    albedo: Albedo | None = None
     transfer: str = "linear"
     build: Build = field(default_factory=Build)
 
@@ -109,6 +114,8 @@ class ShadingPipeline:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
         if self.transfer not in TRANSFERS:
             raise ValueError(f"transfer must be one of {', '.join(TRANSFERS)}, not {self.transfer!r}")
+        if self.albedo is not None and self.albedo.tints and not (self.specular and self.lights):
+            raise ValueError("an albedo with tints needs specular light")
         object.__setattr__(self, "factors", tuple(self.factors))
         if self.factors:
             self._check_factors()
@@ -260,19 +267,21 @@ class ShadingPipeline:
         span, step = pixels_of(length)
         color = np.empty((len(span), 3), dtype=np.int64)
         out_of_range = 0
-        if self.lights:
+        if self.lights or self.albedo:
             lit = self.lit_spans(spans, constants)[kept] if self.gate else None
             shown, first = replace(spans[kept], length=length), 0
             for part in runs_of(length):
-                operands = self.operands(shown[part], constants[0])
+                operands = self._operands(shown[part], constants[0])
                 pixels = slice(first, first + len(operands.cosine.codes))
+                albedo = self._albedo_of(shown[part], constants)
                 material = spans.material[kept][span[pixels]]
                 dark = np.zeros(operands.cosine.shape, dtype=bool) if lit is None else ~lit[span[pixels]]
                 for index in np.unique(material):
                     which = np.flatnonzero(material == index)
                     terms = operands.cosine[which], operands.highlight[which], dark[which]
                     factor = operands.factor[which] if operands.factor is not None else None
-                    color[pixels][which] = self._shade(*terms, constants[index], factor)
+                    own = albedo[which] if albedo is not None else None
+                    color[pixels][which] = self._shade(*terms, constants[index], factor, own)
                 out_of_range += int(np.count_nonzero(operands.out_of_range))
                 first = pixels.stop
         else:
@@ -306,6 +315,9 @@ class ShadingPipeline:
                 raise ValueError(f"{name} must be 0 to {(1 << bits) - 1}")
         if self.lights:
             self.interpolator.check(spans, self.lights, len(self.factors))
+        if (spans.attributes is None) != (self.albedo is None):
+            has, lack = ("no", "have") if self.albedo is None else ("an", "lack")
+            raise ValueError(f"the design has {has} albedo, and the spans {lack} attributes")
 
     def operands(self, spans: Spans, constants: FrameConstants) -> Operands:
         """Bit-accurate operands of every pixel of spans, each of one pixel or more, in their order."""
@@ -318,20 +330,41 @@ class ShadingPipeline:
         dark: np.ndarray,
         constants: FrameConstants,
         factor: Fixed | None = None,
+        albedo: Fixed | None = None,
     ) -> np.ndarray:
         """Codes of `intensity` for pixels of one material, from operands of shape (pixels, lights)."""
         diffuse_unit = Diffuse(cosine.format)
         dark = dark | diffuse_unit.dark(cosine)
         diffuse = diffuse_unit.compute(cosine)
         specular = Fixed(Intensity.TERM_FORMAT, np.zeros(dark.shape, dtype=np.int64))
-        if self.specular is not None:
+        if self.specular is not None and self.lights:
             specular = self.specular.compute(highlight, dark, constants.highlight)
         if factor is not None:
             codes = specular.codes.copy()
             fading = list(self.factors)
             codes[:, fading] = Factor().compute(specular[:, fading], factor).codes
             specular = Fixed(specular.format, codes)
-        return self.intensity.compute(*self._colors(constants), diffuse, specular)
+        colors = self._colors(constants)
+        if albedo is None:
+            return self.intensity.compute(*colors, diffuse, specular)
+        emission = np.zeros(3, dtype=np.int64) if constants.emission is None else constants.emission
+        colored = albedo, Fixed(Intensity.COLOR_FORMAT, emission), bool(constants.tinted)
+        return self.intensity.compute(*colors, diffuse, specular, *colored)
+
+    def _operands(self, spans: Spans, constants: FrameConstants) -> Operands:
+        """Operands of every pixel; of a pipeline without lights those of no light."""
+        if self.lights:
+            return self.operands(spans, constants)
+        none = Fixed(Intensity.TERM_FORMAT, np.zeros((int(spans.length.sum()), 0), dtype=np.int64))
+        return Operands(none, none, np.zeros(0, dtype=bool))
+
+    def _albedo_of(self, spans: Spans, constants: Sequence[FrameConstants]) -> Fixed | None:
+        """Albedo of every pixel of spans of a pixel or more; ``None`` without albedo."""
+        if self.albedo is None or spans.attributes is None:
+            return None
+        textures = [of.texture for of in constants if of.texture is not None]
+        given = spans.attributes, spans.length, spans.material, textures, constants[0].texels
+        return self.albedo.compute(*given)
 
     def _ambient(self, constants: Sequence[FrameConstants], material: np.ndarray) -> np.ndarray:
         """Codes of `intensity` for pixels by their materials, without any light."""
@@ -353,6 +386,8 @@ class ShadingPipeline:
             self.lights,
             has_specular=self.specular is not None,
             channels=1 if self.grey else 3,
+            has_albedo=self.albedo is not None,
+            tints=self.albedo is not None and self.albedo.tints,
             fraction_bits=0 if self.transfer == "linear" else Transfer.OPERAND_FORMAT.fraction_bits,
         )
 

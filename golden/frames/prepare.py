@@ -9,6 +9,7 @@ from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import cutter_of
 from blysk.golden.frames.local import line_ends, local_operands
+from blysk.golden.frames.surface import check_albedo, span_attributes, with_albedo
 from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.unit_vector import quantise
@@ -100,7 +101,10 @@ def spans_for(scene: Scene, cut: Raster, design: ShadingPipeline) -> Spans:
     design : ShadingPipeline
         The pipeline.
     """
-    return design.interpolator.filled(_Filler(scene, cut, design))
+    spans = design.interpolator.filled(_Filler(scene, cut, design))
+    if design.albedo is None:
+        return spans
+    return replace(spans, attributes=span_attributes(scene, cut, design.albedo))
 
 
 @dataclass(frozen=True)
@@ -168,8 +172,9 @@ def constants_of(scene: Scene, design: ShadingPipeline) -> list[FrameConstants]:
     ------
     ValueError
         If the scene has more lights or another number of materials than the design, or more lobes than banks.
-        If a term is brighter than 8.
+        If a term is brighter than 8. If the design does not show the colours of the surface.
     """
+    check_albedo(scene, design)
     if len(scene.materials) != design.materials:
         raise ValueError(f"the pipeline has {design.materials} materials, the scene {len(scene.materials)}")
     constants = [
@@ -177,6 +182,8 @@ def constants_of(scene: Scene, design: ShadingPipeline) -> list[FrameConstants]:
         for index in range(design.materials)
     ]
     constants = design.interpolator.constants_for(scene, constants)
+    if design.albedo is not None:
+        constants = with_albedo(constants, scene, design)
     return with_tables(constants, scene.materials, design) if design.loads_tables else constants
 
 

@@ -202,7 +202,9 @@ def verilog_and_unit(
     renderer = core.model if isinstance(core, RendererUnit) else None
     axes = [f"axis {axis}" for axis in renderer.axes] if renderer else []
     counts = p.lights, p.materials, p.banks
-    constants = address_table(*counts, p.threshold_format, loads, p.interpolator.light_meanings, axes)
+    constants = address_table(
+        *counts, p.threshold_format, loads, p.interpolator.light_meanings, axes, p.albedo
+    )
     if isinstance(core, GeometryUnit):
         lines = _geometry_header(core)
     else:

@@ -1,8 +1,13 @@
 """Codes of a scene's constants, and the beats that write them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.frame_constants import (
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
@@ -17,6 +22,7 @@ from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import Texture
 
 TRIANGLE = Mesh(
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), np.tile([0.0, 0, 1], (3, 1))
@@ -217,6 +223,24 @@ def test_writes_of_a_material_begin_with_its_index():
             np.testing.assert_array_equal(writes[name][1:], plain[name])
     # No other constant has the address.
     assert MATERIAL_ADDRESS not in plain["address"]
+
+
+def test_writes_and_address_table_of_an_albedo():
+    """Each word of an albedo's constants has a line; other designs have neither."""
+    rng = np.random.default_rng(6)
+    plain = FrameConstants(7, rng.integers(0, 2**17, 3), *rng.integers(0, 2**17, (4, 2, 3)))
+    texels = TexelMemory(4).load([Texture(np.ones((2, 2, 3)))])
+    constants = replace(
+        plain, emission=np.array([5, 6, 7]), tinted=True, texture=texels.descriptors[0], texels=texels
+    )
+    writes, others = constants.writes(), plain.writes()
+    new = ~np.isin(writes["address"], others["address"])
+    assert writes["address"][new].tolist() == [8, 9, 10, 11, 12, 13, 14, *[15] * 16]
+    assert writes["data"][new][:5].tolist() == [5, 6, 7, 1, 1 | 1 << 4]
+    np.testing.assert_array_equal(writes["data"][~new], others["data"])
+    albedo = Albedo(texture=TextureSampler(), tints=True)
+    more = [line for line in address_table(2, albedo=albedo) if line not in address_table(2)]
+    assert [int(line.split()[0]) for line in more] == [8, 11, 12, 14, 15]
 
 
 @pytest.mark.parametrize("lights", [1, 16])

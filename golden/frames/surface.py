@@ -1,0 +1,198 @@
+"""Attributes of spans, and constants of materials, for a design with an albedo."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.attribute_spans import SpanAttributes
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_sampler import TextureSampler
+from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.intensity import Intensity
+from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.raster import Raster
+from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import Texture
+
+__all__ = ["albedo_of", "check_albedo", "design_for", "span_attributes", "with_albedo"]
+
+_WHITE = Texture(np.ones((1, 1, 3)), filter="nearest")
+"""Texture of materials that have none."""
+
+_LEAST_DEPTH = 1536
+"""Words of a bank that hold 64x64 texels and their levels."""
+
+
+def albedo_of(scene: Scene) -> Albedo | None:
+    """The albedo path that a scene needs; ``None`` if its surface has neither vertex colours nor textures.
+
+    The depth of the texel memory is the least that holds the textures, of 1536 words times a power of 4.
+    """
+    if not scene.has_albedo:
+        return None
+    texture = None
+    if scene.textures:
+        bilinear = any(of.filter == "bilinear" for of in scene.textures.values())
+        largest = TexelMemory(TexelMemory.LARGEST)
+        words, depth = len(largest.load(_textures(scene)).codes), _LEAST_DEPTH
+        while depth < words:
+            depth *= 4
+        texture = TextureSampler(TexelMemory(min(depth, TexelMemory.LARGEST)), bilinear=bilinear)
+    return Albedo(
+        colors=bool(scene.mesh.colors.size),
+        texture=texture,
+        perspective=scene.camera.projection == "perspective",
+        tints=any(of.tinted for of in scene.materials),
+    )
+
+
+def design_for(design: ShadingPipeline, scene: Scene, scaled: bool = True) -> ShadingPipeline:
+    """The same design for the materials, vertex colours and textures of a scene.
+
+    Parameters
+    ----------
+    design : ShadingPipeline
+        The design.
+    scene : Scene
+        The scene.
+    scaled : bool
+        As for `ShadingPipeline.for_materials`.
+
+    Raises
+    ------
+    ValueError
+        If the textures do not fit the largest texel memory.
+    """
+    albedo = albedo_of(scene)
+    if albedo is not None and not (design.specular and design.lights):
+        albedo = replace(albedo, tints=False)
+    return replace(design.for_materials(scene.materials, scaled), albedo=albedo)
+
+
+def check_albedo(scene: Scene, design: ShadingPipeline) -> None:
+    """Refuse a scene whose surface has colours that the design cannot show.
+
+    Raises
+    ------
+    ValueError
+        If the design lacks what the scene needs.
+    """
+    albedo = design.albedo
+    tinted = any(of.tinted for of in scene.materials) and bool(design.specular and design.lights)
+    for what, needed, there in (
+        ("vertex colours", bool(scene.mesh.colors.size), albedo is not None and albedo.colors),
+        ("textures", bool(scene.textures), albedo is not None and albedo.texture is not None),
+        ("a tinted material", scene.has_albedo and tinted, albedo is not None and albedo.tints),
+    ):
+        if needed and not there:
+            raise ValueError(f"the scene has {what}, and the design does not: make it with design_for")
+    perspective = scene.camera.projection == "perspective"
+    if albedo is not None and albedo.perspective != perspective:
+        its = "perspective" if albedo.perspective else "orthographic"
+        raise ValueError(f"the albedo of the design is {its}, and the camera is not: make it with design_for")
+
+
+def with_albedo(
+    constants: Sequence[FrameConstants], scene: Scene, design: ShadingPipeline
+) -> list[FrameConstants]:
+    """Frame constants with emission, tint, texture and texels, for a design with an albedo.
+
+    Parameters
+    ----------
+    constants : sequence of FrameConstants
+        Constants of each material.
+    scene : Scene
+        Materials and textures. Without an albedo its emission is in the ambient colours.
+    design : ShadingPipeline
+        The pipeline.
+
+    Raises
+    ------
+    ValueError
+        If textures do not fit, or the light on a surface is over the limit of `Intensity`.
+    """
+    albedo = design.albedo
+    assert albedo is not None
+    found = []
+    for index, (of, material) in enumerate(zip(constants, scene.materials, strict=True)):
+        tinted = material.tinted and scene.has_albedo
+        most = of.ambient + of.diffuse.sum(axis=0) + (of.specular.sum(axis=0) if tinted else 0)
+        if most.max() > Intensity.SURFACE_FORMAT.max_code:
+            raise ValueError(
+                f"the lights of material {index} add up to {most.max() / (255 << 6):.3g} times the full "
+                "channel, and a surface with an albedo takes 16: lower the light"
+            )
+        emission = Intensity.color(np.array(material.emission if scene.has_albedo else (0, 0, 0)))
+        found.append(replace(of, emission=emission, tinted=tinted if albedo.tints else None))
+    if albedo.texture is not None:
+        loaded = albedo.texture.memory.load(_textures(scene))
+        found = [replace(of, texture=its) for of, its in zip(found, loaded.descriptors, strict=True)]
+        found[0] = replace(found[0], texels=loaded)
+    return found
+
+
+def _textures(scene: Scene) -> list[Texture]:
+    """Texture of each material."""
+    return [scene.textures.get(index, _WHITE) for index in range(len(scene.materials))]
+
+
+def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes:
+    """Attributes of spans at their ends, quantised.
+
+    Parameters
+    ----------
+    scene : Scene
+        Mesh, materials and camera.
+    cut : Raster
+        Spans, with their weights; with the levels of textures that have several.
+    albedo : Albedo
+        The albedo path.
+
+    Raises
+    ------
+    ValueError
+        If spans have to be cut for `SpanAttributes.quantise`.
+    """
+    mesh = scene.mesh
+    corners, material = mesh.faces[cut.triangle], mesh.material[cut.triangle]
+    level, periodic, size = _places(scene, cut, material)
+    weights = cut.weights_left, cut.weights_right
+    nearness = tuple(of.sum(axis=1) for of in weights)
+    ends = []
+    for of, total in zip(weights, nearness, strict=True):
+        share = of / total[:, np.newaxis]
+        parts = []
+        if albedo.colors:
+            given = mesh.colors[corners] if mesh.colors.size else np.ones((len(corners), 3, 3))
+            parts.append(np.clip(np.einsum("sn,snk->sk", share, given), 0, 1))
+        if albedo.texture is not None:
+            given = mesh.coordinates[corners] if mesh.coordinates.size else np.zeros((len(corners), 3, 2))
+            parts.append(np.einsum("sn,snk->sk", share, given) * size)
+        ends.append(np.concatenate(parts, axis=1))
+    left, right = ends
+    return SpanAttributes.quantise(
+        albedo.spans,
+        left,
+        right,
+        cut.length,
+        weights=(nearness[0], nearness[1]) if albedo.perspective else None,
+        level=level,
+        periodic=periodic,
+    )
+
+
+def _places(scene: Scene, cut: Raster, material: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Level of each span; whether u and v repeat, and the texels of the level, each of shape (spans, 2)."""
+    level = np.zeros(len(material), dtype=np.int64)
+    periodic = np.ones((len(material), 2), dtype=bool)
+    size = np.zeros((len(material), 2))
+    for index, texture in scene.textures.items():
+        own = material == index
+        if texture.mipmapped:
+            level[own] = cut.level[own]
+        periodic[own] = [wrap != "clamp" for wrap in texture.wrap]
+        sides = np.array([image.shape[1::-1] for image in texture.levels])
+        size[own] = sides[level[own]]
+    return level, periodic, size
