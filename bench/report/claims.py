@@ -37,14 +37,16 @@ class Claim:
     quantity : str
         The measured quantity, with its unit behind a comma. With the unit % the function gives a share of 1.
     function : callable, optional
-        Measures the quantity, see `Task`. Its result is a number, a text, a dictionary, or two numbers: by
-        the document's own statement, and as measured. ``None``: nothing is measured.
+        Measures the quantity, see `Task`. Its result is a number, a text, a dictionary, or two numbers. Two
+        numbers are the value by the document's statement and the measured value. ``None``: nothing is
+        measured.
     settings : dict
         Arguments of the function.
     key : str
         Key of the quantity in a dictionary.
     printed : str
-        Printed value, digit by digit. Empty: there is none, or the function computes it.
+        Printed value, digit by digit. Empty if nothing is printed, or if the function computes the printed
+        value.
     holds : callable
         Whether a value is as printed. Two computed values are held to `AGREEMENT`.
     ours : str
@@ -93,7 +95,7 @@ class Claim:
 
 
 def measured(claims: Sequence[Claim]) -> list[Any]:
-    """Results of claims with a function. Each is measured now, once."""
+    """Results of claims with a function. Each quantity is measured once, now."""
     tasks = {_identity(claim.task): claim.task for claim in claims}
     found = {identity: task.run() for identity, task in tasks.items()}
     return [found[_identity(claim.task)] for claim in claims]
@@ -108,7 +110,7 @@ class ClaimTable:
     name, title, note : str
         As for `Table`.
     claims : callable
-        Claims of a quick report or of a full one.
+        Function that gives the claims of a quick report or of a full report.
     further : dict of str to str
         Headings of further columns, each with its key in the results.
     """
@@ -148,7 +150,7 @@ class Plot:
     Parameters
     ----------
     tasks : callable
-        Measurements of a quick report or of a full one.
+        Function that gives the measurements of a quick report or of a full report.
     draw : callable
         Makes the drawing from their results.
     """

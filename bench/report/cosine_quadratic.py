@@ -41,7 +41,10 @@ MODELS = {"f2": "cosquad", "fQ (Q = 0.64)": "cosquad_q", "fQ2": "cosquad_lin"}
 _RELATED = ("cosquad7", "coscos2", "coscos4")
 
 _X = np.linspace(0, 30, 6001)
-"""``n (1 - cos gamma)``. The models depend on almost nothing else. Above 30 Blinn's model is under 1e-13."""
+"""Values of ``n (1 - cos gamma)``.
+
+The models depend on almost nothing else. Above 30 Blinn's model is under 1e-13.
+"""
 
 
 def errors(model: str) -> dict[str, Any]:

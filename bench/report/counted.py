@@ -1,4 +1,4 @@
-"""Costs of ways in software: operations counted while they run, and their least times."""
+"""Costs of ways in software: operations, counted while the ways run, and the least times of the ways."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -72,7 +72,7 @@ class Counted(np.ndarray):
 def fastest(actions: Sequence[Callable[[], Any]], repeats: int) -> list[float]:
     """Least processor time of each of several actions, in seconds. They run in turn, in the same minutes.
 
-    The time is of all threads, as if they shared one core. Other processes do not count.
+    The time is the sum over all threads. Other processes do not count.
 
     Parameters
     ----------

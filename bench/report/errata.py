@@ -83,7 +83,7 @@ def arccos_rows() -> float:
 
 
 def arccos_at_one() -> Pair:
-    """Largest error in rad near x = 1: of a quadratic in x, and of a quadratic times the root of 1 - x."""
+    """Largest error in rad near x = 1 of a quadratic in x, and of a quadratic times the root of 1 - x."""
     x = 1 - np.geomspace(1e-12, 0.04, 4001)
     error = np.polynomial.polynomial.polyval(x, Arccos("corrected").coefficients[4]) - np.arccos(x)
     # The well-posed form, over the same x.
@@ -186,7 +186,7 @@ def flat_picture() -> Pair:
     reference[0, 0] = 200
     reference[0, 1] = 0
     image = reference + 1
-    # The mean is 100: all but two values are at it.
+    # The mean is 100. All values but two equal the mean.
     return mnse_published(image, reference)[1], float(np.isfinite(nmse(image, reference)))
 
 

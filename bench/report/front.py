@@ -234,7 +234,7 @@ def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Dra
             xs = [corners[0][0], *(x for x, _ in corners), max(of[key][1] for of in drawn)]
             ys = [max(of[kind][1] for of in drawn), *(y for _, y in corners), corners[-1][1]]
             panel.step(xs, ys, where="post", color="#1c2126", linewidth=1.2, zorder=0)
-        # Room for labels below the most exact ones.
+        # Room for labels below the most exact designs.
         panel.set_ylim(bottom=max(min(of[kind][1] for of in drawn), _LEAST_LSB) / 4)
         _ticks(panel, in_ns)
     axes[0].set_ylabel("largest error over all scenes, LSB of 8 bits")
@@ -305,7 +305,7 @@ def _short(of: Mapping[str, Any]) -> str:
 
 
 def _named(found: Sequence[Mapping[str, Any]], on: Container[str], kind: str) -> list[Mapping[str, Any]]:
-    """Designs with a label, the more important first: the front, then each method's best and worst."""
+    """Designs with a label, most important first: the front, then each method's best and worst design."""
     chosen = sorted((of for of in found if of["label"] in on), key=lambda of: of[kind][1])
     for method in dict.fromkeys(of["method"] for of in found):
         own = sorted((of for of in found if of["method"] == method), key=lambda of: of[kind][1])

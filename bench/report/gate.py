@@ -64,7 +64,7 @@ EXPONENTS = (2, 10, 50, 200, 1000)
 
 @dataclass(frozen=True)
 class Shares:
-    """Spans and pixels of a frame that the gate keeps from the specular unit, and their upper limits.
+    """Spans and pixels of a frame that the gate keeps away from the specular unit, and their upper limits.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def frames(
 
 
 def same_pixels(run: Run, expected: Pixels) -> bool:
-    """Whether a run's pixels are the expected ones in order: coordinates, colour, mark of a span's end."""
+    """Whether a run's pixels are as expected, in order: coordinates, colour, mark of a span's end."""
     fields = {name: getattr(expected, name) for name in ("x", "y", "last")}
     fields |= {name: expected.color[:, channel] for channel, name in enumerate("rgb")}
     return all(np.array_equal(run.beats[name], codes) for name, codes in fields.items())

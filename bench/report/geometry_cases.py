@@ -123,7 +123,10 @@ def _scene(
 
 
 def _fan(degrees: float) -> np.ndarray:
-    """Normals of three corners: the first two half of the angle to the left and the right, one upright."""
+    """Normals of three corners.
+
+    Two are turned by half of the angle to the left and to the right. The third is upright.
+    """
     half = np.radians(degrees) / 2
     return np.array([(-np.sin(half), 0, np.cos(half)), (np.sin(half), 0, np.cos(half)), (0, 0.1, 1)])
 
@@ -157,7 +160,7 @@ def _smallest(rng: np.random.Generator) -> Scene:
     """Triangles with corners on neighbouring points of the grid, about a pixel's centre."""
     count, step = 400, 1 / 256
     centre = rng.permuted(np.stack(np.meshgrid(*2 * [np.arange(-30, 30)]), axis=-1).reshape(-1, 2))[:count]
-    # The centre is the corner between the left and the top edge.
+    # The pixel's centre is the corner between the left and the top edge.
     points = (centre + 0.5)[:, np.newaxis] + np.array([(0, 0), (0, -1), (1, 0)]) * step
     vertices = np.concatenate([points, np.zeros((count, 3, 1))], axis=2).reshape(-1, 3)
     return _scene(64, 64, vertices, _facing(rng, 3 * count), np.arange(3 * count).reshape(-1, 3))

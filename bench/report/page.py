@@ -117,7 +117,7 @@ def embedded(value: Any) -> str:
 
 
 def without_pictures(value: Any) -> Any:
-    """Figures without their pictures, which the page holds already."""
+    """Figures without their pictures, because the page already has the pictures."""
     if isinstance(value, Mapping):
         return {
             key: without_pictures(item)

@@ -37,9 +37,9 @@ class Perceived:
     Parameters
     ----------
     flip_p99, flip_max : float
-        99th percentile (linear between neighbours) and largest of the FLIP map, 0 to 1.
+        99th percentile (linear between neighbours) and largest value of the FLIP map, 0 to 1.
     ciede2000_p99, ciede2000_max : float
-        99th percentile and largest CIEDE2000 colour difference of a pixel.
+        99th percentile and largest value of the pixels' CIEDE2000 colour difference.
     """
 
     flip_p99: float

@@ -50,8 +50,9 @@ PIXELS = 1 << 14
 _EXPONENT = 50
 
 
-# The ways in software: cosine of the highlight of a pixel from unit vectors N, L and V, as arrays of three
-# rows, and of the diffuse term; then the power. What is the same for a whole frame has one column.
+# The ways in software. From unit vectors N, L and V, as arrays of three rows, a way computes the cosines of
+# the highlight and of the diffuse term of a pixel, and then the power. A vector that is the same for a whole
+# frame has one column.
 
 
 def _halfway(light: np.ndarray, viewer: np.ndarray) -> np.ndarray:
@@ -122,7 +123,7 @@ def operations(way: str, local: bool) -> dict[str, float]:
 
 
 def shading_times(local: bool, repeats: int) -> dict[str, float]:
-    """Share of the time of Phong's vector R that each way saves on the same pixels, in one run.
+    """Share of the time of Phong's way with the vector R that each way saves on the same pixels, in one run.
 
     Parameters
     ----------

@@ -84,9 +84,11 @@ _BEST_MODEL = "blinn"
 
 QUICK_SIMULATED = [(method, model_of(method)) for method in (*METHODS, *PUBLISHED)]
 QUICK_SIMULATED += [("quotient", "phong")]
-"""Designs that the quick report simulates: one pipeline of every method, and true Phong. The others have
-frames of the bit-accurate model, and the cycles of the same method with the same spans, plus the difference
-of latency."""
+"""Designs that the quick report simulates: one pipeline of every method, and true Phong.
+
+The other designs have frames of the bit-accurate model. Their cycles are the cycles of the same method with
+the same spans, plus the difference of latency.
+"""
 
 _SPREAD_MODELS = ("cosquad", "exp", "blinn", "blinn_product", "phong")
 """Models of the designs that are measured over several scenes."""
@@ -98,11 +100,11 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        A teapot of 992 triangles at 160x120 and exponent 100; the designs of `QUICK_SIMULATED` are simulated,
-        the others computed by the bit-accurate model; clock rates are the committed ones (`placed`). If not
-        quick, a teapot of 10,712 triangles at 640x480 and all `EXPONENTS`; every design is simulated, and
-        placed and routed if the tools are installed. Without a C++ compiler nothing is simulated. Further
-        scenes: see `front_scenes`.
+        If quick, a teapot of 992 triangles at 160x120 and exponent 100. The designs of `QUICK_SIMULATED` are
+        simulated, and the bit-accurate model computes the other designs. Clock rates are the committed rates
+        (`placed`). If not quick, a teapot of 10,712 triangles at 640x480 and all `EXPONENTS`. Every design is
+        simulated. If the tools are installed, every design is placed and routed. Without a C++ compiler
+        nothing is simulated. Further scenes: see `front_scenes`.
     meshes : sequence of str
         Files of further meshes.
 
@@ -261,7 +263,7 @@ def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, di
 
 
 class _Cycles:
-    """Cycles a pixel of frames: simulated, of a simulated frame of the same method, or modelled."""
+    """Cycles a pixel of frames: simulated, from a frame of the same method, or by the cycle model."""
 
     def __init__(self, tasks: Sequence[Task], results: Sequence[Any], of_design: Mapping[tuple, dict]):
         self._of_design = of_design

@@ -143,7 +143,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
 def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
     """The trade between error and time at a mesh and exponent, in a few sentences.
 
-    The named designs are those that `_is_comparable` accepts.
+    Only designs that `_is_comparable` accepts are named.
     """
     settings = scene[0]["settings"]
     hardware = [point for point in scene if point["group"] != "software"]

@@ -125,14 +125,14 @@ def check_folder(folder: Path) -> None:
     others = [name for name in names if name not in (PAGE, _JSON) and not name.endswith((".csv", ".svg"))]
     if others or (names and not _earlier(folder)):
         reason = f"holds {(others or names)[0]}, which is not part of a report"
-        raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier report")
+        raise InputError(str(folder), reason, "give a new or empty folder, or an earlier report's folder")
 
 
 def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, Any]) -> None:
     """Write the page, a CSV file for each table, an SVG file for each conclusion, and ``report.json``.
 
-    Each file is whole or not there. Tables and drawings of an earlier report that this one does not have are
-    removed from the folder.
+    Each file is whole or not there. Tables and drawings of an earlier report are removed from the folder if
+    this report does not have them.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def write_report(folder: Path, sections: Sequence[Section], about: Mapping[str, 
         }
         for section in sections
     }
-    # First: it tells that the folder is ours.
+    # This file is written first, because it marks the folder as a report's folder.
     mine = [PAGE, _JSON, *files]
     known = list(dict.fromkeys([*mine, *earlier.get("files", ())]))
     write_json(folder / _JSON, {**about, "files": known, "sections": figures})

@@ -115,11 +115,11 @@ class Section:
     parts : sequence of Table, Drawing
         In the order of the page.
     figures : dict
-        Further values for the page's script and other programs; plain values for JSON.
+        Further values for the page's script and other programs. They are plain values for JSON.
     conclusion : Conclusion, optional
         Its conclusion, if the top of the report has one.
     appendix : bool
-        Whether it is only for readers who check the documents, and comes last.
+        Whether the section is only for readers who check the documents. It then comes last.
     """
 
     name: str

@@ -28,7 +28,7 @@ def measure(count: int, meshes: Sequence[str], size: Sequence[int], method: str)
 
 
 def tasks(quick: bool) -> list[Task]:
-    """A task for each number of pipelines; quick ones have small pictures."""
+    """A task for each number of pipelines. Quick tasks have small pictures."""
     counts = (1, 2) if quick else PIPES
     meshes = pipes.MESHES[:2] if quick else pipes.MESHES
     settings = {

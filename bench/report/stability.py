@@ -48,7 +48,10 @@ _MARKS: dict[Grade, Mark] = {"fair": "stated", "bad": "silent"}
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Measurements of every method in every case, and simulated. If quick, `QUICK_SIMULATED` is simulated."""
+    """Measurements of every method in every case, and simulations of every method.
+
+    If quick, only the methods of `QUICK_SIMULATED` are simulated.
+    """
     simulated = QUICK_SIMULATED if quick else METHODS
     settings = [{"method": method} for method in METHODS]
     result = [Task(function, each) for function in (measure, measure_ranges) for each in settings]
@@ -208,7 +211,7 @@ def _range_table(ranges: dict[str, dict]) -> Table:
                 silent = given["silent"] if given["flagged"] < of["spans"] else None
                 cells = [silent, given["flagged"] / of["spans"], prepared["error"]]
                 own = [given["grade"], "", prepared["grade"]]
-            # A span that is not too wide is not cut.
+            # Spans that are not too wide are not cut.
             row += cells if factor > 1 else cells[:2]
             grade += own if factor > 1 else own[:2]
         row += [f"1 to {(1 << LENGTH_BITS) - 1}", f"1 to {MAX_EXPONENT}"]

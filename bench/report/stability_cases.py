@@ -107,7 +107,8 @@ def arcs(
     degrees : array, shape (spans,)
         Angle between the ends.
     at : array, shape (spans,)
-        Place in the span that is nearest to the vector, 0 to 1. Other values lie before or after the span.
+        Place in the span that is nearest to the vector: 0 to 1 inside the span, other values before or after
+        it.
     off : array, shape (spans,)
         Angle, in degrees, between the vector and the span at that place.
 
@@ -243,7 +244,8 @@ def _light_cases(rng) -> Iterator[Case]:
     side = np.array([1.0, 0.0, 0.0])
     for degrees in (1e-3, 20):
         for exponent in (1, 100):
-            # Most normals turn from the light's side, through right angles with it, away.
+            # Most normals begin on the light's side, pass the right angle to the light, and end on the other
+            # side.
             ends = arcs(rng, viewer, np.full(40, degrees))
             light = normalise(side + np.radians(degrees / 8) * viewer)
             name = f"terminator in a span of {degrees:g} degrees, exponent {exponent}"

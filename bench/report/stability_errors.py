@@ -88,7 +88,7 @@ def _design(case: Case, method: str) -> ShadingPipeline:
 
 
 def spans_of(case: Case, design: ShadingPipeline, raster: Raster) -> Spans:
-    """Spans of a case for a design, made by `spans_for` or of the case's own codes."""
+    """Spans of a case for a design, made by `spans_for` or from the case's own codes."""
     if case.codes is None:
         return spans_for(case.scene, raster, design)
     return design.interpolator.filled(_OfCodes(case, design, raster))
@@ -172,7 +172,7 @@ def _shade(case: Case, design: ShadingPipeline, raster: Raster) -> _Shaded:
     direction = np.array([light.direction for light in scene.lights])
     halfway = halfway_vector(direction, scene.camera.viewer)
     cosine, highlight = (normals @ vectors.T for vectors in (direction, halfway))
-    # Where N·L is 0 but for the arithmetic, either side of the terminator is right.
+    # If N·L is 0 except for errors of the arithmetic, both sides of the terminator are right.
     near = np.abs(cosine) <= error + 3 * _STEP
     exact = [
         saturate(
@@ -276,16 +276,16 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
 
     A method serves a span that `cut_spans` leaves whole. A method that takes two normals and has no span
     limit serves spans up to its `Interpolator.widest_span`. Normals have length 1 within `LENGTH_TOLERANCE`.
-    A method that takes vectors gets a span of two pixels as two spans of one.
+    If the method takes vectors, a span of two pixels is divided into two spans of one pixel.
 
     Returns
     -------
     dict
-        ``case``; numbers of ``spans``, of spans ``inside``, which the method serves, and of ``cut`` ones. For
-        the spans as ``given``, and ``prepared``, that is cut if need be, dictionaries of ``error``;
-        ``silent``, the error in spans without a flag; ``safe``, the error in served spans; ``flagged``, the
-        number of flagged spans; ``grade``, and ``safe_grade`` of served spans. ``prepared`` is ``None`` if
-        the case has its own codes.
+        ``case``; number of ``spans``; number of spans ``inside``, which the method serves; number of ``cut``
+        spans. ``given`` and ``prepared`` are dictionaries for the spans as given, and for the spans after
+        cuts. They have ``error``; ``silent``, the error in spans without a flag; ``safe``, the error in
+        served spans; ``flagged``, the number of flagged spans; ``grade``, and ``safe_grade`` of served spans.
+        ``prepared`` is ``None`` if the case has its own codes.
     """
     design = _design(case, method)
     by_angle = design.interpolator.brings_ends and not design.interpolator.curve_is_exact

@@ -173,7 +173,7 @@ def software(way: str, baseline: str, pixels: int, printed: float, repeats: int)
     pair = WAYS[way], WAYS[baseline]
     results = zip(*(one(*operands, pixels) for one in pair), strict=True)
     difference = max(float(np.abs(ours - theirs).max()) for ours, theirs in results)
-    # Several runs at once, so that a time is longer than some microseconds.
+    # Several runs are timed together, so that a time is longer than a few microseconds.
     runs = max(1, 64 // pixels)
     time, baseline_time = fastest(
         [lambda one=one: [_finish(one(*operands, pixels)) for _ in range(runs)] for one in pair], repeats
@@ -189,7 +189,7 @@ def software(way: str, baseline: str, pixels: int, printed: float, repeats: int)
 
 
 def _finish(results: Iterable) -> None:
-    """Run through results without keeping them."""
+    """Compute all results without keeping them."""
     deque(results, maxlen=0)
 
 
@@ -204,7 +204,7 @@ def prices(repeats: int) -> dict[str, float]:
     x = np.random.default_rng(1).uniform(0.5, 1, SPANS)
     actions = {"a multiplication": lambda: x * x, "a division": lambda: x / x}
     actions |= {"a root": lambda: np.sqrt(x), "a cosine": lambda: np.cos(x)}
-    # Many at once, because a single action takes some microseconds.
+    # Many actions are timed together, because a single action takes only microseconds.
     loops = [lambda action=action: [action() for _ in range(100)] for action in actions.values()]
     product, *times = fastest(loops, repeats)
     return {name: time / product for name, time in zip(list(actions)[1:], times, strict=True)}

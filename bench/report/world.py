@@ -95,7 +95,7 @@ def own(method: str, model: str, date: str) -> dict[str, str]:
     method, model : str
         The pipeline.
     date : str
-        Date of its figures. Empty: there are no figures.
+        Date of the pipeline's figures. Empty if there are no figures.
     """
     light = _OWN.get((method, model), "")
     verified = (

@@ -1,11 +1,11 @@
-"""Moves registers into the multipliers and memories beside them: a step on an ECP5 netlist before nextpnr.
+"""Moves registers into the multipliers and memories beside them. It changes an ECP5 netlist before nextpnr.
 
 An ECP5 multiplier, MULT18X18D, has registers for each operand and for the product. A block RAM, DP16KD, has a
 register for the word that it reads. Yosys uses none of these registers. `absorb_registers` takes Yosys's JSON
-netlist and moves flip-flops that are directly before or behind a multiplier, or behind a block RAM, into it.
-It also disconnects the last carry of a chain if the carry has no reader. Else nextpnr would add a pair of
-look-up tables for it. Nothing else of the netlist changes, and its function stays the same in every cycle
-from power-up on.
+netlist. It moves flip-flops directly before or behind a multiplier into the multiplier, and flip-flops behind
+a block RAM into the block RAM. It also disconnects the last carry of a chain if the carry has no reader. Else
+nextpnr would add a pair of look-up tables for it. Nothing else of the netlist changes, and its function stays
+the same in every cycle from power-up on.
 """
 
 from collections import defaultdict
@@ -182,7 +182,10 @@ class _Netlist:
         }
 
     def fits(self, cell: str, controls: set[_Control | None]) -> _Control | None:
-        """Common control of a register's bits. ``None`` if there is none or the clock does not fit."""
+        """Common control of a register's bits.
+
+        ``None`` if the bits differ in it, or the clock does not fit.
+        """
         if len(controls) != 1:
             return None
         (control,) = controls
@@ -271,7 +274,7 @@ class _Netlist:
         return True
 
     def absorb_words(self, cell: str) -> int:
-        """Move the flip-flops behind each read port of a block RAM into it; the number of ports."""
+        """Move the flip-flops behind each read port of a block RAM into it. Returns the number of ports."""
         # A parameter that is left out has its default, 18.
         bits = self.cells[cell].get("parameters", {}).get("DATA_WIDTH_B", f"{_WORD_BITS:b}")
         wide = int(str(bits), 2) == 2 * _WORD_BITS
@@ -330,7 +333,7 @@ class _Netlist:
 
 
 def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict[str, Any], Absorbed]:
-    """Move flip-flops that stand directly beside a multiplier, or behind a block RAM, into its registers.
+    """Move flip-flops directly beside a multiplier, or behind a block RAM, into registers of this cell.
 
     All bits of an operand, or of a product, must be flip-flops of the same clock and enable. They must have
     no reset, be 0 at power-up, and not be at a port of the module. Bits of an operand may also be constant 0.

@@ -1,7 +1,7 @@
 """The table of the units: errors, latency, interval and cost of each variant.
 
 ``blysk blocks`` prints it, from the records of `blysk.bench.units`. Errors come from the bit-accurate models
-and float64 mathematics, times from the units or a simulation of them, parts from their netlists.
+and float64 mathematics. Times come from the units or a simulation of the units. Parts come from the netlists.
 """
 
 from collections.abc import Iterator, Sequence
@@ -198,7 +198,7 @@ def _found(unit: str, variant: str, samples: int, seed: int) -> tuple:
 
 
 def _row(entry: Entry, samples: int, seed: int) -> Row:
-    """Row of an entry, measured in parts whose results are not kept."""
+    """Row of an entry, measured in parts. Of each part only the extreme errors are kept."""
     count, worst = 0, []
     for sample in _chunks(entry, samples, seed):
         count += np.size(sample.found)

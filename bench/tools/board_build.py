@@ -48,8 +48,9 @@ dfflegalize -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r -cell $_DFF
 """Commands of Yosys's step ``map_ffs`` with the limit `_FEWEST`."""
 
 _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
-"""Options of nextpnr. This placer makes the shortest wires. If wires are scarce, nextpnr's other router
-removes as many as it lays, and does not end on a 25F.
+"""Options of nextpnr. This placer makes the shortest wires.
+
+If wires are scarce, nextpnr's other router removes as many wires as it lays. On a 25F it does not end.
 """
 
 _ROUNDS, _FEW = 100, 10
@@ -144,7 +145,7 @@ def _script(draw: float) -> str:
 def _stuck(said: str) -> str:
     """Reason why the router will not end, from its log. Empty while it may end.
 
-    In all runs that ended, the number of wires used twice at least halved when the rounds doubled.
+    In all runs that ended, twice the rounds at least halved the number of wires used twice.
     """
     twice = [int(number) for number in re.findall(r"^Info:\s+iter=\d+ wires=\d+ overused=(\d+)", said, re.M)]
     if len(twice) >= _ROUNDS and twice[-1] >= _FEW and 2 * min(twice) > twice[len(twice) // 2]:
@@ -255,7 +256,7 @@ def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
     """
     kinds = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
     counts = {
-        # A carry cell takes two, a memory of 16 words four.
+        # A carry cell takes two look-up tables, a memory of 16 words takes four.
         "look-up tables": kinds["LUT4"] + 2 * kinds["CCU2C"] + 4 * kinds["TRELLIS_DPR16X4"],
         "flip-flops": kinds["TRELLIS_FF"],
         "block RAMs": kinds["DP16KD"],

@@ -39,7 +39,10 @@ from blysk.sim.errors import InputError
 __all__ = ["BoardTop", "gpu_of", "least_cycles"]
 
 _COMPACT_INTERVAL = 9
-"""Setup interval on a small device; with it ``renormalise`` takes 2 multipliers fewer than with 3."""
+"""Setup interval on a small device.
+
+With it ``renormalise`` takes 2 multipliers fewer than with interval 3.
+"""
 
 MAX_LIGHTS = 4
 """Largest number of lights of a board's scene."""
@@ -56,8 +59,9 @@ def gpu_of(
 ) -> tuple[Gpu, list[Scene]]:
     """The drawing of a mesh on a board, and the scenes of its presets.
 
-    Presets: the material as given, and one with four times the exponent; the lights as given, and turned by a
-    quarter around the upright.
+    The presets combine two materials with two positions of the lights. The materials are the given material,
+    and the same with four times the exponent. The lights are as given, or turned by a quarter around the
+    upright.
 
     Parameters
     ----------
@@ -118,12 +122,12 @@ def _design(settings: Settings, scene: Scene, board: Board) -> ShadingPipeline:
 
 
 def _presets(scene: Scene, up: Any) -> list[Scene]:
-    """Presets of two lights by two materials; the material changes first."""
+    """Presets: two positions of the lights, each with two materials. The material changes first."""
     shiny = tuple(
         replace(material, exponent=min(_SHINIER * material.exponent, MAX_EXPONENT))
         for material in scene.materials
     )
-    # A light may lie along the upright, which turns into itself.
+    # A light may lie along the upright. Turned, it stays where it is.
     quarter = Rotation.from_rotvec(np.pi / 2 * normalise(up))
     lights = tuple(light.turned(quarter.apply) for light in scene.lights)
     return [
@@ -151,7 +155,7 @@ def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer) -> 
 
 
 def least_cycles(drawing: Drawing) -> int:
-    """Least cycles of a frame of a drawing: for its vertices, and for its triangles in every band."""
+    """Least cycles to draw a frame: cycles for its vertices, and for its triangles in every band."""
     return 3 * drawing.mesh.triangles * drawing.bands + 30 * drawing.mesh.vertices
 
 
@@ -163,7 +167,7 @@ class BoardTop(Elaboratable):
     board : Board
         The board.
     gpu : Component
-        A `GpuUnit`, or another component with ``pairs``, and ``buttons`` if it has some.
+        A `GpuUnit`, or another component with ``pairs``, and with ``buttons`` if the top has buttons.
     plan : ClockPlan
         Clocks made from the board's clock.
     """

@@ -29,7 +29,7 @@ class Board:
     buttons : tuple of (str, int)
         Name and number of up to six button resources. The top gives each its meaning.
     luts, block_rams, multipliers : int
-        Parts of its device. The device has as many flip-flops as look-up tables.
+        Parts of the device. It has as many flip-flops as look-up tables.
     lines : int
         Lines of a band, by the memory of the device.
     loader : str

@@ -61,7 +61,7 @@ class _Place:
 
 @dataclass
 class _Band:
-    """Boxes of some columns, and the tags of arrows from and to the others.
+    """Boxes of some columns, and the tags of arrows from and to other columns.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def _size(node: Node) -> tuple[float, float]:
 
 
 def _spread(wanted: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Places of a column's boxes in their order, without overlap, as near as possible to the wanted ones."""
+    """Places of a column's boxes, in order, without overlap, as near as possible to wanted places."""
     steps = np.r_[0.0, np.cumsum((heights[:-1] + heights[1:]) / 2 + _GAP)]
     blocks: list[list[float]] = []
     for value in wanted - steps:
@@ -199,7 +199,7 @@ class _Layout:
         return count
 
     def _order(self) -> None:
-        """Order each column by its neighbours' mean places. The order with fewest crossings counts."""
+        """Order each column by its neighbours' mean places. The order with the fewest crossings is taken."""
         best, fewest = [list(c) for c in self.columns], self._crossings()
         last = len(self.columns) - 1
         for sweep in range(40):
@@ -211,7 +211,7 @@ class _Layout:
                 means = {}
                 for place, k in enumerate(order):
                     near = [position[o] for o in self._beside(k, beside)]
-                    # Without a neighbour a box keeps its share of the column.
+                    # A box without a neighbour keeps its share of the column.
                     own = place / max(len(order) - 1, 1) * max(len(position) - 1, 0)
                     means[k] = float(np.mean(near)) if near else own
                 order.sort(key=means.__getitem__)

@@ -112,7 +112,7 @@ def draw_errors(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> F
     measured = [m for panel in panels for m in panel if m]
     record, scale = measured[0].entry.record, measured[0].entry.variant.scale
     at = {id(m): np.broadcast_to(m.sample.at, np.shape(m.sample.found)).ravel() for m in measured}
-    # Pixels of a span share its angle: an interval of one span would show that span's chance.
+    # All pixels of a span have the span's angle. An interval with a single span would show only chance.
     bins = min(90 if len(panels) <= 4 else 50, *(max(len(np.unique(a)) // 8, 2) for a in at.values()))
     low, high = min(a.min() for a in at.values()), max(a.max() for a in at.values())
     edges, middles = _intervals(record.logarithmic, at[id(measured[0])], low, high, bins)
@@ -128,12 +128,12 @@ def draw_errors(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> F
             # Intervals between whole numbers are empty.
             has_any = ~np.isnan(values)
             values = values[has_any]
-            # Errors of nearly nothing would take up the whole of a logarithmic axis.
+            # Errors near 0 would take up most of a logarithmic axis.
             values[values < floor] = np.nan
             (handles[name],) = panel.plot(middles[has_any], values, label=name, **_CURVES[name])
         if m.label:
             panel.set_title(m.label, fontsize=8)
-        # A picture of many panels is kept small.
+        # A picture with many panels has small panels.
         panel.grid(True, axis="both" if len(panels) <= 8 else "y", color="#dddddd", linewidth=0.5)
     for panel in axes.flat[len(panels) :]:
         panel.set_visible(False)

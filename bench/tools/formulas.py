@@ -58,6 +58,6 @@ class Formulas:
             for instance, found in self._results.items():
                 if name.startswith(instance):
                     return () if re.fullmatch(r"[\da-d]", name[len(instance) :]) else tuple(found)
-            # A copy of a word that is read later on has a stage in its name.
+            # A copy of a word for a later stage has the stage in its name.
             name = re.sub(r"_\d+$", "", name)
         return tuple(self._of.get(name, ()))

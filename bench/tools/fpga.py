@@ -6,8 +6,8 @@ family in its slowest speed grade. This is out of context, so ports are no pins.
 The clock rate differs by a few per cent between seeds. There is a `Family` for Lattice's ECP5 and one for
 Nexus.
 
-Every port has a register before or behind it, so that every path of the design is between registers and
-counts. These registers are not among the counted parts. The delay of reset is not counted.
+Every port has a register before or behind it. So every path of the design lies between registers and is
+timed. These registers are not among the counted parts. The delay of reset is not counted.
 
 On ECP5 `absorb_registers` moves registers beside a multiplier into it, because Yosys does not. nextpnr times
 a multiplier with registers on one side in full, but not the path between registers on both sides. The clock
@@ -131,7 +131,7 @@ def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Co
 
 
 _TOLD = {"style": "{}", "setup_interval": "interval {}", "pipes": "{} pipelines", "setups": "{} lanes"}
-"""Build options in the name of a design, where it is not the option's name and its value."""
+"""Words for build options in the name of a design, if they differ from the option's name and value."""
 
 
 def name_of(design: ShadingPipeline, operand: str | None = None) -> str:

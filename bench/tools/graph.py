@@ -30,7 +30,7 @@ class Node:
     copies : int
         Number of equal boxes that the box stands for.
     stages : int
-        Registers of a plain delay that the box stands for.
+        Number of registers in a plain delay that the box stands for.
     formulas : tuple of str
         Formulas of the words that the register holds in turn.
     """
@@ -53,7 +53,8 @@ class Graph:
     nodes : dict of int to Node
         Boxes.
     edges : dict of (int, int) to bool
-        Arrows between boxes. True if the arrow carries data, false if it only chooses or enables.
+        Arrows between boxes. The value is true if the arrow carries data, false if it only chooses or
+        enables.
     """
 
     nodes: dict[int, Node] = field(default_factory=dict)
@@ -66,7 +67,7 @@ class Graph:
         return number
 
     def connect(self, source: int, target: int, is_data: bool) -> None:
-        """Add an arrow. Of two arrows between the same boxes the arrow that carries data counts."""
+        """Add an arrow. If two boxes have two arrows, the arrow that carries data is kept."""
         self.edges[source, target] = self.edges.get((source, target), False) or is_data
 
     def neighbours(self, data_only: bool = False) -> tuple[dict[int, set[int]], dict[int, set[int]]]:
@@ -160,7 +161,7 @@ def layers(graph: Graph) -> tuple[dict[int, int], set[tuple[int, int]]]:
 
 
 _LIKENESS_DEPTH = 8
-"""Length, in arrows, of the surroundings by which two boxes are compared."""
+"""Two boxes are compared with their surroundings up to this number of arrows."""
 
 
 def likeness(graph: Graph) -> str:
@@ -179,7 +180,7 @@ def likeness(graph: Graph) -> str:
         for number, node in graph.nodes.items()
     }
     sources, targets = graph.neighbours()
-    # A box is told by its neighbours, theirs, and so on.
+    # A box is identified by its neighbours, by their neighbours, and so on.
     for _ in range(_LIKENESS_DEPTH):
         labels = {
             number: _digest(

@@ -196,7 +196,10 @@ class Netlist:
                     graph.connect(source, number, data)
 
     def _find_held(self) -> set[tuple[str, int]]:
-        """Operands of multiplexers that only keep a register's word, as cell and number of the operand."""
+        """Operands of multiplexers that only keep a register's word.
+
+        Each is a cell and the number of the operand.
+        """
         choices = {}
         for name, cell in self.cells.items():
             if cell["type"] in ("$mux", "$pmux"):
@@ -248,7 +251,10 @@ class Netlist:
         )
 
     def _operands(self, name: str, place: int | None = None) -> Iterable[tuple[int, bool]]:
-        """Input bits of a cell, or of its output bit ``place``, each with whether it carries data."""
+        """Input bits of a cell, or of its output bit ``place``.
+
+        A flag of each bit tells whether it carries data.
+        """
         cell = self.cells[name]
         kind = cell["type"]
         if kind in ("$mux", "$pmux"):
@@ -273,7 +279,10 @@ class Netlist:
                     yield bit, is_data
 
     def _sources(self, bit: int) -> dict[int, bool]:
-        """Boxes from which a net comes through cells without a box, each with whether it carries data."""
+        """Boxes from which a net comes through cells without a box.
+
+        A flag of each tells whether it carries data.
+        """
         bit = self.replaced.get(bit, bit)
         found = self.cache.get(bit)
         if found is None:
@@ -343,7 +352,7 @@ def _without_duplicates(cells: dict) -> tuple[dict, dict[int, int]]:
 
 
 def _short(names: list[str]) -> str:
-    """The plainest of a net's names, without path and serial number."""
+    """The simplest name of a net, without path and serial number."""
     if not names:
         return ""
     name = min(names, key=lambda name: (name.count("."), "__" in name, len(name), name)).split(".")[-1]

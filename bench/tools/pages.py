@@ -85,7 +85,7 @@ def _model(unit: str) -> type | None:
 
 
 def _link(text: str, path: str, folder: Path) -> str:
-    """A text that leads from a page to a file of the project. The text alone if there is no checkout."""
+    """A text with a link from a page to a file of the project. Without a checkout it has no link."""
     file, _, anchor = path.partition("#")
     if not (PROJECT / file).exists():
         return text
@@ -426,7 +426,7 @@ def write_pages(
         If the folder or a file cannot be written, or if a file that is no page would be replaced.
     """
     check_folder(folder, units)
-    # The first page marks the folder as ours, also if an interrupt follows.
+    # The first page marks the folder as a folder of pages, even if an interrupt follows.
     write_text(folder / "README.md", index_page(folder))
     for unit in units:
         if progress:

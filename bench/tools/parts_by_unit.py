@@ -18,10 +18,13 @@ from blysk.bench.tools.tool_runner import ToolRunner
 __all__ = ["OTHERS", "parts_by_unit", "sum_parts", "units_of"]
 
 OTHERS = "others"
-"""Name of the parts in no unit below the design itself."""
+"""Name of the parts that belong to the design itself and to no unit inside."""
 
 _LUTS = {"LUT4": 1, r"CCU2C?": 2, r"(TRELLIS_)?DPR16X4": 6}
-"""Look-up tables of a cell, by the pattern of its kind. A memory takes four, and two that write to it."""
+"""Look-up tables of a cell, by the pattern of its kind.
+
+A memory takes four, and two more for its write port.
+"""
 
 _LEVELS = 3
 """Largest number of names in the path of a unit."""

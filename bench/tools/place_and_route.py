@@ -47,8 +47,8 @@ __all__ = [
 
 _REMEDY = install_extra("fpga")
 
-# Names of registers stay: cells are named by them. Amaranth's other names are aliases, of which abc9 makes
-# two cells of one name.
+# Names of registers stay, because cells get their names. Amaranth's other names are aliases. From an alias
+# abc9 makes two cells with one name.
 MAP_BEFORE = """\
 read_rtlil top.il
 hierarchy -top top
@@ -67,7 +67,10 @@ YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()
 _RIPUP = "--tmg-ripup"
 _SLACK = re.compile(r"ripped up due to negative slack WNS=(-?[\d.]+)ns")
 _ROUNDS = 10
-"""Rounds of the router for paths that are too slow. In this number the slowest path must become faster."""
+"""Rounds of the router for paths that are too slow.
+
+Within these rounds the slowest path must become faster.
+"""
 
 _LARGE = 1000
 """Least number of look-up tables of a large design."""
@@ -136,7 +139,7 @@ class Registered(wiring.Component):
         self._ports = {
             "__".join(map(str, path)): (member.flow, Value.cast(value))
             for path, member, value in component.signature.flatten(component)
-            # The `valid` or `ready` of a stream that always is.
+            # The `valid` or `ready` of a stream that is always valid or always ready.
             if not isinstance(Value.cast(value), Const) and len(Value.cast(value))
         }
         super().__init__({name: flow(Shape(len(value))) for name, (flow, value) in self._ports.items()})
@@ -299,12 +302,12 @@ def _load(path: Path) -> tuple[Parts, Place] | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError):
-        # No entry of ours, or of another release.
+        # The entry is from another program or another release.
         return None
 
 
 def _store(path: Path, parts: Parts, place: Place) -> None:
-    # A cache that fills up or goes away costs the next run its time, no more.
+    # If the cache fills up or is removed, only the next run takes longer.
     with contextlib.suppress(InputError, OSError):
         write_json(path, {"parts": asdict(parts), "place": asdict(place)})
 
@@ -312,9 +315,8 @@ def _store(path: Path, parts: Parts, place: Place) -> None:
 def _stuck(said: str) -> str:
     """Reason why the router will not end, from its log. Empty if it may end.
 
-    nextpnr routes wires of slow paths again for as long as there are slow paths. If the target cannot be met
-    at all, it goes on for ever. An example is the bisection, with the same slowest path to 10 ps in 27
-    rounds.
+    nextpnr routes wires of slow paths again as long as there are slow paths. If the target cannot be met,
+    nextpnr does not end. An example is the bisection, with the same slowest path to 10 ps in 27 rounds.
     """
     slack = [float(worst) for worst in _SLACK.findall(said)]
     stuck = len(slack) > _ROUNDS and max(slack[-_ROUNDS:]) <= max(slack[:-_ROUNDS])

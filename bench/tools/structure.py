@@ -72,7 +72,7 @@ def _drop_idle_choices(graph: Graph) -> None:
                 continue
             sources, targets = graph.neighbours(data_only=True)
             words = sources[number] - {number}
-            # A register that may keep its word does not choose.
+            # The condition on which a register keeps its word is not a choice.
             if len(targets[number]) == 1:
                 words -= targets[number]
             if len(words) < 2:
@@ -129,7 +129,7 @@ def _join_delays(graph: Graph) -> None:
 
 
 def _drop_indirect(graph: Graph) -> None:
-    """Drop arrows that choose, except from ports that do nothing else, and arrows beside a longer path."""
+    """Drop arrows that choose, and arrows beside a longer path. Arrows from ports that only choose stay."""
     passing = {a for (a, _), is_data in graph.edges.items() if is_data}
     graph.edges = {
         edge: data

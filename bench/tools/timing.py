@@ -19,7 +19,7 @@ from blysk.sim.engines.simulate import stimulus_of
 __all__ = ["Waves", "draw_timing", "waves_of"]
 
 _BEATS, _MOST_RESULTS, _MOST_COLUMNS = 3, 6, 44
-"""Default number of input beats, most results, and most columns of a diagram."""
+"""Default number of input beats, largest number of results, and largest number of columns of a diagram."""
 
 PIXELS = 3
 """Pixels of a span in a diagram, if the unit makes pixels of spans."""
@@ -33,7 +33,7 @@ _CLOCK, _ROW = 22.0, 22.0
 _MARGIN = 58.0
 _INK, _FILLS = "#222222", ("#cfe0f3", "#f9dcc0", "#d5ecd5", "#eadcf2")
 QUIET = 7
-"""Most cycles without a change that a diagram shows in full."""
+"""Largest number of cycles without a change that a diagram shows in full."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def _letter(k: int) -> str:
 
 
 def _offered(valid: np.ndarray, ready: np.ndarray, names: list[str]) -> list[str | None]:
-    """Name of the offered beat in each cycle, the next after the moved beats."""
+    """Name of the offered beat in each cycle. This is the next beat after the moved beats."""
     moved = np.cumsum(valid & ready) - (valid & ready)
     return [names[k] if is_valid else None for k, is_valid in zip(moved, valid, strict=True)]
 
@@ -244,7 +244,7 @@ def _draw_beats(axes, shown, beats, span, letters) -> None:
     """Draw boxes with the names of the beats that a stream offers."""
     low, high = span
     names = [None if clock is None else beats[clock] for clock in shown]
-    # A stretch that is left out has what is on both its sides.
+    # Both sides of a stretch that is left out have the same levels, and so has the stretch.
     names = [
         names[k - 1] if clock is None else name
         for k, (name, clock) in enumerate(zip(names, shown, strict=True))

@@ -54,7 +54,7 @@ class ToolRunner:
         `given_up` is called every few seconds with the tool's output so far. If it returns a reason, the tool
         is stopped and `GivenUp` raised. `ToolError` is raised if the tool fails, or was stopped by `stop`.
         """
-        # Python's own warnings are none of the tool's.
+        # Python's own warnings do not belong to the tool's output.
         command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
         with tempfile.TemporaryFile(dir=folder) as given, tempfile.TemporaryFile(dir=folder) as log:
             given.write(text.encode())
@@ -76,7 +76,7 @@ class ToolRunner:
                     try:
                         process.wait(_SECONDS if given_up else None)
                     except subprocess.TimeoutExpired:
-                        # The tool writes from where the file's one position is.
+                        # The tool writes at the file's position, which reading also moves.
                         size = os.fstat(log.fileno()).st_size
                         if reason := given_up(os.pread(log.fileno(), size, 0).decode(errors="replace")):
                             raise GivenUp(reason) from None

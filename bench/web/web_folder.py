@@ -77,7 +77,7 @@ def check_folder(folder: Path) -> None:
     others = [name for name in names if name not in ours]
     if others:
         reason = f"holds {others[0]}, which is not part of a site"
-        raise InputError(str(folder), reason, "give a new or empty folder, or that of an earlier site")
+        raise InputError(str(folder), reason, "give a new or empty folder, or an earlier site's folder")
 
 
 def report_files(folder: Path) -> list[Path]:

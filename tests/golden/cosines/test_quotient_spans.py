@@ -116,7 +116,7 @@ def test_no_word_wraps_at_the_last_pixel(mirror):
         ),
         (
             lambda: SpanVectors.quantise(np.ones((1, 3)), -np.ones((1, 3)), np.array([2])),
-            "the step of a span of two pixels does not fit: give two spans of one",
+            "the step of a span of two pixels does not fit: give two spans of one pixel",
         ),
         (
             lambda: QuotientSpans().differences(
