@@ -204,8 +204,8 @@ class Attributes:
     def errors(self, words: AttributeWords, of_words: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the errors of colours and of texture coordinates, for attributes from -1 to 1.
 
-        With errors e of the words, ``U/w`` is off by at most ``2 e/w``. The bound has 33/32 of it: where U
-        saturates, its product may lack as much.
+        Errors e of the words move ``U/w`` by at most ``2 e/w``. The bound counts 33/32 of this, because the
+        product of a U that saturates is too small.
 
         Parameters
         ----------
