@@ -1,7 +1,8 @@
-"""Border of a light: the pixels where a light, or a highlight with a step, begins."""
+"""Borders: the pixels where a light, a highlight with a step, or another texel begins."""
 
 import numpy as np
 
+from blysk.golden.reference.albedo import fragment_samples
 from blysk.golden.reference.fragments import fragment_normals
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
@@ -9,10 +10,13 @@ from blysk.golden.reference.reflection import ReflectionModel
 from blysk.golden.reference.renderer import fragment_positions
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["BORDER", "border_mask", "highlight_step"]
+__all__ = ["BORDER", "border_mask", "border_name", "highlight_step"]
 
 BORDER = 0.002
-"""Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off."""
+"""Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off.
+
+Also the largest distance, in texels, of a pixel at the border of a texel.
+"""
 
 # Number of fragments processed together; it limits the memory.
 _CHUNK = 1 << 15
@@ -34,11 +38,24 @@ def highlight_step(scene: Scene, model: ReflectionModel) -> float:
     return max(steps) if max(steps) > 0.25 else 0.0
 
 
-def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndarray:
-    """Shown pixels at the border of a light, where its term switches between on and off.
+def border_name(scene: Scene, model: ReflectionModel) -> str:
+    """What is at most `BORDER` at a border, in words, see `border_mask`."""
+    parts = ["|N.L|"]
+    if highlight_step(scene, model):
+        parts.append("|N.H|")
+    if any(texture.filter == "nearest" for texture in scene.textures.values()):
+        parts.append("way to another texel")
+    return " or ".join(parts)
 
-    There ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if there is a `highlight_step`. An error there may be as
-    large as the term. An unlit surface has no border.
+
+def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndarray:
+    """Shown pixels at the border of a light, where its term switches between on and off, or of a texel.
+
+    At the border of a light ``|N·L|`` is at most `BORDER`, or ``|N·H|`` if there is a `highlight_step`. An
+    error there may be as large as the term. An unlit surface has no such border.
+
+    At the border of a texel, of a texture that takes the nearest, the next column or row is at most `BORDER`
+    texels away. An error there may be as large as the difference of the texels.
 
     Parameters
     ----------
@@ -56,7 +73,7 @@ def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndar
     mask = np.zeros(scene.height * scene.width, dtype=bool)
     steps = highlight_step(scene, model) > 0
     is_lit = np.array([not material.unlit for material in scene.materials])
-    shown = np.flatnonzero(raster.visible & is_lit[scene.mesh.material[raster.triangle]][raster.span])
+    shown = np.flatnonzero(raster.visible)
     for start in range(0, len(shown), _CHUNK):
         which = shown[start : start + _CHUNK]
         normals = fragment_normals(scene, raster, which)
@@ -68,5 +85,11 @@ def border_mask(scene: Scene, raster: Raster, model: ReflectionModel) -> np.ndar
             if steps:
                 halfway = halfway_vector(direction, scene.view_vectors(points))
                 near |= np.abs(np.einsum("ij,ij->i", normals, halfway)) <= BORDER
+        near &= is_lit[scene.mesh.material[raster.triangle[raster.span[which]]]]
+        for samples in fragment_samples(scene, raster, which):
+            if samples.texture.filter == "nearest":
+                places = samples.coordinates * samples.sizes
+                beside = np.abs(places - np.rint(places)) <= BORDER
+                near[samples.which] |= (beside & (samples.sizes > 1)).any(axis=1)
         mask[raster.pixel[which]] = near
     return mask.reshape(scene.height, scene.width)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from blysk.golden.frames.border import border_mask, highlight_step
+from blysk.golden.frames.border import border_mask, border_name, highlight_step
 from blysk.golden.frames.frame import Picture
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands
@@ -58,7 +58,7 @@ class FrameErrors(ErrorFigures):
     max_lsb, p999_lsb, rmse_lsb, psnr_db : float
         See `ErrorFigures`.
     steady_lsb : float
-        Largest error of the pixels off the border of every light, see `border_mask`; 0 without these pixels.
+        Largest error of the pixels off every border, see `border_mask`; 0 without these pixels.
     border_lsb : float
         Largest error of the pixels at a border; 0 without these pixels.
     """
@@ -93,11 +93,11 @@ class Comparison:
     visible_pixels : int
         Pixels that show the surface.
     border : str
-        Cosines near 0 at a border: ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see `highlight_step`.
+        What is near 0 at a border, such as ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see `border_name`.
     step_lsb : float
         See `highlight_step`; in LSB of linear light.
     border_pixels : int
-        Visible pixels at the border of a light.
+        Visible pixels at a border.
     nmse : float
         Normalised mean squared error against the exact frame.
     mnse_published, mnse_published_share : float
@@ -377,7 +377,7 @@ def _compare(
     transfer = design.transfer
     figures: dict[str, Any] = {"target": target.name, "transfer": transfer, "arithmetic_error": nothing}
     figures["step_lsb"] = highlight_step(scene, model)
-    figures["border"] = "|N.L| or |N.H|" if figures["step_lsb"] else "|N.L|"
+    figures["border"] = border_name(scene, model)
     seconds = 0.0
     pixels = np.flatnonzero(mask)
     image = image.reshape(-1, 3)[pixels]
