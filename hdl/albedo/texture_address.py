@@ -68,7 +68,7 @@ class TextureAddressUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(bank_addresses_shape(model)))`
         Addresses and weights.
     constants : :py:`In(descriptor_shape())`
-        The texture.
+        The texture, of which each level has to fit the memory.
 
     Source: docs/theory/textures.md#addresses.
     """
@@ -119,13 +119,17 @@ class TextureAddressUnit(PipelinedUnit):
             size = Mux(texels, (Const(1) << exponent)[:bits], 0)
             return Mux(level.any(), self._behind | size, 0)[:bits]
 
-        exponent = g.register("exponent", lambda a, b: _less_one(a) + _less_one(b), *sizes)
+        def sum_of(width, height):
+            # A level behind level 0 has no larger exponent.
+            return (_less_one(width) + _less_one(height))[: (bits - 1).bit_length()]
+
+        exponent = g.register("exponent", sum_of, *sizes, formula="log2 S")
         texels = g.register("texels", lambda a, b: a.any() | b.any(), *sizes)
         place = g.register("place", place, exponent, texels, level)
         stride = g.register("stride", _less_one, sizes[0])
 
         def coarse(row, stride):
-            return select([Cat(Const(0, 4 * k), row, Const(0, 8 - 4 * k)) for k in (0, 1, 2)], stride[2:])
+            return select([(row << k)[:bits] for k in (0, 4, 8)], stride[2:])
 
         def address(row, stride, column, place):
             row = select([(row << k)[:bits] for k in range(4)], stride[:2])

@@ -150,13 +150,13 @@ class TextureFilterUnit(PipelinedUnit):
         """Mean of two texels, with 18 fraction bits, and half a step of the colour and of a row."""
         a, b = _value(a), _value(b)
         difference = register((b - a).as_signed(), "difference")
-        start = register(register(Cat(Const(3, 4), a), "start"), "start_behind")
+        start = Cat(Const(3, 4), register(register(a, "start"), "start_behind"))
         return self._sum(register, difference, weight, start, _VALUE)
 
     def _mean(self, register, a, b, weight):
         """Mean of two rows."""
         difference = register((b - a).as_signed(), "difference")
-        start = register(register(Cat(Const(0, 1), a), "start"), "start_behind")
+        start = Cat(Const(0, 1), register(register(a, "start"), "start_behind"))
         return self._sum(register, difference, weight, start, _ROW)
 
     def _sum(self, register, difference, weight, start, fraction_bits):

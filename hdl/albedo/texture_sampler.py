@@ -18,6 +18,9 @@ from blysk.hdl.core.stream import connect
 
 __all__ = ["TextureSamplerUnit"]
 
+_INSIDE = 4
+"""Samples whose weights wait while the memory inside reads; it takes three."""
+
 
 class TextureSamplerUnit(wiring.Component):
     """Colours of a texture at places of a surface, in their order.
@@ -33,7 +36,7 @@ class TextureSamplerUnit(wiring.Component):
     initiation_interval : int
         Cycles from a sample to the next, at least 1: interval of the filter.
     waiting : int
-        Largest number of samples whose texels are under way, at least 4.
+        Largest number of samples whose texels are under way from a memory outside, at least 4.
 
     Raises
     ------
@@ -91,7 +94,7 @@ class TextureSamplerUnit(wiring.Component):
             connect(m, wiring.flipped(self.write), memory.write)
         weight = stream.Signature(address.o.payload.shape().members["weight"])
         waits, follows = weight.create(path=("waits",)), weight.create(path=("follows",))
-        connect_wide_fifo(m, "weights", waits, follows, self._waiting)
+        connect_wide_fifo(m, "weights", waits, follows, self._waiting if p.memory.external else _INSIDE)
         both = response.valid & follows.valid
         m.d.comb += [
             request.payload.eq(address.o.payload.address),

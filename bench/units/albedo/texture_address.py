@@ -1,5 +1,6 @@
 """Record of the texture address."""
 
+from dataclasses import replace
 from functools import partial
 
 from blysk.bench.units.albedo.textures import any_descriptor, any_places, of_descriptor
@@ -20,8 +21,7 @@ def _expect(unit, case):
     return {"address": address, "weight": weight.codes}
 
 
-def _case(unit, rng, count, largest):
-    descriptor = any_descriptor(rng, largest, max(unit.model.memory.depth // 2, 1))
+def _case(unit, rng, count, descriptor):
     codes, level = any_places(rng, unit.model, descriptor, count)
     level[::50] = rng.integers(0, 16, len(level[::50]))
     return Case({"coordinates": codes, "level": level}, of_descriptor(descriptor))
@@ -29,12 +29,29 @@ def _case(unit, rng, count, largest):
 
 def _places(unit, rng, count):
     """Places over three images each way, their borders, and any; one descriptor of any size a run."""
-    return _case(unit, rng, count, 10)
+    return _case(unit, rng, count, any_descriptor(rng, unit.model.memory))
 
 
 def _small(unit, rng, count):
     """The same of images of one to four texels a side."""
-    return _case(unit, rng, count, 2)
+    return _case(unit, rng, count, any_descriptor(rng, unit.model.memory, 2))
+
+
+def _strips(unit, rng, count):
+    """The same of images of 1024 texels by one to four, and four to one by 1024."""
+    sides = rng.permutation([10, rng.integers(3)]).tolist()
+    descriptor = any_descriptor(rng, unit.model.memory, 2)
+    return _case(unit, rng, count, replace(descriptor, width=sides[0], height=sides[1]))
+
+
+def _alone(unit, rng, count):
+    """The same of images of a single level that fills the memory."""
+    sides = min(unit.model.memory.address_bits + 2, 20)
+    width = int(rng.integers(max(sides - 10, 1), min(sides, 11)))
+    descriptor = any_descriptor(rng, unit.model.memory, 2)
+    case = _case(unit, rng, count, replace(descriptor, width=width, height=sides - width, base=0))
+    case.beats["level"][:] = 0
+    return case
 
 
 RECORD = Record(
@@ -52,6 +69,9 @@ RECORD = Record(
     stimuli={
         "places": Stimulus(_places, 400, repeats=30),
         "small": Stimulus(_small, 300, stalled=False, repeats=20),
+        "strips": Stimulus(_strips, 300, stalled=False, repeats=12),
+        "alone": Stimulus(_alone, 300, stalled=False, repeats=12),
     },
     axis="",
+    still={"it follows from the constants of a run": "behind[0-10]"},
 )

@@ -2,17 +2,23 @@
 
 import numpy as np
 
-from blysk.golden.albedo.texel_memory import TextureDescriptor
+from blysk.golden.albedo.texel_memory import TexelMemory, TextureDescriptor
 from blysk.golden.reference.texture import FILTERS, WRAPS, Texture
 
 __all__ = ["any_descriptor", "any_places", "any_texture", "of_descriptor"]
 
 
-def any_descriptor(rng: np.random.Generator, largest: int, bases: int) -> TextureDescriptor:
-    """A descriptor of any wraps, of sides to 2^largest and a base under ``bases``; a third are small."""
-    width, height = rng.integers(0, rng.choice([2, largest + 1, largest + 1]), 2).tolist()
+def any_descriptor(rng: np.random.Generator, memory: TexelMemory, largest: int = 10) -> TextureDescriptor:
+    """A descriptor of any wraps, base, and sides to 2^largest, of which all levels fit a memory."""
+    most = memory.address_bits - 1
+    while True:
+        sides = rng.integers(0, largest + 1, 2)
+        if np.maximum(sides - 1, 0).sum() <= most:
+            break
+    width, height = sides.tolist()
     wrap = tuple(rng.integers(0, len(WRAPS), 2).tolist())
-    return TextureDescriptor(width, height, wrap, bool(rng.random() < 0.2), int(rng.integers(bases)))
+    base = int(rng.integers(max(memory.depth // 2, 1)))
+    return TextureDescriptor(width, height, wrap, bool(rng.random() < 0.2), base)
 
 
 def of_descriptor(descriptor: TextureDescriptor) -> dict[str, object]:
@@ -26,7 +32,8 @@ def any_texture(rng: np.random.Generator, largest: int) -> Texture:
     width, height = 1 << rng.integers(0, largest + 1, 2)
     texels = rng.random((height, width, 3)) ** rng.choice([1, 6])
     texels[rng.random((height, width)) < 0.3] = rng.integers(0, 2, 3)
-    return Texture(texels, tuple(rng.choice(WRAPS, 2).tolist()), rng.choice(FILTERS, p=[0.8, 0.2]))
+    wrap = tuple(rng.choice(WRAPS, 2).tolist())
+    return Texture(texels, wrap, str(rng.choice(FILTERS, p=[0.8, 0.2])), bool(rng.random() < 0.8))
 
 
 def any_places(rng: np.random.Generator, model, descriptor, count: int) -> tuple[np.ndarray, np.ndarray]:
