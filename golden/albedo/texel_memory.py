@@ -129,7 +129,7 @@ class TexelMemory:
     units of 2^-14, a fine code c is c, for numbers to 1/8. A coarse code is ``8 c + 7``. These values are in
     linear light, times ``1 - 2^-14``: the filter divides by this factor at its end, so that the largest code
     is exactly 1. A texel is off by at most 2^-15 to 1/8, and 2^-12 from there on. After the transfer of sRGB
-    both are at most a tenth of an LSB. Equal steps of 2^-12 would be off by 0.4 LSB near black.
+    both are at most 0.101 LSB. Equal steps of 2^-12 would be off by 0.4 LSB near black.
 
     Parameters
     ----------
