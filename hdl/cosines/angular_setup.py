@@ -31,7 +31,7 @@ class AngularSetupUnit(PipelinedUnit):
     `AngularSetup`, the bit-accurate model, has equations, tables, formats and the error bound.
 
     A beat needs 26 multiplications: five dot products of three, six of the half chord, two more
-    interpolations, x, y and the step. They share ``ceil(26/I)`` multipliers, I the initiation interval
+    interpolations, x, y and the step. With the initiation interval I they share ``ceil(26/I)`` multipliers
     (`dataflow`). With ``angle="arccos"`` the pipelined arccos unit, which has two multipliers, takes the
     place of the half chord. One multiplication, which converts psi to turns, takes the place of six. There
     are then ``2 + ceil(21/I)`` multipliers. Results are the same for every I.

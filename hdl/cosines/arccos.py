@@ -143,7 +143,7 @@ class ArccosUnit(PipelinedUnit):
         carry(7, "x", "segment", "flags", "c0")
         product = register(m, slope * carried["x"], "product_8")
         carry(8, "segment", "flags", "c0")
-        # One register after the shift, one after the sum.
+        # A register follows the shift, and another register follows the sum.
         aligned = register(m, self._aligned(product, carried["segment"]), "aligned_9")
         carry(9, "flags", "c0")
         total = register(m, (aligned + (carried["c0"] << 16))[:43].as_signed(), "total_10")
@@ -153,7 +153,10 @@ class ArccosUnit(PipelinedUnit):
         return carried["flags"], total
 
     def _sequential(self, m, x, segment, flags):
-        """Stage 5: words, ``c2 x`` starts; 6: ``c1 x`` starts; 8: ``(c2 x) x`` starts; 12: sum."""
+        """Words are ready at stage 5, and ``c2 x`` starts.
+
+        ``c1 x`` starts at 6, ``(c2 x) x`` at 8. The sum is ready at 12.
+        """
         at, register = self.at, self.register
         c0, c1, c2 = (
             register(m, word, f"c{power}", when=at(4))

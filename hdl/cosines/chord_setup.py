@@ -170,7 +170,7 @@ class ChordSetupUnit(PipelinedUnit):
         return results
 
     def _quadratic(self, i: int, function: str, slope_format: Format, flags: list[Word]):
-        """Words of P and G of f, u or a; the flags get a word where P or G is out of range."""
+        """Words of P and G of f, u or a. The flags get a word that tells whether P or G is out of range."""
         g, p = self._graph, self.model
         name = f"{function}_{i}"
         values = g.input(
@@ -229,7 +229,7 @@ def shared_shifters(graph: Dataflow, model: ChordSetup) -> FunctionalUnit:
     format = model.shifted_format
 
     def shift(register, value, amount):
-        # Two stages of shift, then rounding half up to the fraction bits of the differences.
+        # Two stages shift. Then the result is rounded half up to the fraction bits of the differences.
         coarse = FixedValue(format, Value.cast(value) >> Cat(Const(0, 2), amount[2:]))
         coarse, fine = register(coarse, "coarse"), register(amount[:2], "fine_amount")
         shifted = register(FixedValue(format, Value.cast(coarse) >> fine), "shifted")

@@ -20,9 +20,9 @@ class HalfChordUnit(PipelinedUnit):
     `HalfChord`, the bit-accurate model, has table, coefficients, formats and the error bound.
 
     Each beat needs six multiplications of 18 x 17 bits: the interpolation of the root, four Horner steps and
-    the last product. They share ``ceil(6/I)`` multipliers, I the initiation interval (`dataflow`). By default
-    there is one multiplier, which is busy in every cycle. Results are the same for every I. The table has 512
-    words of 36 bits, one block RAM.
+    the last product. With the initiation interval I they share ``ceil(6/I)`` multipliers (`dataflow`). By
+    default there is one multiplier, which is busy in every cycle. Results are the same for every I. The table
+    has 512 words of 36 bits, one block RAM.
 
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6

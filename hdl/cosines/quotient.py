@@ -158,7 +158,7 @@ class QuotientUnit(PipelinedUnit):
             if not spans.mirror:
                 marks[f"second_{k}"] = compared[-1][1]
                 marks[f"away_{k}"] = g.input(f"away_{k}", lambda operands, k=k: operands.away[k], "z < 0")
-        # Bits that wait for the end do so in one word.
+        # All bits that wait for the end wait in one word.
         together = g.register("marks", lambda *bits: Cat(bits), *marks.values())
         marks = {
             name: g.wire(f"mark_{name}", lambda bits, place=place: bits[place], together)
@@ -198,7 +198,7 @@ class QuotientUnit(PipelinedUnit):
         return g.register("root", rounded, entry, bend, formula="r")
 
     def _compare(self, light: int, numerators: list[Word], rest: Word) -> tuple[Word, Word | None]:
-        """The smaller of m and w of a light, and whether it is w; of R·V it is m."""
+        """The smaller of m and w of a light, and whether this is w. For R·V it is always m."""
         p, g, mirror = self.model, self._graph, self.model.spans.mirror
         numerator, name = numerators[light], f"{light}"
         cut, width = p.PIXEL_FRACTION, p.PIXEL_FRACTION + 2
@@ -225,7 +225,8 @@ class QuotientUnit(PipelinedUnit):
         first = width - p.COMPARED
 
         def is_larger(m, w):
-            # The sign of a difference is at the end of its carries; a comparison looks at them again.
+            # The sign of a difference is the end of its carry chain. A comparison would add logic
+            # behind the carries.
             return (code(w)[first:].as_signed() - code(m)[first:].as_signed())[p.COMPARED]
 
         second = g.register(f"second_{name}", is_larger, numerator, rest, formula="m > w")
@@ -240,7 +241,7 @@ class QuotientUnit(PipelinedUnit):
         return chosen, second
 
     def _place(self, light: int, chosen: Word, shift: Word, square_root: Word, marks: list[Word]) -> Word:
-        """Word of the place of a light; marks: the part, and ``z < 0``, but for R·V."""
+        """Word of the place of a light. Except for R·V it has marks: the part, and ``z < 0``."""
         p, g, mirror = self.model, self._graph, self.model.spans.mirror
         width, name = p.PIXEL_FRACTION + 2, f"{light}"
 
@@ -280,8 +281,8 @@ class QuotientUnit(PipelinedUnit):
         )
 
         def row(octaves, away=0):
-            # Under the octaves, from OCTAVES = 15 on, the leading one counts, too. The largest octave is
-            # 4 GROUPS + 5.
+            # Below the octaves, from OCTAVES = 15 on, the leading 1 is a part of the position, too. The
+            # largest octave is 4 GROUPS + 5.
             under = ~octaves[5] & (octaves[4] | octaves[:4].all())
             low = Mux(under, octaves[:4] - (OCTAVES - 1), 0)[:4]
             past = octaves[5] | (~octaves.any() if mirror else away)

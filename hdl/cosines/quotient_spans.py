@@ -44,20 +44,21 @@ class QuotientSpansUnit(wiring.Component):
     """Words of every pixel of spans, first pixel first; `QuotientSpans` is the bit-accurate model.
 
     *Setup.* The multipliers make ``v·v``, ``v·d`` and ``d·d`` of a span in turns, three cycles in all. A span
-    of one pixel needs ``v·v`` alone, one cycle. Every squared component has a multiplier, and every l two
-    multipliers: 5 for a light with highlights of N·H, 6 with highlights of R·V, 4 more a further light.
-    Without highlights there are 3. Differences wait in registers behind the shifts, starts in a memory of
-    `DEPTH` words. So the differences of a span pass the starts of the spans before it.
+    of one pixel needs ``v·v`` alone, and one cycle. Every squared component has a multiplier, and every l has
+    two. These are 5 multipliers for a light with highlights of N·H, 6 with highlights of R·V, and 4 more for
+    each further light. Without highlights there are 3. Differences wait in registers behind the shifts,
+    starts in a memory of `DEPTH` words. So the differences of a span pass the starts of the spans before it.
 
-    *Serial setup.* One multiplier makes all products of a span one by one, in three turns: for second
-    differences, for first differences, for the start. Each turn waits until the words of its kind from the
-    span before were taken. With P products a turn, two a line and one a square, a span takes 3 P cycles, or
-    ``P + 6`` if it has one pixel. All sums have one shift, and a start waits in registers.
+    *Serial setup.* One multiplier makes all products of a span one after the other, in three turns: for
+    second differences, for first differences, for the start. Each turn waits until the words of its kind from
+    the span before were taken. A turn has P products: two for each line and one for each square. A span takes
+    3 P cycles, or ``P + 6`` if it has one pixel. All sums have one shift, and a start waits in registers.
 
-    *Accumulators.* Second differences are taken while the last three pixels of a span leave, first
-    differences with the last two, the start with the last. So spans follow each other without a gap: a run of
-    n spans with p pixels takes p cycles, if at most a third of them have two pixels. A second difference
-    comes halved into the first addition, whole into the others. So ``D1 = 2 v·d + d·d`` takes no adder.
+    *Accumulators.* Second differences are taken while the last three pixels of a span leave. First
+    differences are taken with the last two pixels, and the start with the last pixel. So spans follow each
+    other without a gap: a run of n spans with p pixels takes p cycles, if at most a third of them have two
+    pixels. The first addition takes half of a second difference, and the other additions take the whole. So
+    ``D1 = 2 v·d + d·d`` takes no adder.
 
     The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span. For
     a span of one pixel these are `short_latency` cycles. Payloads are registers.
@@ -131,7 +132,7 @@ class QuotientSpansUnit(wiring.Component):
         return 2 if self.serial else self.DEPTH + self._SUMS + 2
 
     def elaborate(self, platform):
-        """Turns of the setup; the accumulators, and which words they take."""
+        """Turns of the setup, and the accumulators with the words that they take."""
         m = Module()
         p, pixel = self.model, self.o.payload
         # Registers of differences that wait, and the FIFO of starts.
@@ -158,7 +159,8 @@ class QuotientSpansUnit(wiring.Component):
         else:
             self._set_up(m, (second, second_waits), (first, first_waits), start)
         self._take(m, advance, takes, (second_waits, first_waits), start)
-        # Half of the second difference is added on the cycle after the first one was taken; then it waits.
+        # Half of the second difference is added on the cycle after the first difference was taken. Then it
+        # waits.
         halves, ready = Signal(name="halves"), self._ready
         with m.If(advance):
             m.d.sync += halves.eq(takes_first)
@@ -230,7 +232,7 @@ class QuotientSpansUnit(wiring.Component):
             self.i.ready.eq(moves & ends),
             self.begun.eq(begun),
         ]
-        # Their enable is from registers alone: valid and the length are late.
+        # Their enable comes from registers alone, because valid and the length are late.
         with m.If(moves):
             m.d.sync += [
                 begun.eq(Mux(begun, is_second | ~valid, valid & is_long)),
@@ -312,7 +314,7 @@ class QuotientSpansUnit(wiring.Component):
                     m.d.sync += target.eq(value[: len(target)])
 
     def _set_up_serially(self, m: Module, taken: Any, second, first, start: stream.Interface) -> None:
-        """Products one by one, their sums, one shift, and the registers that sums wait in.
+        """Products one after the other, their sums, one shift, and the registers in which sums wait.
 
         A turn begins while no words of its kind are inside, so that nothing behind the multiplier waits.
         """
@@ -339,7 +341,7 @@ class QuotientSpansUnit(wiring.Component):
         notes = [Signal(note, name=f"note_{stage}") for stage in range(self._SHIFTED)]
         m.d.comb += [
             ends.eq(step == steps - 1),
-            # A pipeline drops a span without a pixel, which is not valid here.
+            # Spans without a pixel are not valid here. A pipeline drops them before.
             self.i.ready.eq(Mux(span.length.any(), may_go & ends & is_start, ~self.begun)),
             self.begun.eq(step.any() | made.any()),
             notes[0].turn.as_value().eq(Mux(goes, turn, 0)),
@@ -368,8 +370,8 @@ class QuotientSpansUnit(wiring.Component):
         total = Signal(signed(len(product) + 2), name="total", reset_less=True)
         continues = ~Cat(multiplied.step == last + 1 for last in (-1, *lasts[:-1])).any()
         m.d.sync += total.eq(Mux(continues, total, 0) + product)
-        # The payload stays for the turn of the start, while the last differences are shifted. Second ones of
-        # squares are shifted by twice the exponent.
+        # The payload stays for the turn of the start, while the last differences are shifted. Second
+        # differences of squares are shifted by twice the exponent.
         twice = multiplied.turn.second & (multiplied.step < len(squares))
         exponent = Mux(multiplied.turn.start, 0, span.exponent)
         amount = register(Mux(twice, Cat(Const(0, 1), exponent), exponent)[:5], "amount")
@@ -401,9 +403,9 @@ class QuotientSpansUnit(wiring.Component):
                 m.d.sync += busy.as_value()[kind].eq(1)
 
     def _factors(self) -> list[tuple[str, Value, Any]]:
-        """Of each product of a line its component, the factor, and that with the second differences.
+        """For each product of a line: component, factor, and factor in the turn of second differences.
 
-        Second differences are accompanied by z, times 2^16, where it is taken.
+        If z is taken, z times 2^16 comes with the second differences.
         """
         p = self.model
         if not p.highlights:
@@ -417,13 +419,16 @@ class QuotientSpansUnit(wiring.Component):
 
     @staticmethod
     def _few_of(length: Value) -> Value:
-        """Whether a span has two pixels or more; at most two; at most three."""
+        """Whether a span has two pixels or more, at most two, and at most three."""
         return Cat(length[1:].any(), ~length[2:].any() & ~length[:2].all(), ~length[2:].any())
 
     def _line(
         self, register: Callable, product: Callable, light: int, b: dict[str, Value], is_second
     ) -> Value:
-        """Sum of the products of l; with the second differences z, times 2^16, where it is taken."""
+        """Sum of the products of l.
+
+        In the turn of the second differences it is z times 2^16, if z is taken.
+        """
         p = self.model
         if not p.highlights:
             height = b[f"z{light}"]
@@ -431,7 +436,8 @@ class QuotientSpansUnit(wiring.Component):
             return register(scaled, f"line_sum_{light}")
         sine, cosine = (part.as_value() for part in self.constants[light])
         if p.takes_heights:
-            # Gates and no choice: of a choice of constants Yosys makes resets, which multipliers lack.
+            # Gates stand here in place of a choice. From a choice of constants Yosys makes resets, which
+            # multipliers do not have.
             kept = (~is_second).replicate(len(sine))
             sine, cosine = sine.as_unsigned() & kept, cosine.as_unsigned() & kept
             sine, cosine = sine.as_signed(), Cat(cosine[:16], cosine[16] | is_second, cosine[17]).as_signed()
@@ -442,21 +448,22 @@ class QuotientSpansUnit(wiring.Component):
         return register(x + z, f"line_sum_{light}")
 
     def _shift(self, register: Callable, total: Value, left: int, amount: Value, name: str) -> Value:
-        """``(total << left) >> amount``: a register after the coarse shift."""
+        """``(total << left) >> amount``, with a register after the coarse shift."""
         word, high = total << left, amount[2:]
         coarse = register(select([word >> (4 * k) for k in range(1 << len(high))], high), f"{name}_coarse")
         low = register(amount[:2], f"{name}_low")
         return select([coarse >> k for k in range(4)], low)
 
     def _take(self, m: Module, advance: Value, takes: Any, waits: Any, start: stream.Interface) -> None:
-        """Take words where the span before needs its own no more; count pixels."""
+        """Take words of a span when the span before does not need its own words any more. Count pixels."""
         # Whether at most one, two, three pixels of a span are left, counting the pixel on the output.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
         left, valid = Signal(self.length_bits, name="left"), Signal(name="valid")
-        # Whether the second, the first differences of the next span were taken, and whether they may be.
+        # Whether the second and the first differences of the next span were taken, and whether they may be
+        # taken.
         has_second, self._ready = Signal(name="has_second"), Signal(name="ready")
         may_second, may_first = Signal(name="may_second", init=1), Signal(name="may_first")
-        # Of the start that waits: two pixels and more; at most two; at most three.
+        # The waiting start's span: whether it has two pixels or more, at most two, and at most three.
         is_long, at_most_two, at_most_three = self._few
         m.d.comb += [
             takes[0].eq(waits[0] & may_second),

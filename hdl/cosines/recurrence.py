@@ -25,9 +25,9 @@ class RecurrenceUnit(wiring.Component):
     register of the coefficient and the counter, which marks the last pixel of a span.
 
     With ``interleave`` 1 every pixel depends on the pixel before it. So the registers of the loop hold one
-    pixel at a time. ``reinsch`` gives a pixel every 4 cycles (product, two stages of shift, sums),
-    ``direct`` every 3 (product, sum, saturation). After a span of m pixels the next is accepted
-    ``4 (m - 1) + 1`` (``3 (m - 1) + 1``) cycles later.
+    pixel at a time. ``reinsch`` gives a pixel every 4 cycles: product, two stages of shift, sums. ``direct``
+    gives a pixel every 3 cycles: product, sum, saturation. After a span of m pixels the next is accepted ``4
+    (m - 1) + 1`` (``3 (m - 1) + 1``) cycles later.
 
     With ``interleave`` 4 every pixel depends on the fourth pixel before it. The four phases follow each other
     through the four registers of the loop. So there is a pixel in every cycle. A span takes m cycles, and the
@@ -46,7 +46,7 @@ class RecurrenceUnit(wiring.Component):
     i : :py:`In(stream.Signature(StructLayout({"diffuse", "highlight", "coefficient", "shift", "length"})))`
         For each cosine ``first`` and ``second`` in `Recurrence.state_format`: x(0), and x(1) - x(0) in
         ``reinsch``, x(1) in ``direct``. If interleaved, they are arrays of four, see `Recurrence.start`.
-        Coefficient; shift, in ``reinsch`` only; length 0 to 4095.
+        The coefficient, the shift (only in ``reinsch``), and the length, 0 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "highlight", "last"})))`
         Both cosines in `Recurrence.result_format`. ``last``: the last pixel of its span.
 
@@ -160,14 +160,17 @@ class RecurrenceUnit(wiring.Component):
         return words
 
     def _delayed(self, m, value, cycles, name):
-        """A value some cycles later; if not interleaved, the value itself, constant during its pixel."""
+        """A value some cycles later.
+
+        If not interleaved, this is the value itself, which is constant during its pixel.
+        """
         if self.model.interleave > 1:
             for k in range(cycles):
                 value = PipelinedUnit.register(m, value, f"{name}_delayed_{k}")
         return value
 
     def _reinsch(self, m, name, start, starts, ends, is_first, coefficient, shift):
-        """Loop of ``D -= K 2^(2-s) x; x += D``; the sum of x and the old D does not wait for the product."""
+        """Loop of ``D -= K 2^(2-s) x; x += D``. The sum of x and the old D does not wait for the product."""
         p = self.model
         first, second = start
         state = p.state_format
@@ -200,7 +203,10 @@ class RecurrenceUnit(wiring.Component):
         return (x + exchange).truncate(p.result_format.fraction_bits)
 
     def _direct(self, m, name, start, starts, ends, is_first, coefficient):
-        """Loop of ``x(k+1) = -(-2 cos d) x(k) - x(k-1)``; ``other`` is x(k-1), at the first pixel x(1)."""
+        """Loop of ``x(k+1) = -(-2 cos d) x(k) - x(k-1)``.
+
+        ``other`` is x(k-1), and x(1) at the first pixel.
+        """
         p = self.model
         first, second = start
         state = p.state_format
@@ -211,7 +217,7 @@ class RecurrenceUnit(wiring.Component):
         total = Signal((base - product).shape(), name=f"{name}_sum")
         m.d.sync += [product.eq(x * coefficient), base.eq(half_step - other), total.eq(base - product)]
         following = total.truncate(state.fraction_bits).saturate(state)
-        # The loop has three registers; four phases need a fourth.
+        # The loop has three registers, and four phases need a fourth register.
         following = self._delayed(m, following, 1, f"{name}_following")
         given = self._delayed(m, other, 3, f"{name}_other")
         before = self._delayed(m, x, 3, f"{name}_x")

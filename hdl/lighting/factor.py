@@ -52,7 +52,7 @@ class FactorUnit(PipelinedUnit):
         super().__init__(data.StructLayout(operands), data.StructLayout(terms), latency=2)
 
     def datapath(self, m, operands):
-        """Registers of the operands and of the product, which is cut behind them."""
+        """Registers of the operands and of the product. The product is cut after its register."""
         diffuse, specular = (
             self.register(m, operands[name], f"{name}_operand") for name in ("diffuse", "specular")
         )

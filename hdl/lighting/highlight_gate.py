@@ -19,7 +19,7 @@ __all__ = ["HighlightGateUnit"]
 class HighlightGateUnit(PipelinedUnit):
     """Whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
 
-    Comparisons, formats and proof are those of the bit-accurate model `HighlightGate`.
+    The bit-accurate model `HighlightGate` has the comparisons, formats and proof.
 
     There are fifteen multiplications: three for each of ``N_l . N_r``, ``N_l . H`` and ``N_r . H``, and six
     products for the comparisons: ``T u``, ``a b``, ``u w``, ``max(a, b)^2``, ``max(a, b) u`` and ``d^2``.
@@ -58,7 +58,7 @@ class HighlightGateUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(StructLayout({"normal_left": ..., "normal_right": ...})))`
         Unit normals of the span's ends, three components ``SQ(1, F)`` each.
     o : :py:`Out(stream.Signature(unsigned(lights)))`
-        Whether the span may be lit, a bit for each light, the first lowest.
+        Whether the span may be lit, a bit for each light. Bit 0 is the first light.
     constants : :py:`In(StructLayout({"halfway": ArrayLayout(..., lights), "exponent": 10}))`
         Unit vectors H, and as a port the exponent, 1 to 1000, or ``threshold``, T of F bits. All are constant
         while beats are inside.
@@ -180,7 +180,7 @@ class HighlightGateUnit(PipelinedUnit):
             partial,
             multiply("a_b", a, b, since=partial),
         )
-        # A slack of 0 needs no flag: the square below reaches 0 in any case.
+        # A slack of 0 needs no flag, because the square below reaches 0 in any case.
         exceeded = g.register(f"exceeded_{index}", lambda w: w[-1], total)
         slack = g.register(f"slack_{index}", lambda w: w[f + 2 :][:f], total)
 

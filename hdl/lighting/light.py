@@ -34,17 +34,18 @@ class SpecularKind(NamedTuple):
     Parameters
     ----------
     unit : callable
-        Makes the unit from its bit-accurate model and the options ``initiation_interval``, ``exponent``
-        (fixed at build time, or ``None``) and ``shares_slope``: whether the slope unit, or the memory of a
-        lobe, is outside. The unit has an attribute ``latency``.
+        Function that makes the unit from its bit-accurate model and three options: ``initiation_interval``;
+        ``exponent``, fixed at build time, or ``None``; ``shares_slope``, whether the slope unit, or the
+        memory of a lobe, is outside. The unit has an attribute ``latency``.
     compact_interval : callable
-        Gives the initiation interval at which one multiplier is enough, from the model and the fixed exponent
-        or ``None``.
+        Function of the model and the fixed exponent (or ``None``). It gives the initiation interval at which
+        one multiplier is enough.
     slope_unit : callable or None
-        Makes, from the model, the unit of the words that depend on the exponent alone. This unit serves all
-        lights. ``None``: no words depend on the exponent alone.
+        Function of the model that makes the unit of the words that depend on the exponent alone. This unit
+        serves all lights. ``None``: no words depend on the exponent alone.
     memory : callable or None
-        Makes, from the model and the number of lights, the memory of the lights' tables. ``None``: no tables.
+        Function of the model and the number of lights that makes the memory of the lights' tables. ``None``:
+        no tables.
     constant : str
         Frame constant that the unit's port ``constants`` reads.
     """
@@ -112,9 +113,9 @@ class LightUnit(wiring.Component):
     longer interval dark beats bypass the specular unit. They wait beside it in order, and take two cycles
     each.
 
-    For beats that are not dark, the latency, the initiation interval and the multipliers are those of the
-    specular unit. With a longer interval the latency is a cycle longer. For a light that fades a `FactorUnit`
-    follows, with two cycles and a multiplier more. The factor passes beside the units before it.
+    For beats that are not dark, the specular unit gives the latency, the initiation interval and the
+    multipliers. With a longer interval the latency is a cycle longer. For a light that fades a `FactorUnit`
+    follows, which adds two cycles and a multiplier. The factor passes beside the units before it.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ class LightUnit(wiring.Component):
     exponent : int or None
         Exponent that is fixed at build time; see `SpecularUnit`.
     shares_slope : bool
-        Whether slope and boundary come from a `SlopeUnit` outside. Of a lobe: whether tables come from a
+        Whether slope and boundary come from a `SlopeUnit` outside. For a lobe, whether tables come from a
         `LobeMemory` outside. `Power` needs neither.
     gated : bool
         Whether there is a highlight gate.
@@ -144,9 +145,9 @@ class LightUnit(wiring.Component):
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "specular"})))`
         Terms, ``UQ(0, 17)``.
     constants
-        That of the specular unit: exponent, slope, bank, or none.
+        Port of the specular unit: exponent, slope, bank, or none.
     table, write
-        Those of a `LobeUnit`.
+        Ports as of a `LobeUnit`.
 
     Source: docs/theory/models.md#lighting; [T] figure 4.10; [B] 4.
     """
@@ -246,7 +247,7 @@ class LightUnit(wiring.Component):
         connect(m, factor.o, wiring.flipped(self.o))
         if self.fades:
             accepted, taken = self.i.valid & self.i.ready, factor.i.valid & factor.i.ready
-            # As many as the units have inside, their outputs included.
+            # This is the largest number inside the units, including their outputs.
             most = self._depth + self._diffuse.latency + 1 if self.skips_dark else self._specular.latency + 1
             word = pass_beside(m, "factors", self.i.payload.factor, accepted, taken, most)
             m.d.comb += copy(factor.i.payload.factor, word)
@@ -256,7 +257,7 @@ class LightUnit(wiring.Component):
     def _depth(self) -> int:
         """Largest number of terms that wait for the specular unit.
 
-        As many as it has inside, one that it is about to take, and one for the output.
+        These are the terms inside the unit, a term that the unit is about to take, and a term for the output.
         """
         return max(self._specular.latency // self._specular.initiation_interval + 2, 3)
 
@@ -269,14 +270,15 @@ class LightUnit(wiring.Component):
         dark: Value,
         o: stream.Interface,
     ) -> None:
-        """Diffuse terms wait for the specular terms of their beats; a dark beat has none."""
+        """Diffuse terms wait for the specular terms of their beats. A dark beat has no specular term."""
         depth = self._depth
-        # For each beat a bit, dark or not, waits as long as its term is in the diffuse unit or its FIFO.
+        # A bit of each beat tells whether it is dark. It waits as long as the beat's term is in the diffuse
+        # unit or its FIFO.
         m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)
         terms = diffuse.o.signature.create(path=("terms",))
         connect_fifo(m, "waiting", diffuse.o, terms, depth)
         takes, gives, skip = Signal(), Signal(), skips.r_data
-        # A beat waits in a register, and with it whether it is dark.
+        # A beat waits in a register, with a bit that tells whether it is dark.
         full, was_dark, taken = Signal(name="full"), Signal(name="was_dark"), Signal(name="taken")
         with m.If(~full):
             m.d.sync += [full.eq(self.i.valid), given.eq(self.i.payload), was_dark.eq(dark)]

@@ -31,7 +31,7 @@ def lobe_write_shape() -> data.StructLayout:
 def lobe_read_signature(model: Lobe) -> wiring.Signature:
     """Read port. It gives the word of an ``address`` after two cycles with ``enable``.
 
-    Without ``enable`` the word stays; it may also stay on a cycle that writes to the address.
+    Without ``enable`` the word stays. On a cycle that writes to the address, it may also stay.
     """
     return wiring.Signature(
         {
@@ -109,7 +109,8 @@ class LobeMemory(wiring.Component):
         follows, begins, holds, active = (
             Signal(name=name) for name in ("follows", "begins", "holds", "active")
         )
-        # A register close to the memory, as the write enable also decides whether the memory is read.
+        # The register is close to the memory, because the write enable also decides whether the memory is
+        # read.
         m.d.sync += [
             value.eq(write.value),
             follows.eq(self.write.valid & ~write.begins),
@@ -137,7 +138,7 @@ class LobeMemory(wiring.Component):
 class LobeUnit(PipelinedUnit):
     """A lobe of 1 - N·H by its table. 0 for a dark beat and where N·H is not positive.
 
-    Table, formats and error bounds are those of `Lobe`, the bit-accurate model.
+    `Lobe`, the bit-accurate model, has table, formats and error bounds.
 
     With an initiation interval of 1 the latency is 10 cycles: one minus, saturation, leading one, two for the
     shift, two for the word, operands, product, sum. With the operand ``place`` it is 8: choice, three for the
@@ -275,7 +276,7 @@ class LobeUnit(PipelinedUnit):
             return Mux(lit, Value.cast(wide.saturate(p.argument_format))[:bits], 0)[:bits]
 
         def coarse(argument, zeros):
-            # Shift by all but the last bits of the amount here; the second stage shifts by these.
+            # This stage shifts by the upper bits of the amount. The second stage shifts by the last bits.
             shift = Cat(Mux(zeros == p.octaves, p.octaves - 1, zeros), Const(0, _FINE))
             normal = (argument << Cat(Const(0, _FINE), shift[_FINE:]))[:top]
             row = (self._base + p.octaves - zeros)[: len(self._read.address) - p.step_bits]
@@ -296,7 +297,7 @@ class LobeUnit(PipelinedUnit):
         return (shifted,), place
 
     def _look_up(self, register: Callable[[Any, str], Any], address: Value, fraction: Value) -> Value:
-        """Word of an address, and beside it the fraction."""
+        """Word at an address, and the fraction, delayed by as many cycles."""
         self._module.d.comb += self._read.address.eq(address)
         return Cat(self._read.word, register(register(fraction, "fraction_read"), "fraction"))
 
@@ -323,7 +324,7 @@ class LobeUnit(PipelinedUnit):
             product = g.multiply("product", difference, fraction)
 
         def term(value, product, lit):
-            # The term lies between two entries, so that it does not wrap.
+            # The term lies between two entries, so it does not wrap.
             total = (value + product.truncate(17)).wrap(p.RESULT_FORMAT)
             return FixedValue(p.RESULT_FORMAT, Mux(lit, Value.cast(total), 0))
 

@@ -19,7 +19,7 @@ __all__ = ["PowerUnit"]
 class PowerUnit(PipelinedUnit):
     """``max(cos gamma, 0)^n``, 0 for a dark beat, with the ports of `SpecularUnit`.
 
-    Method, formats and error bound are those of the bit-accurate model `Power`.
+    The bit-accurate model `Power` has method, formats and error bound.
 
     The pipelined form has an initiation interval of 1 and 18 multipliers. Its latency is 32 cycles:
     difference from 1, saturation, and three for each bit of the exponent. The sequential form has one
@@ -85,7 +85,7 @@ class PowerUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """Complement of the cosine, two cycles; then the bits of the exponent, lowest first."""
+        """Complement of the cosine in two cycles, then the bits of the exponent, lowest first."""
         p, register = self.model, self.register
         complement = one_minus(p, operands.operand).extend(SQ(5, 34))
         complement = register(m, complement, "one_minus_cosine")
@@ -96,7 +96,7 @@ class PowerUnit(PipelinedUnit):
         return FixedValue(p.RESULT_FORMAT, ~Value.cast(s)[17:])
 
     def _pipelined(self, m, start):
-        """Three cycles a bit: product, difference, saturation; squares and products in parallel."""
+        """A bit takes three cycles: product, difference, saturation. Squares and products are in parallel."""
         p, register = self.model, self.register
         format = p.COMPLEMENT_FORMAT
         x = register(m, start, "x_0")
@@ -131,7 +131,7 @@ class PowerUnit(PipelinedUnit):
         return difference, register(m, kept, f"{name}_late")
 
     def _sequential(self, m, start):
-        """Bit j: its square starts at stage 3 + 4j, its product at 4 + 4j; both end four cycles later."""
+        """The square of bit j starts at stage 3 + 4j, its product at 4 + 4j. Both end four cycles later."""
         p, at, register = self.model, self.at, self.register
         format = p.COMPLEMENT_FORMAT
         bits = range(p.EXPONENT_BITS)

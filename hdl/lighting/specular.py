@@ -97,7 +97,8 @@ class SlopeUnit(wiring.Component):
             read, boundary = (
                 Signal(p.SHIFTED_FORMAT.width, name=name, reset_less=True) for name in ("read", "boundary")
             )
-            # The first register is inside an FPGA's memory, far from the logic that the second one drives.
+            # The first register is inside an FPGA's memory. It is far from the logic that the second register
+            # drives.
             m.d.sync += [read.eq(word), boundary.eq(read)]
         m.d.comb += [
             self.slope.scale.eq(scale),
@@ -116,7 +117,7 @@ class SlopeUnit(wiring.Component):
 class SpecularUnit(PipelinedUnit):
     """``max(1 - k (1 - cos gamma), 0)^2`` or a higher power, 0 for a dark beat.
 
-    Models, formats, PROM and error bound are those of the bit-accurate model `Specular`. A beat is dark if
+    The bit-accurate model `Specular` has models, formats, PROM and error bound. A beat is dark if
     the light is behind the surface, or if a highlight gate tells that its span has no highlight. A dark beat
     has the argument 0. So from one dark beat to the next only the input and the first register toggle.
 
@@ -248,7 +249,8 @@ class SpecularUnit(PipelinedUnit):
             return FixedValue(UQ(10, 26), (Value.cast(argument) << self._slope[1])[:36]).truncate(16)
 
         def is_lit(wide, dark):
-            # Whether the saturated argument is at most the boundary: always if that is the largest code.
+            # Whether the saturated argument is at most the boundary. This is always so if the boundary is the
+            # largest code.
             boundary = self._slope[2]
             return ((wide <= boundary) | Value.cast(boundary).all()) & ~dark
 
@@ -300,7 +302,10 @@ class SpecularUnit(PipelinedUnit):
         right: Callable[[Any], FixedValue] = lambda value: value,
         formula: str | None = None,
     ) -> Word:
-        """Exact product: one cycle with a multiplier of its own, else issued to a shared one."""
+        """Exact product.
+
+        With a multiplier of its own it takes one cycle. Else it is issued to a shared multiplier.
+        """
         g = self._graph
         if g.interval == 1:
             return g.register(name, lambda x, y: left(x) * right(y), a, b, formula=formula)
@@ -334,7 +339,7 @@ class SpecularUnit(PipelinedUnit):
         return g.register("result", result, self._multiply("square", base, base))
 
     def _cosine(self, argument: Word, product: Word, below_one: Callable, lit: Word) -> Word:
-        """Base of ``coscos``: e at the same time as the product p; ``p + p e``; the cosine."""
+        """Base of ``coscos``: e and the product p at the same time, then ``p + p e``, then the cosine."""
         p, g = self.model, self._graph
         code = g.wire("excess_code", lambda x: Value.cast(x)[8:], argument)
         e = self._interpolate("excess", p.excess, code)
@@ -363,7 +368,7 @@ class SpecularUnit(PipelinedUnit):
         return g.register("result", result, value, whole, lit, formula="2^−(n·u)")
 
     def _interpolate(self, name: str, chords: Chords, code: Word, lit: Word | None = None) -> Word:
-        """`Chords.compute`: table, product, sum; 0 where not ``lit``."""
+        """`Chords.compute` by table, product and sum. The result is 0 unless ``lit``."""
         g = self._graph
         format, step_format = chords.start.format, chords.step.format
         words = (chords.start.codes | chords.step.codes << format.width).tolist()

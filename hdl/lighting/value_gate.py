@@ -36,7 +36,7 @@ class ValueGateUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(ArrayLayout(ArrayLayout(UQ(1, 26), 3), lights)))`
         u of each light at the first pixel, in the middle and at the last pixel.
     o : :py:`Out(stream.Signature(unsigned(lights)))`
-        Whether the span may be lit, a bit for each light, the first lowest.
+        Whether the span may be lit, a bit for each light. Bit 0 is the first light.
     constants : :py:`In(10)` or :py:`In(18)`
         The exponent or the threshold, as a port, constant from 2 cycles before a beat on.
 
@@ -68,11 +68,14 @@ class ValueGateUnit(PipelinedUnit):
 
     @property
     def ports(self) -> dict[str, Member]:
-        """The port of exponent or threshold, for units that pass it on; none if the exponent is fixed."""
+        """The port of exponent or threshold, for units that pass it on.
+
+        There is no port if the exponent is fixed.
+        """
         return {name: member for name, member in self.signature.members.items() if name == "constants"}
 
     def datapath(self, m, operands):
-        """Sums and differences; the least u, and whether it holds; the comparison."""
+        """Sums and differences, the least u and whether it is valid, and the comparison."""
         p = self.model
         shift = p.LEVEL_FORMAT.fraction_bits - p.THRESHOLD_FORMAT.fraction_bits
         threshold = self._threshold(m) << shift

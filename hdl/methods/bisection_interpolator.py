@@ -19,7 +19,7 @@ EMPTY_SEGMENT_CYCLES = 3
 class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpolator):
     """The adaptive normaliser. `BisectionInterpolator` is the bit-accurate model.
 
-    `latency` and `setup_interval` are those of a span of one segment. More segments take longer (see
+    `latency` and `setup_interval` hold for a span of one segment. More segments take longer (see
     `AdaptiveNormaliserUnit`).
 
     Parameters

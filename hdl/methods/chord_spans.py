@@ -43,9 +43,9 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     highlights : bool
         Whether there is u.
     gated : bool
-        Whether spans bring a gate's decision for each light, ``lit``.
+        Whether a span brings ``lit``, a gate's decision for each light.
     factors : sequence of int
-        Indices of the lights that fade. These have a quadratic more.
+        Indices of the lights that fade. Each of them has one more quadratic.
 
     Members
     -------
@@ -142,7 +142,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 class ChordSpansUnit(wiring.Component):
     """From values of spans to the operands of their pixels, by chord setup and accumulators.
 
-    A span of three pixels or more goes through the setup, and its start past the setup through a memory. A
+    A span of three pixels or more goes through the setup. Its start goes through a memory beside the setup. A
     span of one pixel goes through the memory alone. So short spans take a cycle each, and wait only for the
     spans before them. The setup never waits, because a span is accepted only if there is room for its
     differences behind the setup.
@@ -205,7 +205,7 @@ class ChordSpansUnit(wiring.Component):
         self._accumulator = ChordAccumulatorUnit(
             model, lights, highlights=highlights, gated=gated, factors=factors
         )
-        # A cycle for the count of the differences that wait.
+        # One cycle is for the count of the waiting differences.
         self.latency = self._setup.latency + 1 + self._accumulator.latency
         waits = 1 + FIFO_LATENCY + (gate.latency if gate else 0)
         self.short_latency = waits + self._accumulator.latency
@@ -223,24 +223,26 @@ class ChordSpansUnit(wiring.Component):
     def starts_inside(self) -> int:
         """Depth of the memory of starts, with room for the spans that may follow a span during its setup.
 
-        It also has room for the spans before it. Its values may take an interval, in which no span comes.
+        It also has room for the spans before this span. The span's values may take an interval, in which no
+        span comes.
         """
         needed = self._setup.latency + self._setup.initiation_interval + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
 
     @property
     def differences_inside(self) -> int:
-        """Depth of the memory of differences, with room also for the spans inside the setup, three cycles
-        each.
+        """Depth of the memory of differences.
+
+        It also has room for the spans inside the setup, which take three cycles each.
         """
         needed = -(-self._setup.latency // _LONG) + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
 
     _LATE = 4
-    """Spans beyond the count: three that come before the count is known, and one whose words wait."""
+    """Spans beyond the count: three come before the count is known, and the words of a fourth wait."""
 
     def elaborate(self, platform):
-        """Memory of starts beside the setup, one of differences behind it, and the accumulators."""
+        """Memory of starts beside the setup, memory of differences behind it, and the accumulators."""
         m = Module()
         m.submodules.chord_setup = setup = self._setup
         m.submodules.chord_accumulator = accumulator = self._accumulator
@@ -292,7 +294,7 @@ class ChordSpansUnit(wiring.Component):
         waits, room = Signal(name="waits"), Signal(name="room", init=1)
         m.d.sync += [
             behind.eq(behind + setup.o.valid - went[1]),
-            # A span that left is counted in ``behind``, so that the new sum is not needed.
+            # ``behind`` also counts a span that left, so that the new sum is not needed.
             waits.eq(setup.o.valid | behind[1:].any() | (behind[0] & ~went[1])),
             room.eq(Cat(is_room).all()),
         ]
@@ -316,7 +318,7 @@ class ChordSpansUnit(wiring.Component):
         with m.If(accumulator.i.valid & accumulator.i.ready):
             m.d.sync += takes_long.eq(lengths.r_data[-1])
         taken = accumulator.taken
-        # A cycle late, as the handshake is known late.
+        # This is a cycle late, because the handshake is known late.
         kept, entered = Signal.like(start, name="kept", reset_less=True), Signal(name="entered")
         length = Signal(len(lengths.w_data), name="length", reset_less=True)
         m.d.sync += [
@@ -334,7 +336,7 @@ class ChordSpansUnit(wiring.Component):
             m.d.comb += Cat(Value.cast(words[name]) for name in names).eq(kept_words)
 
     def _decide(self, m: Module, joined: stream.Interface, depth: int, known: Value, ready: Value) -> None:
-        """The gate beside the setup: a span waits for its decision."""
+        """The gate beside the setup. A span waits for the gate's decision."""
         m.submodules.value_gate = gate = self._gate
         lights = len(gate.o.payload)
         m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=depth)
@@ -344,7 +346,7 @@ class ChordSpansUnit(wiring.Component):
             m.d.comb += given[0].as_value().eq(first)
             m.d.comb += [given[k].as_value().eq(Mux(long, u, first)) for k, u in enumerate(others, 1)]
         m.d.comb += [
-            # Every span goes to the starts and to the gate: each of them waits for the other.
+            # Every span goes to the starts and to the gate. Both take it on the same cycle.
             gate.i.valid.eq(self.i.valid & self.i.ready),
             ready.eq(gate.i.ready),
             decisions.w_data.eq(gate.o.payload),
@@ -359,7 +361,7 @@ class ChordSpansUnit(wiring.Component):
 
 
 def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Value:
-    """Memory of words in their order, without handshakes: the first that has not been taken.
+    """Memory of words in their order, without handshakes. It gives the first word that has not been taken.
 
     Parameters
     ----------
@@ -368,7 +370,7 @@ def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, d
     word : ValueLike
         Word that comes.
     written, taken : Value
-        Whether a word comes, and whether the first is taken.
+        Whether a word comes, and whether the first word is taken.
     depth : int
         Largest number of words inside, a power of two.
     """

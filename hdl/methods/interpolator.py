@@ -83,7 +83,7 @@ class InterpolatorUnit(wiring.Component):
     lights : int
         Number of lights, at least 1.
     setup_interval : int or None
-        Least cycles from a span to the next, one of `setup_intervals`. ``None``: the largest of them up to
+        Least cycles from a span to the next, one of `setup_intervals`. ``None``: the largest interval up to
         `DEFAULT_INTERVAL`, or the only interval of a method without a choice.
     highlights : bool
         Whether there is specular light, and operands for it.
@@ -92,7 +92,8 @@ class InterpolatorUnit(wiring.Component):
     product_interval : int
         Least cycles from a pixel to the next in the products with L and H, for methods that find normals.
     gate : ValueGateUnit or None
-        From `gate_inside`. The gate decides whether a span has no highlight, and operands have ``gated``.
+        Gate from `gate_inside`, which decides whether a span has no highlight. The operands then have
+        ``gated``.
     takes_threshold : bool
         Whether a threshold tells the end of highlights, in place of the exponent, see
         `ShadingPipeline.threshold_of`.
@@ -122,7 +123,7 @@ class InterpolatorUnit(wiring.Component):
     cycles_per_pixel = 1
 
     room_after = 2
-    """Cycles from the first pixel of a span until there is room for the span after the next, prepared."""
+    """Cycles from a span's first pixel until there is room for the prepared span after the next span."""
 
     DEFAULT_INTERVAL = 4
     """Largest default of `setup_interval`."""
@@ -280,7 +281,10 @@ class NormalInterpolatorUnit(InterpolatorUnit):
         self.cycles_per_pixel = max(self.cycles_per_pixel, self.product_interval)
 
     def source(self, m: Module) -> tuple[stream.Interface, Value]:
-        """Describe in ``m`` the part from spans to normals; return their stream, and ``out_of_range``."""
+        """Describe in ``m`` the part from spans to normals.
+
+        Returns the stream of normals, and ``out_of_range``.
+        """
         raise NotImplementedError
 
     def elaborate(self, platform):

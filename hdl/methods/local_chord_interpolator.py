@@ -81,7 +81,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
         self.latency = self._spans.latency
 
     def elaborate(self, platform):
-        """Two pixels one after the other, the second from registers; anything else as it comes."""
+        """A span of two pixels becomes two spans, the second from registers. Other spans pass unchanged."""
         m = Module()
         m.submodules.chord_spans = spans = self._spans
         span, second, pair = self.i.payload, Signal(name="second"), Signal()
@@ -142,7 +142,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @property
     def _of_gate(self):
-        """Exponent or threshold of a gate, if it is a port; else ``None``."""
+        """Exponent or threshold of a gate, if it is a port. Else ``None``."""
         return self.constants if "constants" in self.signature.members else None
 
     @property

@@ -72,7 +72,8 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
         """Coefficients, and the normals of the form."""
         m.submodules.middle_normal = middle = self._middle
         m.submodules.gpq = gpq = self._gpq
-        # Never full: both units hold as many spans, and each one more at its output.
+        # The FIFO is never full. Both units hold as many spans, and each unit has one more span at its
+        # output.
         depth = -(-middle.latency // middle.initiation_interval) + gpq.latency + 2
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=depth)
         length = stream.Signature(self.length_bits).create(path=("length",))
@@ -80,7 +81,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
         differences = self.model.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload
-        # Written a cycle late, as the handshake is known late.
+        # The length is written a cycle late, because the handshake is known late.
         m.d.sync += [lengths.w_en.eq(self.i.valid & self.i.ready), lengths.w_data.eq(span.length)]
         m.d.comb += [
             self.i.ready.eq(middle.i.ready),
@@ -90,7 +91,8 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
             *copy_fields(gpq.i.payload, middle.o.payload, ("normal_left", "normal_middle", "normal_right")),
             gpq.i.valid.eq(middle.o.valid),
             middle.o.ready.eq(gpq.i.ready),
-            # A length comes before its coefficients, which take longer: both start on the same cycle.
+            # A length comes before its coefficients. Both start on the same cycle, and the coefficients take
+            # longer.
             *copy_fields(curve.i.payload, gpq.o.payload, "gpq"),
             curve.i.payload.length.eq(length.payload),
             curve.i.valid.eq(gpq.o.valid),

@@ -20,9 +20,9 @@ __all__ = ["QuotientInterpolatorUnit"]
 class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     """From spans of vectors to N·L and places in lobes' tables. `QuotientInterpolator` is the model.
 
-    `QuotientSpansUnit` gives the words of the pixels, `QuotientUnit` their quotients. A span of two pixels or
-    more takes at least three cycles, a span of one pixel takes one. A span is flagged at its first pixel out
-    of range.
+    `QuotientSpansUnit` gives the words of the pixels, and `QuotientUnit` their quotients. A span of one pixel
+    takes one cycle. A longer span takes at least three cycles. A span is flagged at its first pixel out of
+    range.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     def __init__(self, model: QuotientInterpolator, lights: int, **options):
         super().__init__(model, lights, **options)
         spans = model.spans(lights, self.highlights)
-        # Where a pixel takes several cycles, one multiplier has the time for a span.
+        # If a pixel takes several cycles, one multiplier has enough time for a span.
         self._spans = QuotientSpansUnit(spans, self.length_bits, serial=self.product_interval > 1)
         self._quotient = QuotientUnit(Quotient(spans), self.product_interval)
         self.setup_interval = self._spans.initiation_interval
@@ -82,7 +82,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         self.latency = self._spans.latency + self._quotient.latency
 
     def elaborate(self, platform):
-        """Words of pixels, quotients; and a flag for each span with a pixel that is out of range."""
+        """Words of pixels, quotients, and a flag for each span with a pixel that is out of range."""
         m = Module()
         m.submodules.quotient_spans = spans = self._spans
         m.submodules.quotient = quotient = self._quotient

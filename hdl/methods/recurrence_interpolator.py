@@ -15,7 +15,7 @@ __all__ = ["RecurrenceInterpolatorUnit"]
 
 
 class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator):
-    """Recurrence setup, then a recurrence unit for each light, with a copy for L and one for H.
+    """Recurrence setup, then recurrence units for L and H of each light.
 
     `RecurrenceInterpolator` is the bit-accurate model. All recurrence units are equal and have the same input
     and the same ready of the output. So they are in the same state on every cycle. There are two multipliers

@@ -91,7 +91,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInter
         self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency
 
     def source(self, m):
-        """Lines, their vectors, unit vectors; and a flag for each span with a vector that is too short."""
+        """Lines, their vectors, unit vectors, and a flag for each span with a vector that is too short."""
         m.submodules.line_setup = setup = self._setup
         m.submodules.line_accumulator = accumulator = self._accumulator
         m.submodules.renormaliser = renormaliser = self._renormaliser

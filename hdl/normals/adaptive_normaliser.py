@@ -25,11 +25,11 @@ SEGMENT_CYCLES = 14
 
 
 class AdaptiveNormaliserUnit(wiring.Component):
-    """Normals of a span, by straight lines over ``2^k`` arcs, k as small as the threshold allows.
+    """Normals of a span, by straight lines over ``2^k`` arcs. k is as small as the threshold allows.
 
     `AdaptiveNormaliser`, the bit-accurate model, has formats, choice of k and error bounds.
 
-    Three parts work at once, each on a span of its own.
+    Three parts work at the same time, each on another span.
 
     1. The first bisects, level by level (`BisectionUnit`), and counts the levels.
     2. The second computes start, step and length of every segment, and puts them into a FIFO. A segment takes
@@ -120,14 +120,15 @@ class AdaptiveNormaliserUnit(wiring.Component):
         m.d.sync += ready_spans.eq(ready_spans + s.through - begun)
         m.submodules.ends = ends = Memory(shape=normal_shape(), depth=4 << p.depth, init=[])
         multiplier = SteppedMultiplier(m, s.step)
-        # Before the levels, which use the multiplier on steps on which the segments do not.
+        # The segments are described before the levels. Levels use the multiplier on steps on which segments
+        # do not use it.
         self._divide(m, r, s, ends, multiplier, fifo, segment_shape)
         self._count(m, r, s, ends, multiplier)
         self._back(m, fifo, segment_shape, ready_spans, begun)
         return m
 
     def _count(self, m, r, s, ends, multiplier):
-        """Bisect, count the levels, hand the span over."""
+        """Bisect, count the levels, and pass the span on."""
         read, write = ends.read_port(), ends.write_port()
         address = Signal(self.model.depth + 1, name="write_address")
         m.d.comb += write.addr.eq(Cat(address, r.bank))
@@ -178,7 +179,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         ]
 
     def _store_ends(self, m, r: "_Levels", address, write) -> None:
-        """Ends of segments into their memory: those of the span, then the bisection's results."""
+        """Write ends of segments into their memory: first the span's ends, then the bisection's results."""
         whole, bisection = 1 << self.model.depth, self._bisection
         m.d.comb += [
             bisection.o.ready.eq(1),
@@ -218,7 +219,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
             m.next = "store left"
 
     def _bisect(self, m, r: "_Levels", read) -> None:
-        """Pairs of neighbouring ends of a level, from the second on, into the bisection."""
+        """Send pairs of neighbouring ends of a level into the bisection, from the second pair on."""
         bisection, bits = self._bisection, self.model.depth + 1
         m.d.comb += [
             read.addr.eq(Cat(Mux(r.step == 0, r.index, r.next_index)[:bits], r.bank)),
@@ -239,7 +240,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                     m.next = "drain"
 
     def _next_level(self, m, r: "_Levels", s: "_Segments") -> None:
-        """The results of a level are stored: go on."""
+        """The results of a level are stored. Go on."""
         result = self._bisection.o.payload
         m.d.sync += [
             r.half.eq(r.half >> 1),
@@ -260,7 +261,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
             m.next = "bisect"
 
     def _count_levels(self, m, r: "_Levels", s: "_Segments", multiplier: SteppedMultiplier) -> None:
-        """Number of levels, by ``q + q^2`` and its limits."""
+        """Number of levels, from ``q + q^2`` and its limits."""
         p = self.model
         with m.If(r.step != 0):
             m.d.sync += r.step.eq(r.step + 1)
@@ -275,7 +276,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         with m.If(r.step == 3):
             m.d.sync += r.levels.eq(0)
             for k, code in enumerate(p.limits.codes.tolist()):
-                # One pixel or two are at the ends; the middle one of three comes from the first level.
+                # One or two pixels are at the ends. The middle pixel of three comes from the first level.
                 with m.If((sagitta.as_value() > code) & ~r.out_of_range & (r.steps > min(k + 1, 2))):
                     m.d.sync += r.levels.eq(k + 1)
         with m.If(r.step == 4):
@@ -287,14 +288,14 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     @staticmethod
     def _hand_on(m, r: "_Levels", s: "_Segments") -> None:
-        """A span whose ends are stored goes on to its segments, as soon as the one before is through."""
+        """A span whose ends are stored goes on to its segments as soon as the span before is finished."""
         m.d.comb += r.counted.eq(1)
         m.next = "counted"
         with m.If(s.free):
             m.next = "idle"
 
     def _divide(self, m, r, s, ends, multiplier, fifo, segment_shape):
-        """The segments of a span, one after the other, into the FIFO."""
+        """Put the segments of a span into the FIFO, one after the other."""
         read = ends.read_port()
         m.d.comb += s.free.eq(~s.busy | s.through)
         with m.If(s.busy):
@@ -349,7 +350,10 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 m.d.sync += s.slope[c].eq(shifted.truncate(32).wrap(p.STEP_FORMAT))
 
     def _end_segment(self, m, s: "_Segments", read, fifo) -> None:
-        """Right end of a segment; the segment into the FIFO, or none without a pixel; on to the next."""
+        """Take the right end of a segment.
+
+        Put the segment into the FIFO if it has a pixel. Go on to the next segment.
+        """
         whole = 1 << self.model.depth
         following = Signal(self.model.depth + 2)
         m.d.comb += [
@@ -385,7 +389,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         ]
 
     def _back(self, m, fifo, segment_shape, ready_spans, begun):
-        """Interpolate: an accumulating adder a component."""
+        """Interpolate, with an accumulating adder for each component."""
         p = self.model
         segment = data.View(segment_shape, fifo.r_data)
         inside, out_of_range = Signal(name="inside"), Signal(name="span_out_of_range")
@@ -437,7 +441,7 @@ class _Levels:
         self.steps = Signal(bits)
         self.reciprocal = Signal(FixedShape(COMPONENT))
         self.shift = Signal(range(bits + 1))
-        # Of the bisection: ``half`` is the distance of a middle from its two ends.
+        # Words of the bisection. ``half`` is the distance of a middle from its two ends.
         self.half = Signal(depth + 1)
         self.index = Signal(depth + 1)
         self.write_index = Signal(depth + 1)
@@ -454,13 +458,13 @@ class _Levels:
 
 
 class _Segments:
-    """Registers and wires of the part that prepares segments: the results of the first part, and its own."""
+    """Registers and wires of the part that prepares segments: results of the first part, own words."""
 
     def __init__(self, model: AdaptiveNormaliser):
         p, bits, depth = model, model.LENGTH_BITS, model.depth
         component = FixedShape(COMPONENT)
         self.busy = Signal()
-        # The last segment goes; the next span may come.
+        # The last segment leaves, and the next span may come.
         self.through = Signal()
         self.free = Signal()
         self.step = Signal(range(SEGMENT_CYCLES), name="segment_step")

@@ -139,7 +139,7 @@ class BisectionUnit(PipelinedUnit):
             return FixedValue(p.OPERAND_FORMAT, Mux(first_step, cosine.as_value(), angle.as_value()))
 
         x = g.register("x", operand, first_step, cosine, angle)
-        # A multiplier has two signed operands of 18 bits; wired shifts align them.
+        # A multiplier has two signed operands of 18 bits. Wired shifts align them.
         product = g.multiply(
             "product_top",
             x,

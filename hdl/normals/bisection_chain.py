@@ -168,7 +168,7 @@ class BisectionChainUnit(wiring.Component):
             m.d.sync += [self.o.payload.out_of_range.eq(r.angle > limit), r.first_round.eq(0)]
 
     def _halve(self, m: Module, r: "_Registers", multiplier: SteppedMultiplier) -> None:
-        """Next u, l and m of a round; the round ends."""
+        """Next u, l and m of a round. Then the round ends."""
         word, product = r.u.format, multiplier.product
         half_l = (r.weight_l + FixedValue.constant(word, 1)).scale(-1)
         half_m = r.weight_m.scale(-1)
@@ -189,7 +189,7 @@ class BisectionChainUnit(wiring.Component):
                 m.next = "combine"
 
     def _combine(self, m: Module, r: "_Registers", multiplier: SteppedMultiplier) -> None:
-        """Components of ``l N_l + m N_r``, by two products each."""
+        """Components of ``l N_l + m N_r``. Each takes two products."""
         product = multiplier.product
         left_term = Signal(product.shape())
         exact_sum = left_term + product

@@ -17,7 +17,7 @@ __all__ = ["AccumulatorUnit", "DifferenceAccumulatorUnit"]
 
 
 class AccumulatorUnit(wiring.Component):
-    """Quadratics of a span by forward differences, with a value of each in every cycle, first pixel first.
+    """Quadratics of a span by forward differences. Each gives a value in every cycle, first pixel first.
 
     `DifferenceAccumulator`, the bit-accurate model of each quadratic, has formats, rounding and bounds.
 
@@ -37,8 +37,8 @@ class AccumulatorUnit(wiring.Component):
     ports : mapping of str to Member, optional
         Further members, by name.
 
-    A subclass may carry further words of a span to its pixels, see `carried`. The words of a span may come
-    from elsewhere, a cycle after the length, see `hold`.
+    A subclass may carry further words of a span to its pixels, see `carried`. Words of a span may also come
+    from another source, a cycle after the length, see `hold`.
 
     Members
     -------
@@ -84,7 +84,7 @@ class AccumulatorUnit(wiring.Component):
         m : Module
             Module that gets the register.
         load : Value
-            Whether they are taken in on this cycle.
+            Whether the words are taken in on this cycle.
         """
         self._span = Signal(self.i.payload.shape(), name="span", reset_less=True)
         with m.If(self.i.ready):
@@ -92,12 +92,12 @@ class AccumulatorUnit(wiring.Component):
 
     @classmethod
     def begin(cls, model: DifferenceAccumulator, start: FixedValue) -> FixedValue:
-        """First value of an accumulator, the start and half a step of the result; a cut then rounds."""
+        """First value of an accumulator: the start plus half a step of the result. A cut then rounds."""
         return start + FixedValue.constant(model.format, model.result_format.step / 2)
 
     @classmethod
     def rounded(cls, model: DifferenceAccumulator, value: FixedValue) -> FixedValue:
-        """The value before the cut of the result, here ``value``."""
+        """The value before the result is cut. By default it is ``value``."""
         return value
 
     def elaborate(self, platform):

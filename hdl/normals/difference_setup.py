@@ -170,7 +170,7 @@ class DifferenceSetupUnit(PipelinedUnit):
             words["second", c] = graph.register(f"second_{c}", _twice, second)
 
     def _as_published(self, words, p, g, reciprocal, shift) -> None:
-        """``(G dt + P) dt`` and ``2 (G dt) dt``; the word of ``G dt`` leaves the shift of dt out."""
+        """``(G dt + P) dt`` and ``2 (G dt) dt``. The word of ``G dt`` does not contain the shift of dt."""
         graph = self._graph
         curvature_format, step_format = DifferenceSetup.CURVATURE_FORMAT, SQ(1, 29)
         products = [
@@ -254,7 +254,7 @@ def _twice(second: FixedValue) -> FixedValue:
 
 
 def _multiply(register, a: FixedValue, b: FixedValue, amount: Value) -> Sequence[FixedValue]:
-    """Product; and ``4 product 2^-amount`` in two stages, rounded half up to 42 fraction bits."""
+    """The product, and ``4 product 2^-amount`` in two stages, rounded half up to 42 fraction bits."""
     product = registered_product(register, a, b)
     for cycle in range(MULTIPLIER_LATENCY):
         amount = register(amount, f"amount_{cycle}")
