@@ -33,7 +33,7 @@ STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans
 PORT_DESCRIPTIONS = {
     "i_x": "columns of the three corners, in any order",
     "i_y": "rows of the three corners",
-    "i_depth": "depths of the three corners; less is nearer",
+    "i_depth": "depths of the three corners; a smaller depth is nearer",
     "i_normal": "component (second index) of a corner's (first index) N/W",
     "i_material": "index of the triangle's material; a larger index counts as the last",
     "i_two_sided": "with back_faces 2: 1 turns the normals of a back face, 0 culls it",
@@ -100,7 +100,7 @@ class RendererUnit(wiring.Component):
         As for `DepthTesterUnit`.
     clears : bool
         Whether the memory of depths is cleared for each picture, see `DepthTesterUnit`. Else the unit is
-        right for one picture, unless the memory outside is cleared between pictures.
+        right for one picture only, unless the memory outside is cleared between pictures.
 
     Members
     -------
@@ -182,7 +182,7 @@ class RendererUnit(wiring.Component):
         ]
         known, drops = self._judge(m, source, room, made.ready, ready)
         if geometry.compact and not geometry.vectors and self.coarse is None:
-            # Memories of 16 words for one span and the next would cost as much as they win.
+            # Memories of 16 words for two spans would cost as much as they save.
             connect_register(m, "waiting_span", made, ready)
         else:
             connect_late_fifo(m, "spans", made, ready, WAITING_SPANS)
@@ -206,7 +206,7 @@ class RendererUnit(wiring.Component):
         moves = depth.i.valid & depth.i.ready
         taken, there = moves & pixel.payload.last, waiting.valid
         if compact:
-            # Pixels are some cycles apart: a span's depth goes on the cycle after its last.
+            # Pixels are some cycles apart, so a span's depth leaves on the cycle after its last pixel.
             goes = Signal(name="depth_goes")
             m.d.sync += goes.eq(taken)
             taken, there = goes, there & ~goes
@@ -297,7 +297,7 @@ class RendererUnit(wiring.Component):
             return Const(1), Const(0)
         m.submodules.coarse = coarse = self.coarse
         place = coarse.i.payload
-        # A number that changes with the first span of a picture: a picture without spans may turn it back.
+        # A number that changes with the first span of a picture. A picture without spans may change it back.
         number, before, turned = (Signal(name=name) for name in ("number", "picture_before", "turned"))
         turns = turned | (self.constants.picture != before)
         m.d.sync += [before.eq(self.constants.picture), turned.eq(turns)]

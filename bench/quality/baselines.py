@@ -132,7 +132,7 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
     pipelines += [_Pipeline(method, gate=True) for method in ("quadratic", "linear")]
     pipelines += [_Pipeline("quadratic", "blinn_product", "compact", gate) for gate in (False, True)]
     entries = {f"frames: {pipeline.name}": pipeline.cycles for pipeline in pipelines}
-    # In this style a model moves the cycles by its latency alone.
+    # In this style the model changes only the latency, so the cycles differ only by this.
     pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]
     pipelines += [_Pipeline("quotient", "phong")]
     entries |= {f"parts: {pipeline.name}": pipeline.parts for pipeline in pipelines}
@@ -175,7 +175,7 @@ def read(path: Path = FILE) -> dict[str, dict[str, int]]:
 def differences(old: Figures, new: Figures, tolerance: float = 0.0) -> list[str]:
     """Changes by more than a tolerance. Each line has entry, figure, old, new, and change in percent.
 
-    An entry or figure that only one side has is a difference at any tolerance. A change from 0 is a
+    If only one side has an entry or figure, this is a difference at any tolerance. A change from 0 is a
     difference, too.
 
     Parameters

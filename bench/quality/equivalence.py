@@ -20,7 +20,7 @@ __all__ = ["Miter", "yosys"]
 _SECONDS = 20
 """Time limit of a proof of equivalence, in seconds.
 
-A first attempt comes before this proof. Its limit is a quarter of this time. Most proofs that succeed take at
+A first attempt comes before this proof. Its limit is a quarter of this time. Most successful proofs take at
 most 3 seconds.
 """
 

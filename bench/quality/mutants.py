@@ -14,10 +14,9 @@ share of killed mutants. These mutants do not count in it:
 Clocks are not mutated, and reset stays low. Other tests and proofs check them. The faults are in the unit's
 own cells. Parts that have a record are mutated for their own record.
 
-All mutants of a unit are one compiled model, with an input that chooses one. Survivors that count are listed:
-stimuli for them are missing, or a proof, or a waiver. Each change of a unit makes Yosys choose other faults,
-so survivors do not change the exit status. It is 1 if a unit's score is less than `LEAST`, and 2 for bad
-input.
+All mutants of a unit are one compiled model, with an input that chooses one. Survivors that count are listed.
+Each lacks a stimulus, a proof or a waiver. Each change of a unit makes Yosys choose other faults, so
+survivors do not change the exit status. It is 1 if a unit's score is less than `LEAST`, and 2 for bad input.
 """
 
 import re
@@ -115,7 +114,10 @@ class Score:
 
     @property
     def score(self) -> float:
-        """Share of killed mutants among the mutants neither equivalent nor waived. 1 if there are none."""
+        """Share of killed mutants among the mutants that are neither equivalent nor waived.
+
+        1 without such mutants.
+        """
         return self.killed / (self.killed + len(self.open)) if self.open else 1.0
 
 

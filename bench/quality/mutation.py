@@ -177,10 +177,11 @@ def _others_of(unit: Component) -> list[str]:
     return [name for name, member in members.items() if member.flow is Out and name not in known]
 
 
-# The reset is undriven and set to 0, so that its logic is removed. `setattr` removes initial values of wires,
-# as a wire would keep that of a register that `zinit` has inverted. `opt_dff` makes clock enables: a register
-# that held its word by a loop through a multiplexer would take in a fault at its output on every cycle. Then
-# an inversion would alternate from cycle to cycle, unseen where a word is held for an even number of cycles.
+# The reset is undriven and set to 0, so that its logic is removed. `setattr` removes initial values of wires.
+# Else a wire would keep the initial value of a register that `zinit` has inverted. `opt_dff` makes clock
+# enables: a register that held its word by a loop through a multiplexer would take in a fault at its output
+# on every cycle. Then an inversion would alternate from cycle to cycle, unseen where a word is held for an
+# even number of cycles.
 _FLATTEN = """\
 read_rtlil top.il
 hierarchy -auto-top
@@ -258,14 +259,14 @@ def _listed(count: int, seed: int, most: int, folder: Path) -> list[str]:
     """Commands for ``count`` different mutants or fewer, in lists of at most ``most``."""
     rounds = 1 if count <= most else 2 * -(-count // most)
     lists = [_LIST.format(count=min(count, most), seed=seed + k, round=k) for k in range(rounds)]
-    # In one run with what is before: a netlist that is read again has another order.
+    # This is one run with the commands before, because a netlist that is read again has another order.
     yosys("\n".join([_FLATTEN, *lists]), folder)
     found = [line for k in range(rounds) for line in (folder / f"list{k}.txt").read_text().splitlines()]
     return list(dict.fromkeys(found))[:count]
 
 
 def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
-    """Number of mutants of ``own`` cells that Yosys can list at once: two of each cell, or of each named bit.
+    """Number of mutants of ``own`` cells that Yosys can list at once: two a cell, or two a named bit.
 
     Yosys takes about two of each cell, of each named wire and of each of its bits. It never ends if asked for
     more. A bit counts if it is driven, or has only one reader.
@@ -343,7 +344,7 @@ class Mutants(cxxrtl.Compiled):
         compiler = next(find_compilers(), None)
         if compiler is None:
             raise CompilerMissing("no C++ compiler")
-        # -O1, as compiling takes longer than running.
+        # -O1 is used because compiling takes longer than running.
         compiler = replace(compiler, compile=(*compiler.compile, "-O1"))
         failure = cxxrtl._build(netlist, driver, compiler, "mutants", folder)
         if failure:
@@ -374,8 +375,8 @@ def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iter
     """Numbers of the mutants whose trace differs from the unit's trace for a vector.
 
     A counter of events has more bits than a run has events. Therefore the shortest run that changes a word of
-    the status is made again. Its counters begin at each power of 2 less 1, as after so many events. So the
-    next event changes one more bit.
+    the status is made again. Its counters begin at each power of 2, minus 1. So the next event changes one
+    more bit.
     """
     alive = set(mutants)
 

@@ -251,7 +251,7 @@ class AdaptiveNormaliser:
 
     @property
     def half_step(self) -> Fixed:
-        """Half a step of the result; with it added, a cut rounds half up."""
+        """Half a step of the result. When it is added, a cut rounds half up."""
         return Fixed.round(self.ACCUMULATOR_FORMAT, COMPONENT.step / 2)
 
     def reciprocal(self, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -111,7 +111,7 @@ class Bisection:
         return self._limit(self.max_angle)
 
     def reads_cosine(self, first_step: bool) -> bool:
-        """Whether a polynomial is in r in place of u."""
+        """Whether a polynomial takes r in place of u."""
         return first_step or self.as_published
 
     def polynomial(self, first_step: bool) -> tuple[Fixed, Fixed]:

@@ -81,7 +81,7 @@ class DifferenceAccumulator:
         fraction_bits = self.format.fraction_bits
         shift = fraction_bits - self.start_format.fraction_bits
         index = np.asarray(index, dtype=np.int64)[:, np.newaxis]
-        # An int64 wraps modulo 2^64, the hardware modulo 2^width: the low bits agree.
+        # An int64 wraps modulo 2^64, and the hardware modulo 2^width. Their low bits agree.
         total = (
             (start.codes[span] << shift)
             + (1 << (fraction_bits - self.result_format.fraction_bits - 1))

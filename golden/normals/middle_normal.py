@@ -45,7 +45,8 @@ class MiddleNormal:
     A wider span is flagged. u and N_c then saturate.
 
     Ends of length ``1 + x`` have a middle normal of length ``1 + x/(1 + r)``. If u would be negative, the
-    middle normal is half their sum, at most as long as the ends. A span with an end of length 0 is flagged.
+    middle normal is half the sum of the ends, and at most as long as the ends. A span with an end of length 0
+    is flagged.
 
     The other fits are for comparison, and need the same hardware. docs/theory/bounds.md#middle-normal has a
     table of their `model_error`. The fit of [T] is exact at angle 0, too. A plain minimax fit has an error
@@ -89,7 +90,7 @@ class MiddleNormal:
 
     @property
     def constant(self) -> Fixed:
-        """Constant of ``e``, its value at angle 0; it is 0 except for the plain minimax fits."""
+        """Constant of ``e``, its value at angle 0. It is 0 except for the plain minimax fits."""
         return Fixed(self.factor_format, _coefficients(self.fit)[0])
 
     @property

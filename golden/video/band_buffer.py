@@ -17,12 +17,12 @@ RGB565 = (5, 6, 5)
 
 @dataclass(frozen=True)
 class BandBuffer:
-    """Two bands of colour: one is shown, the other is drawn. All other pixels are background.
+    """Two bands of colour: one band is shown while the other is drawn. All other pixels are background.
 
     The *slot* of a band is the time in which the display shows its `lines` lines. A band that is incomplete
     when its slot begins is *late*. The display shows the background in its place, and the band is dropped
-    when it is complete. The next band to draw follows the last band. If its slot has begun, the next band is
-    the band of the next slot (`following`). So each line of a frame is either right or background. The
+    when it is complete. The next band to draw follows the last band. If the slot of that band has begun, the
+    band of the next slot is drawn (`following`). So each line of a frame is either right or background. The
     display's timing does not depend on the drawing.
 
     Colours are kept as their highest bits, ``channel >> (8 - bits)``, and shown with these bits repeated

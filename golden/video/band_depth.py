@@ -16,8 +16,8 @@ class BandDepth:
     A word holds a depth and a tag of ``tag_bits`` bits: the number of the band in which it was written,
     modulo ``2^tag_bits``. A word with another tag than the present tag reads as `DepthTester.CLEARED`. An old
     tag must not become the present tag again. So when a band begins, ``swept`` words are written with the tag
-    before the present tag, the words swept longest ago first. With ``2^t`` tags every word is swept again at
-    most ``2^t - 2`` bands later, one band before its tag would be the present tag.
+    before the present tag, beginning with the words that were swept longest ago. With ``2^t`` tags every word
+    is swept again at most ``2^t - 2`` bands later, one band before its tag would be the present tag.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ DIVIDERS, FEEDBACK_DIVIDERS = 128, 80
 """Largest divider of the PLL's reference and outputs, and largest divider of its feedback."""
 
 FEEDBACK = 200_000_000
-"""Highest rate of the fed-back output, Hz, although the PLL's outputs go to 400 MHz."""
+"""Highest rate of the fed-back output, Hz. Other outputs of the PLL go to 400 MHz."""
 
 SERIAL = 5
 """Rate of the serial clock over the rate of the pixel clock."""

@@ -7,7 +7,7 @@ from blysk.golden.video.motion import ANGLE_BITS
 __all__ = ["BUTTONS", "ControlState", "Controls"]
 
 BUTTONS = ("pause", "step", "material", "light")
-"""Buttons: stop or go on; turn the other way, or in a pause one step; next material; next light."""
+"""Buttons: stop or go on; turn the other way, or turn one step in a pause; next material; next light."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class ControlState:
 class Controls:
     """Angle and preset of each frame, controlled by buttons.
 
-    A button is sampled every ``2^debounce_bits`` cycles, longer than it bounces. It is pressed when it is
-    down and was up in the sample before. In a pause a press of ``step`` turns by one step. Else it reverses
-    the motion. The list of a frame has the index ``light * materials + material``.
+    A button is sampled every ``2^debounce_bits`` cycles, longer than it bounces. A button is pressed if it is
+    down in a sample and was up in the sample before. In a pause a press of ``step`` turns by one step. Else
+    it reverses the motion. The list of a frame has the index ``light * materials + material``.
 
     Parameters
     ----------

@@ -125,12 +125,12 @@ class Display:
             )
             words = np.einsum("nbl,b->nl", whole, weights)
             is_control = np.logical_and.reduce(np.isin(words[:, :3], CONTROL_WORDS), axis=1)
-            # Two in a row: no run of colour looks like that at any cut.
+            # Two control words in a row cannot be a part of colours, at any cut into words.
             counts.append((int((is_control[1:] & is_control[:-1]).sum()), offset, words))
         count, _, words = max(counts, key=lambda count: count[0])
         if count == 0:
             raise LaneError("no control words: the lanes are not aligned with each other")
-        # Until the crossing is set the lanes are idle.
+        # The lanes are idle until the crossing has started.
         started = int(np.argmax(words[:, 3] == CLOCK_WORD))
         words = words[started:]
         if (words[:, 3] != CLOCK_WORD).any():
@@ -162,4 +162,4 @@ class Display:
         # Before the first control word the start of the sum is unknown.
         seen = np.maximum.accumulate(is_control, axis=0)
         if (np.abs(total)[seen] > MAX_DISPARITY).any():
-            raise LaneError("a lane sends more ones than zeros, or fewer, than a balanced one may")
+            raise LaneError("a lane is not balanced: it sends too many ones, or too many zeros")

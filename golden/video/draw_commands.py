@@ -1,4 +1,4 @@
-"""Draw commands: lists of commands that are executed for every band, and made from a mesh."""
+"""Draw commands: lists of commands, made from a mesh and executed for every band."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -104,7 +104,8 @@ class DrawCommands:
         cull : sequence of int
             Indices of parts that are left out.
         sets : sequence of int, optional
-            For each preset, the index of its set of slots, see `Motion.of`; by default all have the first.
+            For each preset, the index of its set of slots, see `Motion.of`. By default all presets have the
+            first set.
         """
         rows: list[list[int]] = []
         starts = []

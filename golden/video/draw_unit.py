@@ -62,17 +62,17 @@ class Drawing:
     mesh : MeshMemory
         Vertices and triangles.
     motion : Motion
-        A slot for each part of the memory, for each set of axes of normals.
+        Matrices: a slot for each part of the memory and each set of axes of normals.
     commands : DrawCommands
         Lists, one for each preset of ``controls``.
     presets : tuple of tuple of FrameConstants
-        Constants that the lists write, of each preset and material.
+        Constants that the lists write, for each preset and material.
     renderer : Renderer
         Renderer with a design whose ``x_bits`` and ``y_bits`` come from `place_bits`.
     size : (int, int)
         Width and height of the picture.
     frames : tuple of FrameSettings
-        The whole picture for each preset. Each preset has its own, because a steeper highlight needs shorter
+        Settings of the whole picture for each preset. They differ, because a steeper highlight needs shorter
         spans.
     controls : Controls
         Angle and preset of each frame.

@@ -40,7 +40,7 @@ class Part:
     centre : float64 array, shape (3,)
         Middle of the mesh's box, in world units.
     scale : float
-        Length in world units of 1 in the memory.
+        Length in world units that 1 in the memory stands for.
     """
 
     first: int

@@ -77,10 +77,10 @@ class AxiLiteUnit(wiring.Component):
             with m.If(valid & ready):
                 m.d.sync += [full.eq(1), *taken]
 
-        # Whose turn it is, and whether an access is on its way.
+        # Whether a read or a write has its turn, and whether an access is in progress.
         writes, asked, last = Signal(name="writes"), Signal(name="asked"), Signal(name="last_writes")
         begins = Signal(name="begins")
-        # A response that is not taken keeps only its own kind waiting.
+        # A response that is not taken delays only accesses of its own kind.
         write, read = has_write & has_word & ~bus.bvalid, has_read & ~bus.rvalid
         m.d.comb += begins.eq(~asked & ~access.valid & (write | read))
         with m.If(begins):

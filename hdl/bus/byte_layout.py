@@ -17,7 +17,7 @@ def layout_of(
     """Layout of the bytes of a payload.
 
     The name of a member of a nested structure has both names, with an underscore between them. In an array of
-    structures the index is the name of each.
+    structures the index is the name of a structure.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class FramingUnit(wiring.Component):
     Parameters
     ----------
     design : ShadingPipeline
-        Design of the core; its `Build` says which of `TOPS` the core is.
+        Design of the core. Its `Build` names the core (see `TOPS`).
     **options
         Keyword arguments of the core's constructor.
 
@@ -56,8 +56,8 @@ class FramingUnit(wiring.Component):
         Members of the core, if it has them. In place of ``picture`` the constants have ``keep``.
     status : :py:`Out(...)`
         Counters of the core; ``frames``, the number of ended frames; ``misfits``, the number of beats with a
-        number that outgrew its field; and ``busy``. Of a misfit the low bits are taken. For an index past the
-        last material the last material is taken.
+        number that outgrew its field; and ``busy``. If a number outgrew its field, its low bits are taken.
+        For an index past the last material the last material is taken.
 
     Source: docs/theory/bus.md#streams; not in the documents.
     """
@@ -88,7 +88,7 @@ class FramingUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The core; the admission of beats; the beat held back and its flags."""
+        """The core, the admission of beats, and the beat that is held back with its flags."""
         m = Module()
         m.submodules.core = core = self.core
         inside = self.top.watch(core)
@@ -133,7 +133,7 @@ class FramingUnit(wiring.Component):
         return m
 
     def _give(self, m: Module, empty: Value) -> Value:
-        """The beat held back and the one at the output; whether the frame has left."""
+        """The beat that is held back, the beat at the output, and whether the frame has left."""
         made, shape = self.core.o, self.core.o.payload.shape()
         held, waiting = Signal(shape, name="held_back", reset_less=True), Signal(name="waiting")
         word, valid = Signal(self.o.payload.shape(), name="word", reset_less=True), Signal(name="valid")

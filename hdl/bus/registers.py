@@ -47,7 +47,7 @@ class RegistersUnit(wiring.Component):
     An access is answered 2 cycles after it was accepted. The next is accepted when the answer has been taken.
     A refused access changes only the registers ``errors`` and ``refused``. Registers of the picture and frame
     constants are written while ``busy`` is low, as whole words. Bits of ``errors`` are cleared at any time,
-    by the written bytes, all ones included. A read of a byte gets its word.
+    by the written bytes, all ones included. A read of a byte gets the whole word.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class RegistersUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The access in a register; its decoding; its answer in another register."""
+        """The access in a register, its decoding, and its answer in another register."""
         m = Module()
         access, full = Signal(self.i.payload.shape(), name="access"), Signal(name="full")
         answer, answered = Signal(self.o.payload.shape(), name="answer"), Signal(name="answered")
@@ -171,7 +171,7 @@ def _fits(register: Register, word: Value) -> Value:
     if register.range is not None:
         code, (low, high) = Value.cast(word[: register.width]), register.range
         code = code.as_signed() if register.signed else code
-        # A comparison that every code passes would be a warning of Verilator.
+        # Verilator would warn of a comparison that every code passes.
         fits &= Const(1) if low == 0 and not register.signed else code >= low
         fits &= code <= high
     return fits

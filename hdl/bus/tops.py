@@ -24,12 +24,12 @@ class Top:
     Parameters
     ----------
     title : str
-        Its input and its output, as in ``triangles to spans``.
+        Input and output of the core, as in ``triangles to spans``.
     unit : callable
-        Makes the core from a `ShadingPipeline`. Keywords go to the constructor of its unit.
+        Function that makes the core from a `ShadingPipeline`. Keywords go to the constructor of its unit.
     watch : callable
-        Makes a signal from the core, before it is elaborated. The signal is high while anything is inside,
-        except a beat that waits at ``o``.
+        Function that makes a signal from the core, before the core is elaborated. The signal is high while
+        anything is inside, except a beat that waits at ``o``.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""Programs that end with this process, at every kind of end."""
+"""Programs that end with this process, however it ends."""
 
 import atexit
 import contextlib
@@ -27,9 +27,9 @@ for number in running:
 
 
 class _Guard:
-    """A small process that reads what runs from a pipe, and kills it when the pipe's other end is gone.
+    """A small process that reads from a pipe what runs, and kills this when the pipe is closed.
 
-    The system closes that end whatever ends this process: SIGKILL, too.
+    The system closes this end even if SIGKILL ends this process.
     """
 
     def __init__(self) -> None:
@@ -45,13 +45,13 @@ class _Guard:
                 self._start()
 
     def add(self, number: int) -> None:
-        """Guard a process group; the guard has begun."""
+        """Guard a process group. The guard must have begun."""
         with self._lock:
             self._running.add(number)
             self._tell(b"+%d\n" % number)
 
     def discard(self, number: int) -> None:
-        """Guard it no more; nothing happens if it is not guarded."""
+        """End guarding a process group. If the group is not guarded, nothing happens."""
         with self._lock:
             if number in self._running:
                 self._running.discard(number)

@@ -31,20 +31,20 @@ def shown_shape(model: BandBuffer) -> data.StructLayout:
 class BandBufferUnit(wiring.Component):
     """Two bands in a memory with two clocks. `BandBuffer` is the bit-accurate model.
 
-    The domain ``sync`` draws, the domain ``pixel`` shows. Pixels of a free buffer are written as they come,
-    one a cycle. With ``done`` the buffer goes to the display. The display clears each word as it reads it, on
-    the same port, as the memory reads before it writes. It gives the buffer back after its last line. A
-    buffer that came too late is given back uncleared, at the beginning of the next slot. The drawing side
-    clears an uncleared buffer, and each buffer after a reset, a word a cycle, while the band is already
-    requested. The display's addresses follow from the timing alone, so it does not depend on the time of
-    drawing. A colour leaves a cycle after its timing. The unit has no multipliers.
+    The domain ``sync`` draws, and the domain ``pixel`` shows. Pixels of a free buffer are written as they
+    come, one in each cycle. With ``done`` the buffer goes to the display. The display clears each word as it
+    reads it, on the same port, as the memory reads before it writes. It gives the buffer back after its last
+    line. A buffer that came too late is given back uncleared, at the beginning of the next slot. The drawing
+    side clears an uncleared buffer, and each buffer after a reset. It clears a word in each cycle, while the
+    band is already requested. The display's addresses follow from the timing alone, so it does not depend on
+    the time of drawing. A colour leaves a cycle after its timing. The unit has no multipliers.
 
-    Toggles cross between the clocks, each through two flip-flops: two for each buffer (it is filled; it is
-    free), one for the beginning of a slot, one for a late band. Beside them cross the numbers of bands and of
-    the slot, and a flag of a free buffer that was not shown. Each of these words is written with its toggle
-    or a cycle before. It is read two cycles of the reader's clock later or more. The constraint is that the
-    words' paths take less than one period of the reader's clock. A slot lasts longer than a crossing, because
-    its lines have 800 pixels each by default.
+    Toggles cross between the clocks, each through two flip-flops. Each buffer has two toggles: it is filled,
+    and it is free. A toggle marks the beginning of a slot, and another marks a late band. The numbers of
+    bands and of the slot cross beside the toggles, and a flag of a free buffer that was not shown. Each of
+    these words is written with its toggle or a cycle before. It is read at least two cycles of the reader's
+    clock later. The constraint is that the words' paths take less than one period of the reader's clock. A
+    slot lasts longer than a crossing, because its lines have 800 pixels each by default.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class BandBufferUnit(wiring.Component):
     shown : :py:`Out(shown_shape(model))`
         Domain ``pixel``: the timing a cycle later, and the colour.
     status : :py:`Out(counters_shape("late_bands", "frames"))`
-        Bands replaced by the background, and frames begun, since the reset.
+        Number of bands replaced by the background, and number of frames begun, since the reset.
 
     Source: docs/theory/video.md#bands.
     """
@@ -86,12 +86,12 @@ class BandBufferUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The memory, both sides of it, and the signals that cross between them."""
+        """The memory, both its sides, and the signals that cross between the sides."""
         m = Module()
         given, width = self.model, sum(self.model.colour_bits)
         m.submodules.colours = memory = Memory(shape=width, depth=2 * given.pixels, init=[])
-        # Written in `sync`: a buffer is filled, and its band. Written in `pixel`: it is free, and it was not
-        # shown; the slot, and its beginning.
+        # `sync` writes that a buffer is filled, and its band. `pixel` writes that a buffer is free, whether
+        # it was not shown, the slot, and the slot's beginning.
         self._filled, self._bands = Signal(2, name="filled"), [self._number(f"band_{k}") for k in range(2)]
         self._freed, self._slot = Signal(2, name="freed"), self._number("slot", given.bands - 1)
         self._unseen = Signal(2, name="unseen", init=0b11)
@@ -109,14 +109,14 @@ class BandBufferUnit(wiring.Component):
 
     @property
     def _clear(self) -> int:
-        """The background's word, by which words are XORed: a memory of zeros is cleared."""
+        """Words are XORed with the background's word. So a memory of zeros is a cleared memory."""
         return sum(
             int(code) << sum(self.model.colour_bits[:k])
             for k, code in enumerate(self.model.kept(self.model.background))
         )
 
     def _draw(self, m: Module, write) -> None:
-        """Clear a free buffer that was not shown, ask for its band, write its pixels, hand it over."""
+        """Clear a free buffer that was not shown, ask for its band, write its pixels, pass it on."""
         given = self.model
         freed, begun = Signal(2, name="freed_seen"), Signal(name="begun_seen")
         m.submodules += [FFSynchronizer(self._freed, freed), FFSynchronizer(self._begun, begun)]
@@ -219,5 +219,5 @@ class BandBufferUnit(wiring.Component):
 
 
 def _times(value: Value, factor: int) -> Value:
-    """A product by a constant, as sums: no multiplier for four bits."""
+    """A product by a constant, as sums. Four bits need no multiplier."""
     return sum(value << k for k in range(factor.bit_length()) if factor >> k & 1)

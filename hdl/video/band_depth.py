@@ -17,7 +17,7 @@ class BandDepthUnit(wiring.Component):
     """The memory behind a `DepthMemory` port, anew for each band. `BandDepth` is the bit-accurate model.
 
     With ``begin`` the tag counts up, and `BandDepth.swept` words (all words after a reset) are swept, one a
-    cycle. Meanwhile ``busy`` is high; leave the port alone. The unit has no multipliers.
+    cycle. Meanwhile ``busy`` is high. Do not use the port then. The unit has no multipliers.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ class ControlsUnit(wiring.Component):
     Members
     -------
     buttons : :py:`In(4)`
-        One bit for each of `BUTTONS`, 1 while down, from any clock domain.
+        One bit for each of `BUTTONS`, 1 while the button is down. Any clock domain may drive the bits.
     frame : :py:`In(1)`
         A frame begins.
     angle : :py:`Out(12)`

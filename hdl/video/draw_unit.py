@@ -68,7 +68,7 @@ class DrawUnit(wiring.Component):
     done : :py:`Out(stream.Signature(band_shape(bands)))`
         Bands whose pixels have all been taken.
     pixels : :py:`Out(stream.Signature(drawn_band_pixel_shape(x_bits, y_bits)))`
-        Pixels of the last requested band. At a place the last pixel counts.
+        Pixels of the last requested band. Of several pixels at a place, the last pixel counts.
     buttons : :py:`In(4)`
         See `ControlsUnit`.
     status : :py:`Out(counters_shape(*STATUS))`
@@ -98,7 +98,7 @@ class DrawUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The units, and what one command after the other does with them."""
+        """The units, and the commands, which use the units one after the other."""
         m = Module()
         for name in ("render", "depth", "mesh", "commands", "vertex", "assembly", "motion", "controls"):
             m.submodules[name] = getattr(self, name)
@@ -118,7 +118,7 @@ class DrawUnit(wiring.Component):
         return m
 
     def _matrix(self, m: Module) -> None:
-        """The matrix's registers, one after the other."""
+        """The registers of the matrix are written one after the other."""
         matrix = Signal(matrix_shape(), name="matrix")
         given = self.motion.o.payload
         words = [word for name in ("position", "normal") for row in matrix[name] for word in row]
@@ -132,7 +132,7 @@ class DrawUnit(wiring.Component):
     def _band(self, m: Module) -> None:
         """One band after the other."""
         given, commands = self.model, self.commands
-        # Behind a register: a word of the memory comes late in its cycle.
+        # A register follows, because a word of the memory comes late in its cycle.
         self._command_in = stream.Signature(commands.o.payload.shape()).create(path=("command",))
         connect_register(m, "waiting_command", commands.o, self._command_in)
         command = self._command_in.payload
@@ -167,7 +167,7 @@ class DrawUnit(wiring.Component):
             self.done.payload.eq(band),
         ]
         idle = Signal(name="idle")
-        # A cycle late, but before the command behind a draw comes.
+        # This is a cycle late, but before the command after a draw command comes.
         m.d.sync += idle.eq(self.assembly.idle & render.idle)
         with m.FSM(name="state") as state:
             with m.State("clear"):

@@ -23,8 +23,8 @@ def range_shape() -> data.StructLayout:
 class MeshMemoryUnit(wiring.Component):
     """Reads the vertices of ranges from a memory with contents fixed at build time, one a cycle.
 
-    A range is accepted while no other is read. Its first vertex is offered two cycles later. The unit has no
-    multipliers.
+    A range is accepted while no other range is read. Its first vertex is offered two cycles later. The unit
+    has no multipliers.
 
     Parameters
     ----------

@@ -27,7 +27,10 @@ def turn_shape(slots: int) -> data.StructLayout:
 
 
 def entry_shape() -> data.StructLayout:
-    """Shape of an entry: its index in the matrix, and its value, in `OFFSET` or at the end in `ENTRY`."""
+    """Shape of an entry: its index in the matrix, and its value.
+
+    The format is `OFFSET`, and `ENTRY` for the last entries.
+    """
     return data.StructLayout({"index": range(ENTRIES), "value": FixedShape(OFFSET)})
 
 

@@ -10,18 +10,18 @@ __all__ = ["OutputCells"]
 
 
 class OutputCells(wiring.Component):
-    """A cell a lane that sends bit 0 of a pair in the first half of a cycle, bit 1 in the second.
+    """A cell for each lane. It sends bit 0 of a pair in the first half of a cycle, then bit 1.
 
-    With ports it is the FPGA's own cell, by Amaranth's `DDRBuffer`, ``ODDRX1F`` on ECP5. Without ports it is
-    a model of this cell. On each cycle ``bits`` has the pair that the pins send, two cycles after its input,
-    as with ``ODDRX1F``. Its clock is the domain ``serial``.
+    With ports the cell is the FPGA's own cell (``ODDRX1F`` on ECP5), made by Amaranth's `DDRBuffer`. Without
+    ports it is a model of this cell. On each cycle ``bits`` has the pair that the pins send, two cycles after
+    its input, as with ``ODDRX1F``. Its clock is the domain ``serial``.
 
     Parameters
     ----------
     lanes : int
         Lanes.
     ports : sequence of amaranth.lib.io.PortLike, optional
-        One a lane, a pin or a differential pair.
+        One port for each lane, which is a pin or a differential pair.
 
     Members
     -------

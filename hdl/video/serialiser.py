@@ -45,10 +45,11 @@ class SerialiserUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """A shift register a lane, and one bit that goes with the last pair."""
+        """A shift register for each lane, and a bit that marks the last pair."""
         m = Module()
         pairs = self.model.PAIRS
-        # One bit for each pair that is left; a word is taken in by an empty register, or at the last pair.
+        # One bit for each pair that is left. A word is taken in if the register is empty, or at the last
+        # pair.
         left = Signal(pairs, name="left")
         lanes = [Signal(BITS, name=f"lane_{k}", reset_less=True) for k in range(self.model.lanes)]
         payload = Signal(self.o.payload.shape(), name="pair")

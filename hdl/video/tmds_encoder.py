@@ -33,9 +33,10 @@ class TmdsEncoderUnit(PipelinedUnit):
     Attributes
     ----------
     disparity : Signal
-        Ones less zeros sent since the last control word, from `elaborate` on.
+        Number of ones minus number of zeros sent since the last control word. It exists from `elaborate` on.
     chain, excess : Value
-        The word's eight bits before the balance, and half their ones less zeros, a cycle before the output.
+        The word's eight bits before the balance, and half of their ones minus zeros. They come a cycle before
+        the output.
 
     Source: docs/theory/video.md#tmds.
     """
@@ -45,7 +46,7 @@ class TmdsEncoderUnit(PipelinedUnit):
         super().__init__(SYMBOL, unsigned(BITS), latency=self.model.latency)
 
     def datapath(self, m, operands):
-        """XOR or XNOR by the ones of the byte; the chain's excess of ones; inversion and disparity."""
+        """XOR or XNOR by the ones of the byte, the chain's excess of ones, inversion and disparity."""
         byte = operands.data
         ones = Signal(range(9), name="ones")
         use_xor, chain = Signal(name="use_xor"), Signal(8, name="chain")
@@ -58,7 +59,7 @@ class TmdsEncoderUnit(PipelinedUnit):
         symbol = self.register(m, Cat(operands.control, operands.active), "symbol_1")
         half = Signal(signed(4), name="half")
         m.d.comb += half.eq(sum(first) - 4)
-        # The excess and the disparity are even: registers hold half of each.
+        # The excess and the disparity are even, so registers hold half of each.
         excess = self.register(m, half, "excess")
         word, xor = self.register(m, first, "chain_2"), self.register(m, xor, "xor_2")
         symbol = self.register(m, symbol, "symbol_2")

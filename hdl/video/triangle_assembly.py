@@ -29,9 +29,9 @@ def band_rows_shape() -> data.StructLayout:
 class TriangleAssemblyUnit(wiring.Component):
     """Keeps vertices of a frame, makes triangles from them. `TriangleAssembly` is the bit-accurate model.
 
-    A triangle takes three cycles, one for each corner that is read, also if it is not sent. It is offered
-    `latency` cycles after its first corner's address. A range is accepted while no other is read, and costs
-    two cycles more. The unit has no multipliers.
+    A triangle takes three cycles, one for each corner that is read, even if the triangle is not sent. It is
+    offered `latency` cycles after its first corner's address. A range is accepted while no other is read, and
+    costs two cycles more. The unit has no multipliers.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class TriangleAssemblyUnit(wiring.Component):
         self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
-        """The walk through the triangles' words; the corners' words; the test of the band."""
+        """The walk through the triangles' words, the corners' words, and the test of the band."""
         m = Module()
         mesh = self.model.mesh
         m.submodules.triangles = triangles = Memory(
@@ -89,18 +89,20 @@ class TriangleAssemblyUnit(wiring.Component):
         result, valid = Signal(self.o.payload.shape(), name="result"), Signal(name="valid")
         advance = Signal(name="advance")
         m.d.comb += [
-            # One address: a block RAM that reads and writes at different ones needs registers beside it.
+            # Reads and writes share one address. With two addresses a block RAM would need registers beside
+            # it.
             write.addr.eq(read.addr),
             write.data.eq(Value.cast(self.write.payload.vertex)),
             write.en.eq(self.write.valid),
             self.write.ready.eq(1),
-            # A skid buffer would cost 400 bits for nothing: the next unit takes 5 cycles or more a triangle.
+            # A skid buffer would cost 400 bits without a gain, because the next unit takes at least 5 cycles
+            # for a triangle.
             advance.eq(~valid | self.o.ready),
             self.o.valid.eq(valid),
             copy(self.o.payload, result),
         ]
 
-        # A triangle's word is read a cycle before the address of its first corner, and held for three.
+        # A triangle's word is read a cycle before the address of its first corner, and kept for three cycles.
         left, following = (Signal(range(mesh.triangles + 1), name=name) for name in ("left", "following"))
         material, corner = Signal(MATERIAL_BITS, name="material"), Signal(2, name="corner")
         walks = Signal(name="walks")
@@ -135,14 +137,14 @@ class TriangleAssemblyUnit(wiring.Component):
         return m
 
     def _gather(self, m: Module, advance, walks, corner, word, material) -> dict:
-        """Shift corners in; the range of their scanlines, and whether one is outside."""
+        """Shift corners in. Find the range of their scanlines, and whether a corner is outside."""
         grid = self.model.grid
         arrives, arriving = Signal(name="arrives"), Signal(2, name="arriving")
         corners = [Signal(word.shape(), name=f"corner_{k}") for k in range(3)]
         low, high = (Signal(signed(X_BITS), name=name) for name in ("low", "high"))
         outside, whole = Signal(name="outside"), Signal(name="whole")
         kept = Signal.like(material, name="material_of_corners")
-        # A word of the memory comes late in its cycle: its scanline is compared on the next.
+        # A word of the memory comes late in its cycle, so its scanline is compared on the next cycle.
         row, came, judged = (
             Signal.like(first_centre(word.y, grid), name="row"),
             Signal(name="came"),

@@ -134,7 +134,7 @@ class VertexUnit(PipelinedUnit):
         )
 
         def mantissa(c, shift, outside):
-            # The first bit is 1 for every vertex: one that is outside gets W = 1.
+            # The first bit is 1 for every vertex, because a vertex outside gets W = 1.
             moved = (c >> Mux(outside, 0, shift))[:places]
             return FixedValue(Reciprocal.FORMAT, Cat(Mux(outside, 0, moved), Const(1, 1)))
 
@@ -201,7 +201,7 @@ class VertexUnit(PipelinedUnit):
         vertex = result.vertex
         m.d.comb += [
             result.index.eq(value["index"]),
-            # A place is counted from the picture's edge to the other, its code in parts of a pixel.
+            # A place counts from one edge of the picture to the other. Its code is in parts of a pixel.
             *(copy(vertex[name], value[name].scale(self.model.scale_bits)) for name in "xy"),
             Value.cast(vertex.depth).eq(value["depth"]),
             *(Value.cast(vertex.normal[k]).eq(value[f"normal_{k}"]) for k in range(3)),

@@ -15,7 +15,7 @@ class WordCrossing(wiring.Component):
     cycles. If the edges of both clocks lie close together, later edges may come a cycle early or late. They
     do not move the counter. So every word is taken at the same distance from its edge, two or three cycles.
     The constraint is that the words' paths take less than two periods of the serial clock. The words stay for
-    five.
+    five periods.
 
     Both clocks come from one source, at 1 : 5. The phase does not matter.
 
