@@ -36,7 +36,7 @@ SELDOM = (
     *("attribute_serialiser", "vertex_sort", "span_clip", "edge_walk", "vector_normaliser", "span_halver"),
     *("texture_address", "texel_memory", "texture_filter", "texture_sampler"),
     "serial_vectors",
-    *("attribute_spans", "attributes"),
+    *("attribute_spans", "attributes", "albedo"),
     *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_tester"),
     *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )

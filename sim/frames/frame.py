@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from amaranth.lib import data
 
+from blysk.golden.albedo.attribute_spans import SpanAttributes
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants, writes_of
@@ -22,7 +24,14 @@ from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import Run, simulate
 
-__all__ = ["FrameSimulator", "SimulatedFrame", "beats_of", "sample_constants", "sample_material"]
+__all__ = [
+    "FrameSimulator",
+    "SimulatedFrame",
+    "attribute_beats",
+    "beats_of",
+    "sample_constants",
+    "sample_material",
+]
 
 
 @dataclass(frozen=True)
@@ -58,12 +67,40 @@ def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dic
     members = unit.i.payload.shape().members
     vectors = {} if spans.vectors is None else spans.vectors._asdict()
     given = {name: vectors[name] for name in members if name in vectors}
-    others = [name for name in members if name != "values" and name not in given]
+    others = [name for name in members if name not in ("values", "attributes") and name not in given]
     beats = {name: getattr(spans, name) for name in others} | given
     if "values" in members:
         beats["values"] = values = np.zeros(len(spans), dtype_of(members["values"]))
         for name in members["values"].elem_shape.members:
             values[name] = getattr(spans.values, name)
+    if "attributes" in members:
+        beats["attributes"] = attribute_beats(members["attributes"], spans.attributes)
+    return beats
+
+
+def attribute_beats(layout: data.StructLayout, attributes: SpanAttributes) -> np.ndarray:
+    """Attributes of spans as beats.
+
+    Parameters
+    ----------
+    layout : StructLayout
+        Layout of the beats, see `span_albedo_shape`. Further members stay 0.
+    attributes : SpanAttributes
+        The attributes.
+    """
+    beats = np.zeros(len(attributes.exponent), dtype_of(layout))
+    weights = attributes.weight_start, attributes.weight_step
+    for member, codes, weight in zip(
+        ("start", "step"), (attributes.start, attributes.step), weights, strict=True
+    ):
+        for name in beats[member].dtype.names:
+            if name == "weight":
+                beats[member]["weight"] = weight
+            else:
+                beats[member][name] = codes[:, :3] if name == "colors" else codes[:, -2:]
+    for name in ("exponent", "base", "range", "level"):
+        if name in beats.dtype.names:
+            beats[name] = getattr(attributes, name)
     return beats
 
 
