@@ -55,10 +55,9 @@ class QuotientSpansUnit(wiring.Component):
     3 P cycles, or ``P + 6`` if it has one pixel. All sums have one shift, and a start waits in registers.
 
     *Accumulators.* Second differences are taken while the last three pixels of a span leave. First
-    differences are taken with the last two pixels, and the start with the last pixel. So spans follow each
-    other without a gap: a run of n spans with p pixels takes p cycles, if at most a third of them have two
-    pixels. The first addition takes half of a second difference, and the other additions take the whole. So
-    ``D1 = 2 v·d + d·d`` takes no adder.
+    differences are taken with the last two pixels, the start with the last pixel. So spans follow each other
+    without a gap. A run of spans takes as many cycles as pixels, if at most a third of the spans have two.
+    The first addition takes half of a second difference. So ``D1 = 2 v·d + d·d`` takes no adder.
 
     The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span. For
     a span of one pixel these are `short_latency` cycles. Payloads are registers.
@@ -159,8 +158,7 @@ class QuotientSpansUnit(wiring.Component):
         else:
             self._set_up(m, (second, second_waits), (first, first_waits), start)
         self._take(m, advance, takes, (second_waits, first_waits), start)
-        # Half of the second difference is added on the cycle after the first difference was taken. Then it
-        # waits.
+        # On the cycle after the first difference was taken, half of the second difference is added.
         halves, ready = Signal(name="halves"), self._ready
         with m.If(advance):
             m.d.sync += halves.eq(takes_first)
@@ -304,8 +302,7 @@ class QuotientSpansUnit(wiring.Component):
         shifted += [
             self._shift(register, total, more, exponent, f"line_{k}") for k, total in enumerate(lines)
         ]
-        # Second differences wait until the first differences of the span before are taken. By then the second
-        # differences of that span are taken, too.
+        # Second differences wait until both differences of the span before are taken.
         m.d.comb += moves.eq(~((at_coarse[0] & first[1]) | (at_sums[2] & ~to_start.ready)))
         for which, (word, waits) in enumerate((second, first)):
             with m.If(moves & at_coarse[which]):
@@ -425,10 +422,7 @@ class QuotientSpansUnit(wiring.Component):
     def _line(
         self, register: Callable, product: Callable, light: int, b: dict[str, Value], is_second
     ) -> Value:
-        """Sum of the products of l.
-
-        In the turn of the second differences it is z times 2^16, if z is taken.
-        """
+        """Sum of the products of l. With second differences it is z times 2^16, if z is taken."""
         p = self.model
         if not p.highlights:
             height = b[f"z{light}"]
@@ -436,8 +430,7 @@ class QuotientSpansUnit(wiring.Component):
             return register(scaled, f"line_sum_{light}")
         sine, cosine = (part.as_value() for part in self.constants[light])
         if p.takes_heights:
-            # Gates stand here in place of a choice. From a choice of constants Yosys makes resets, which
-            # multipliers do not have.
+            # Gates, because Yosys makes resets from a choice of constants. Multipliers have no resets.
             kept = (~is_second).replicate(len(sine))
             sine, cosine = sine.as_unsigned() & kept, cosine.as_unsigned() & kept
             sine, cosine = sine.as_signed(), Cat(cosine[:16], cosine[16] | is_second, cosine[17]).as_signed()
@@ -459,8 +452,7 @@ class QuotientSpansUnit(wiring.Component):
         # Whether at most one, two, three pixels of a span are left, counting the pixel on the output.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
         left, valid = Signal(self.length_bits, name="left"), Signal(name="valid")
-        # Whether the second and the first differences of the next span were taken, and whether they may be
-        # taken.
+        # Whether second and first differences of the next span were taken, and whether they may be.
         has_second, self._ready = Signal(name="has_second"), Signal(name="ready")
         may_second, may_first = Signal(name="may_second", init=1), Signal(name="may_first")
         # The waiting start's span: whether it has two pixels or more, at most two, and at most three.

@@ -75,9 +75,7 @@ ColorLike = str | float | Triple
 """A colour: ``"#rrggbb"``, one number, or three."""
 
 Source = Union[str, os.PathLike[str], Mesh, Sequence[Any], "trimesh.Trimesh", "trimesh.Scene"]
-"""``"teapot"``, a mesh file, a scene file (``.toml``), a mesh, also of `trimesh`, or arrays: vertices, faces
-and perhaps normals."""
-
+"""``"teapot"``, a mesh or scene file, a mesh (also of `trimesh`), or arrays of vertices, faces and normals."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """Names of engines. ``"auto"`` takes ``"cxxrtl"``, or ``"pysim"`` if no C++ compiler works."""

@@ -29,7 +29,7 @@ def test_bad_input_is_one_line(tmp_path, monkeypatch):
 def test_use_of_resources():
     entry = placed(DEVICE)["quotient", "blinn"]
     assert use(entry["date"])["luts"] == entry["luts"]
-    with pytest.raises(ValueError, match="not 1999"):
+    with pytest.raises(ValueError, match="not of 1999"):
         use("1999")
 
 
