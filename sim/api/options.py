@@ -75,7 +75,7 @@ ColorLike = str | float | Triple
 """A colour: ``"#rrggbb"``, one number, or three."""
 
 Source = Union[str, os.PathLike[str], Mesh, Sequence[Any], "trimesh.Trimesh", "trimesh.Scene"]
-"""``"teapot"``, a mesh or scene file, a mesh (also of `trimesh`), or arrays of vertices, faces and normals."""
+"""``"teapot"``, a mesh or scene file, a mesh (or of trimesh), or arrays: vertices, faces, perhaps normals."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """Names of engines. ``"auto"`` takes ``"cxxrtl"``, or ``"pysim"`` if no C++ compiler works."""
