@@ -155,7 +155,7 @@ def test_weight_of_1_and_colours(tmp_path):
     text = "v 0 0 0 1.0\nv 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 1e0\nf 1 2 3 4\n"
     loaded = load(tmp_path / "a.obj", text)
     assert drawn_area(loaded) == pytest.approx(2)
-    assert loaded.ignored == ("vertex colours",)
+    assert loaded.ignored == ("3 missing colours of vertices",)
 
 
 HEAD = (
