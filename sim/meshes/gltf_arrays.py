@@ -219,6 +219,8 @@ class _Arrays:
         if of_colors and not scaled and kind != _FLOAT:
             raise Refused(f"its {name} has whole numbers that are not normalised", ONE_MATERIAL)
         if name not in decoded:
+            if not {"bufferView", "sparse"} & accessor.keys():
+                raise Refused(f"its {name} has no data", ONE_MATERIAL)
             return self.read(index).astype(np.float64)
         values = decoded[name].astype(np.float64)
         return _normalised(values, np.dtype(_TYPES[kind])) if scaled else values
@@ -352,10 +354,13 @@ def _looks(
     """Colours and texture coordinates of a primitive's vertices; ``None`` where there are none."""
     info = color_texture(material)
     names = ["COLOR_0", *([] if info is None else [texture_set(info)])]
-    values = {name: arrays.look(attributes[name], name, decoded) for name in names if name in attributes}
-    for name in [name for name in values if len(values[name]) != count]:
-        found.tell(f"{name} of another number than positions")
-        del values[name]
+    values = {}
+    for name in [name for name in names if name in attributes]:
+        if arrays.document["accessors"][attributes[name]]["count"] == count:
+            values[name] = arrays.look(attributes[name], name, decoded)
+        if len(values.get(name, ())) != count:
+            found.tell(f"{name} of another number than positions")
+            values.pop(name, None)
     colors, coordinates = values.get("COLOR_0"), values.get(names[-1])
     if colors is not None:
         mode = material.get("alphaMode", "OPAQUE")

@@ -281,7 +281,7 @@ def _huge_header(rng: random.Random) -> Case:
         files = {"a.stl": bytes(80) + struct.pack("<I", count % 2**32 or 10**9) + bytes(rng.choice([0, 50]))}
     else:
         document, buffer = document_of(None)
-        part = rng.choice(document["accessors"])
+        part = rng.choice(document["accessors"][:3])
         if kind == "count":
             part["count"] = count
         elif kind == "no view":

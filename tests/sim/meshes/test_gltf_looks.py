@@ -166,6 +166,13 @@ def test_colours_of_another_number_than_positions(tmp_path):
     loaded = load(tmp_path / "a.glb", content)
     assert loaded.ignored == ("COLOR_0 of another number than positions",)
     assert (len(loaded.mesh.colors), loaded.materials) == (0, (FileMaterial(),))
+    document, buffer = with_array(mesh_gltf(), "COLOR_0", [[1, 0, 0]] * 3)
+    del document["accessors"][-1]["bufferView"]
+    check_refused(tmp_path / "a.glb", "its COLOR_0 has no data", content=(document, buffer))
+    # It is not made, only to be left out.
+    document["accessors"][-1]["count"] = 3 * 10**7
+    told = ("COLOR_0 of another number than positions",)
+    assert load(tmp_path / "a.glb", (document, buffer)).ignored == told
     document, buffer = mesh_gltf()
     document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 9
     reason = "it has a mesh with the accessor 9 (from 0), but there are 2"
