@@ -117,11 +117,13 @@ def default_method(
     gate: bool = False,
     operand: Operand | None = None,
     setup_interval: int | None = None,
+    local: bool = False,
 ) -> str:
     """The method of a design that names none.
 
-    It is ``quotient``, which models of R·V need. Three options, which ``quotient`` lacks, get
-    ``renormalise``, the most exact method of normals:
+    It is ``quotient``, which models of R·V need. Near lights and a near viewer get ``chord-local``, the only
+    method that serves them. Three options, which ``quotient`` lacks, get ``renormalise``, the most exact
+    method of normals:
 
     - a model of `MODELS`, which has a unit of its own in place of a table;
     - an operand;
@@ -134,9 +136,13 @@ def default_method(
     ----------
     model, gate, operand, setup_interval
         As for `preset`.
+    local : bool
+        Whether a light has a position, or the viewer is near.
     """
     if model in MIRROR_LOBES:
         return "quotient"
+    if local:
+        return "chord-local"
     if gate:
         return "quadratic"
     return "renormalise" if model in MODELS or operand or setup_interval else "quotient"

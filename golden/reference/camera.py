@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,6 +66,21 @@ class Camera:
             raise ValueError(
                 f"field_of_view must be greater than 0 and less than 180 degrees, not {self.field_of_view}"
             )
+
+    def scaled(self, shift: int) -> "Camera":
+        """The camera in a mesh whose unit has been multiplied by ``2**shift``.
+
+        Raises
+        ------
+        OverflowError
+            If it is too far away.
+        """
+        position, target = (
+            (math.ldexp(x, shift), math.ldexp(y, shift), math.ldexp(z, shift))
+            for x, y, z in (self.position, self.target)
+        )
+        height, near = (math.ldexp(length, shift) for length in (self.height, self.near))
+        return replace(self, position=position, target=target, height=height, near=near)
 
     @property
     def viewer(self) -> np.ndarray:

@@ -226,7 +226,7 @@ SCENE: dict[str, Option] = {
         Direction({word: word for word in VIEW_WORDS}),
         (0.4, 0.5, 1.0),
         "Direction from the mesh to the viewer. The camera shows the whole mesh. The words and the default "
-        "turn with --up.",
+        "turn with --up. Options of the camera replace the camera of a file.",
         "camera.view",
     ),
     "position": Option(
@@ -253,7 +253,7 @@ SCENE: dict[str, Option] = {
     "viewer": Option(
         Choice("viewer", VIEWERS),
         "distant",
-        "distant: highlights seen from one direction. near: from the camera; needs --method chord-local.",
+        "distant: highlights seen from one direction. near: from the camera, by --method chord-local.",
         "camera.viewer",
     ),
     "lights": Option(
@@ -263,7 +263,7 @@ SCENE: dict[str, Option] = {
             "give a direction other than 0 and colours of 0 or more",
         ),
         (-0.5, 0.8, 0.7),
-        "Direction to a light, and its colour (1,1,1 if left out).",
+        "Direction to a light, and its colour (1,1,1 if left out). Replaces the lights of a file.",
         "lights",
     ),
     "point_lights": Option(
@@ -274,7 +274,7 @@ SCENE: dict[str, Option] = {
         ),
         None,
         "Position of a light in the mesh's units, its colour, and its attenuation. At distance d the light "
-        "counts 1/(K0 + K1 d + K2 d^2), at most 1. Needs --method chord-local.",
+        "counts 1/(K0 + K1 d + K2 d^2), at most 1. Takes --method chord-local.",
     ),
     "spot_lights": Option(
         Lights(
@@ -313,8 +313,8 @@ DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
         None,
-        "Method of interpolation along a span.  [default: quotient; quadratic with --gate; renormalise with "
-        "--operand, --setup-interval, or a model without a table]",
+        "Method of interpolation along a span.  [default: quotient; near lights: chord-local; --gate: "
+        "quadratic; --operand, --setup-interval or a model without a table: renormalise]",
         "pipeline.method",
     ),
     "model": Option(

@@ -9,7 +9,9 @@ from time import perf_counter
 from typing import Any, Unpack, cast
 
 from blysk.golden.frames.prepare import constants_of
+from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import built, design_of, refused_counts
@@ -147,7 +149,10 @@ def prepare_rendering(
     with settings.located():
         made = _built(settings, design or _design(settings))
         stage("loading the mesh")
-        loaded = load(settings)
+        most = MAX_LIGHTS if design is None else design.lights
+        loaded = load(settings, lights=most, local=design is None and _serves_local(settings))
+        if loaded.lights and design is None:
+            made = _built(settings, _design(settings))
         seconds = {"load": perf_counter() - start}
         simulator, used = None, "cxxrtl"
         while True:
@@ -256,6 +261,15 @@ def _design(settings: Settings) -> ShadingPipeline:
         option, remedy = ("geometry", "use software") if hardware else ("method", "use method chord-local")
         raise settings.refuse(option, "point lights and a near viewer need the values of a span", remedy)
     return replace(made, factors=tuple(index for index, light in enumerate(lights) if light.fades))
+
+
+def _serves_local(settings: Settings) -> bool:
+    """Whether the method of the settings serves lights with a position, or may become one that does."""
+    if settings["geometry"] == "hardware" or settings["model"] in MIRROR_LOBES:
+        return False
+    if "method" in settings.given:
+        return bool((METHODS | PUBLISHED)[settings["method"]].serves_local)
+    return not (settings["gate"] or settings["operand"] or settings["setup_interval"])
 
 
 def _specialised(scenes: Sequence[Scene], design: ShadingPipeline, settings: Settings) -> Specialisation:

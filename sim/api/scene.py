@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blysk.golden.frame_constants import FrameConstants
+from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.light import Triple
@@ -24,6 +25,9 @@ from blysk.sim.meshes.materials import surfaces
 from blysk.sim.meshes.mesh import given_mesh, load_mesh
 
 __all__ = ["load", "scene", "scenes_of"]
+
+# Options that replace the camera of a file.
+_CAMERA = ("projection", "view", "position", "target", "up", "field_of_view")
 
 
 @with_options(SCENE)
@@ -54,7 +58,8 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     view : three floats or str
         Direction from the mesh to the viewer, or ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``,
         ``"bottom"``. The camera shows the whole mesh. The default is (0.4, 0.5, 1) along right, up and front.
-        Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z. Right is the cross product of up and front.
+        Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z. Right is the cross product of up and front. If no
+        option of the camera is given, a glTF file's own camera serves.
     position, target : three floats
         Position of the camera, which replaces ``view``, and the point in the middle of its picture. The
         default of ``target`` is the middle of the mesh. Both are in the mesh's units.
@@ -63,11 +68,12 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     field_of_view : float
         See `Camera`; by default 30.
     viewer : {"distant", "near"}
-        See `Scene`; by default ``"distant"``. ``"near"`` needs the method ``chord-local``.
+        See `Scene`; by default ``"distant"``. ``"near"`` takes the method ``chord-local``.
     lights : Light or dict or numbers or str, or a sequence of these
-        At most 16; by default one light from (-0.5, 0.8, 0.7). A dict has fields of `Light`. Numbers are a
-        direction, or direction and colour. Lights with a position need the method ``chord-local``. They may
-        fade by distance or be spots. Lights of colour 0 are off, and left out.
+        At most 16; by default the lights of a glTF file, else one light from (-0.5, 0.8, 0.7). A dict has
+        fields of `Light`. Numbers are a direction, or direction and colour. Lights with a position take the
+        method ``chord-local``. They may fade by distance or be spots. Lights of colour 0 are off, and left
+        out.
     point_lights, spot_lights
         More lights in the same forms. Their numbers are as for ``--point-light`` and ``--spot-light``.
     ambient, diffuse, specular, exponent, roughness, fresnel
@@ -93,8 +99,21 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         return scenes_of(loaded, settings)[0]
 
 
-def load(settings: Settings) -> LoadedMesh:
+def load(settings: Settings, *, lights: int = MAX_LIGHTS, local: bool = True) -> LoadedMesh:
     """The mesh of a scene, with its materials.
+
+    Lights of a file become those of the settings, unless an option names lights. If one of them has a
+    position, the default method is ``chord-local``. The mesh has a camera of the file, unless an option names
+    the camera.
+
+    Parameters
+    ----------
+    settings : Settings
+        All options of `scene`.
+    lights : int
+        Most lights of a file.
+    local : bool
+        Whether lights of a file may have positions.
 
     Raises
     ------
@@ -113,8 +132,25 @@ def load(settings: Settings) -> LoadedMesh:
             triangles=settings["triangles"],
             crease_angle=settings["crease"],
             materials=settings["materials"] == "file",
+            lights=0 if "lights" in settings.given else lights,
+            local=local,
+            camera=settings.given.isdisjoint(_CAMERA),
         )
+    if loaded.lights:
+        settings.use_lights(loaded.lights)
+    if loaded.camera is not None and not _sees(loaded.camera, loaded.mesh, settings["size"]):
+        told = "a camera that does not see the mesh"
+        loaded = replace(loaded, camera=None, ignored=(*loaded.ignored, told))
     return _without_albedo(loaded)
+
+
+def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
+    """Whether a triangle is not beyond one side of the picture, or nearer than the near plane."""
+    width, height = size
+    with np.errstate(over="ignore", invalid="ignore"):
+        x, y, weight, depth = np.moveaxis(camera.homogeneous(mesh.vertices, width, height), -1, 0)
+        beyond = np.stack((x < 0, x > width * weight, y < 0, y > height * weight, depth < camera.near))
+    return not bool(beyond[:, mesh.faces].all(axis=2).any(axis=0).all())
 
 
 def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
@@ -173,7 +209,7 @@ def _made(loaded: LoadedMesh, settings: Settings, count: int) -> tuple[Scene, li
     shift = -int(np.frexp(np.abs(mesh.vertices).max())[1])
     mesh = replace(mesh, vertices=np.ldexp(mesh.vertices, shift))
     width, height = settings["size"]
-    cameras = _cameras(mesh.vertices, shift, settings, count)
+    cameras = _cameras(mesh.vertices, shift, settings, count, loaded.camera)
     made = Scene(
         mesh=mesh,
         camera=cameras[0],
@@ -192,10 +228,17 @@ def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
     return surfaces(loaded.materials, default, settings.given.intersection(COEFFICIENTS))
 
 
-def _cameras(vertices: np.ndarray, shift: int, settings: Settings, count: int) -> list[Camera]:
+def _cameras(
+    vertices: np.ndarray, shift: int, settings: Settings, count: int, of_file: Camera | None
+) -> list[Camera]:
     """Cameras of a mesh whose unit has been multiplied by ``2**shift``."""
     by_position = settings["position"] is not None
+    if of_file is not None and settings["viewer"] == "near" and of_file.projection != "perspective":
+        remedy = "give a view, or a distant viewer"
+        raise settings.refuse("viewer", "the orthographic camera of the file is distant", remedy)
     try:
+        if of_file is not None:
+            return turntable(of_file.scaled(shift), count)
         if by_position:
             return turntable(_placed(vertices, shift, settings), count)
         return _framing(vertices, settings, count)

@@ -59,6 +59,12 @@ class Settings:
             return self.source.lights
         return tuple(light for light in self["lights"] if light.is_on)
 
+    def use_lights(self, lights: tuple[Light, ...]) -> None:
+        """Take lights in place of the default. With a position they get a method that serves them."""
+        self.values["lights"] = lights
+        if "method" in self.values and "method" not in self.given:
+            self.values["method"] = _method(self.source, self.values)
+
     @contextmanager
     def located(self) -> Iterator[None]:
         """Within the block, the error of a value from a scene file names file and key."""
@@ -145,13 +151,23 @@ def read_settings(
     if "view" in merged:
         _turn_view(merged, {*given, *values})
     if "method" in merged and merged["method"] is None:
-        merged["method"] = default_method(
-            merged["model"], bool(merged["gate"]), merged["operand"], merged["setup_interval"]
-        )
+        merged["method"] = _method(source, merged)
     settings = Settings(source, merged, frozenset(given) | frozenset(values), origins)
     with settings.located():
         _check_pairs(settings)
     return settings
+
+
+def _method(source: Source | Scene, values: Mapping[str, Any]) -> str:
+    """The method of settings that name none."""
+    if isinstance(source, Scene):
+        local = source.local
+    else:
+        lights = values.get("lights")
+        near = values.get("viewer") == "near"
+        local = near or (isinstance(lights, tuple) and any(light.is_local for light in lights))
+    model, gate = values["model"], bool(values["gate"])
+    return default_method(model, gate, values["operand"], values["setup_interval"], local)
 
 
 def rendering_settings(

@@ -35,8 +35,8 @@ Examples:
     blysk render model.obj --model cosquad_lin --exponent 200 --size 1280x720 --compare both.png
     blysk render scene.toml --exponent 100
     blysk render scene.toml --gate --specialise
-    blysk render teapot --method chord-local --point-light 3,4,5 --viewer near
-    blysk render teapot --method chord-local --spot-light 3,6,5,-3,-5,-5,8,14
+    blysk render teapot --point-light 3,4,5 --viewer near
+    blysk render teapot --spot-light 3,6,5,-3,-5,-5,8,14
     blysk render scene.toml --frames 36 -o turntable.gif
 
 \b

@@ -31,6 +31,7 @@ __all__ = [
 _READ = {"KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 _UNLIT, _STRENGTH = "KHR_materials_unlit", "KHR_materials_emissive_strength"
 _READ |= {"KHR_node_visibility", "KHR_texture_transform", "EXT_texture_webp", GLOSSY, _UNLIT, _STRENGTH}
+_READ |= {"KHR_lights_punctual"}
 _SILENT = {
     "KHR_texture_basisu",
     "EXT_texture_avif",
@@ -40,7 +41,7 @@ _SILENT = {
     "KHR_animation_pointer",
 }
 _SILENT |= {"KHR_materials_variants", "KHR_node_hoverability", "KHR_node_selectability", "EXT_mesh_manifold"}
-_TOLD = {"KHR_lights_punctual", "EXT_lights_image_based", "EXT_lights_ies"}
+_TOLD = {"EXT_lights_image_based", "EXT_lights_ies"}
 _TOLD |= {
     f"KHR_materials_{name}"
     for name in (
@@ -322,13 +323,10 @@ def tell_contents(document: dict, found: Found) -> None:
     skins = {node["skin"] for node in nodes if "skin" in node and "mesh" in node}
     found.tell("skin", "skins", len(skins))
     found.tell("animation", "animations", len(document.get("animations", [])))
-    found.tell("camera", "cameras", sum("camera" in node for node in nodes))
-    lights = sum("light" in extension_of(node, "KHR_lights_punctual") for node in nodes)
-    found.tell("light (KHR_lights_punctual)", "lights (KHR_lights_punctual)", lights)
     primitives = [primitive for mesh in meshes for primitive in mesh["primitives"]]
     attributes = {name for primitive in primitives for name in primitive["attributes"]}
     found.tell_names("attributes", sorted(a for a in attributes if not _ATTRIBUTES.fullmatch(a)))
-    known = _READ | _SILENT | {"KHR_lights_punctual", *MESHOPT}
+    known = _READ | _SILENT | MESHOPT
     found.tell_names("extensions", _extension_names(document), known)
     parts = {"document": [document], "nodes": nodes, "meshes": meshes, "primitives": primitives}
     for name, each in parts.items():

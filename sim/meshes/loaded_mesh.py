@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blysk.golden.frame_constants import MAX_MATERIALS
+from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.light import Light
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.normals import crease_normals, face_directions, repaired_normals, transformed
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused
@@ -49,6 +51,10 @@ class LoadedMesh:
     ignored : tuple of str
         Contents or references of the file that change a picture and are not read: alpha, textures other than
         those of the colour, a missing image or material file, and the names that a reader does not know.
+    lights : tuple of Light
+        Lights of a glTF file, in its unit of length; the brightest counts 1, see `placed_lights`.
+    camera : Camera or None
+        The first camera of a glTF file, in its unit of length.
     """
 
     mesh: Mesh
@@ -58,6 +64,8 @@ class LoadedMesh:
     opposed_faces: int = 0
     materials: tuple[FileMaterial, ...] = (FileMaterial(),)
     ignored: tuple[str, ...] = ()
+    lights: tuple[Light, ...] = ()
+    camera: Camera | None = None
 
 
 def assembled(

@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote
@@ -13,6 +14,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import ArrayLike
 
+from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.sim.errors import InputError
 from blysk.sim.meshes.gltf import (
     check_gltf,
@@ -24,6 +26,7 @@ from blysk.sim.meshes.gltf import (
 )
 from blysk.sim.meshes.gltf_arrays import gltf_buffers, plain_arrays
 from blysk.sim.meshes.gltf_textures import GltfTextures
+from blysk.sim.meshes.gltf_views import GltfViews, gltf_views, placed_camera, placed_lights
 from blysk.sim.meshes.loaded_mesh import LoadedMesh, assembled, finished
 from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.mesh_path import check_mesh_path
@@ -55,6 +58,9 @@ def load_mesh(
     triangles: int = DEFAULT_TRIANGLES,
     crease_angle: float = DEFAULT_CREASE,
     materials: bool = True,
+    lights: int = MAX_LIGHTS,
+    local: bool = True,
+    camera: bool = True,
 ) -> LoadedMesh:
     """Load a mesh from a file, or build the teapot.
 
@@ -91,18 +97,29 @@ def load_mesh(
 
     Of an OBJ file these are read from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded,
     at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of glTF are linear, as
-    k_d is, and the picture is written without a transfer curve. So they are used without conversion, and Kd,
-    too. If a material file is missing, or lacks a name, the colours are ``None``. Materials of no face are
-    left out, and equal materials merged. PLY and STL files have one material.
+    k_d is. So they are used without conversion, and Kd, too. If a material file is missing, or lacks a name,
+    the colours are ``None``. Materials of no face are left out, and equal materials merged.
+
+    *Colours of other formats* are read by the curve of sRGB:
+
+    - of OBJ red, green and blue behind a position, and the image of ``map_Kd`` with ``-s``, ``-o`` and
+      ``-clamp``;
+    - of PLY the colours of vertices, and the images of ``comment TextureFile``, by coordinates of vertices or
+      of the corners of faces;
+    - of binary STL the colours of facets, see `read_stl`.
+
+    Images lie in the folder of the file, or below. If a name leads elsewhere, its last part is looked for.
+
+    *Lights and camera* of a glTF file are read: KHR_lights_punctual, see `placed_lights`, and the first
+    camera.
 
     *Looks.* In a mesh with colours of vertices other vertices are white. Colours over 1 count as 1, and are
     told. Corners of equal normal are welded only if their colours and texture coordinates are equal, too. A
     part without texture coordinates is drawn without its texture, and so is a part whose image is not there.
 
     Contents that change a picture and are not read are in ``ignored``: other textures, alpha, ``illum``,
-    smoothing groups, lights, cameras, animations. Each reader has a list of the
-    statements, keywords, properties, keys and extensions that it knows. Others are in ``ignored`` by their
-    names.
+    smoothing groups, animations. Each reader has a list of the statements, keywords, properties, keys and
+    extensions that it knows. Others are in ``ignored`` by their names.
 
     Parameters
     ----------
@@ -115,6 +132,12 @@ def load_mesh(
         Degrees, 0 to 180. At 0 only coplanar faces share a normal, at 180 all faces do.
     materials : bool
         Whether to read the file's materials and colours. If not, all faces have one material without values.
+    lights : int
+        Most lights to read from a file: the brightest. 0: none.
+    local : bool
+        Whether to read lights with a position.
+    camera : bool
+        Whether to read the camera of a file.
 
     Returns
     -------
@@ -148,10 +171,17 @@ def load_mesh(
     try:
         data = _read(path)
         with _quiet_trimesh():
-            scene, found = _load_scene(path, data, materials)
+            scene, found, views = _load_scene(path, data, materials, lights > 0, camera)
         # Overflow and NaN are looked for, and reported, in what comes out.
         with np.errstate(over="ignore", invalid="ignore"):
-            return assembled(scene, found, path, data, crease_angle, materials)
+            loaded = assembled(scene, found, path, data, crease_angle, materials)
+            places = loaded.mesh.vertices
+            return replace(
+                loaded,
+                lights=placed_lights(views.lights, places, lights, local, found),
+                camera=placed_camera(views.cameras, places, found),
+                ignored=found.ignored,
+            )
     except Refused as refusal:
         raise InputError(source, refusal.reason, refusal.remedy) from None
     except OutputIsInput:
@@ -285,8 +315,11 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scene, Found]":
+def _load_scene(
+    path: Path, data: bytes, materials: bool, lights: bool, camera: bool
+) -> "tuple[trimesh.Scene, Found, GltfViews]":
     """A scene of trimesh, glTF by trimesh's loader; no file is opened that was not checked."""
+    none = GltfViews([], [])
     suffix, found = path.suffix.lower(), Found()
     if suffix == ".obj":
         data, libraries = split_obj(data, found)
@@ -295,15 +328,15 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
         images = {}
         if materials and len(found.names) > 1:
             images = find_obj_materials(libraries, path.parent, found)
-        return scene_of(read_obj(data, found, images, materials)), found
+        return scene_of(read_obj(data, found, images, materials)), found, none
     if suffix == ".ply":
         parts, names = read_ply(data, found, materials)
         refers(path.parent, *names)
         if materials:
             find_ply_images(names, path.parent, found)
-        return scene_of(parts), found
+        return scene_of(parts), found, none
     if suffix == ".stl":
-        return scene_of([read_stl(data, found, materials)]), found
+        return scene_of([read_stl(data, found, materials)]), found, none
     document = gltf_document(data, suffix, found)
     check_gltf(document)
     images = document.get("images")
@@ -315,6 +348,7 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     textures = GltfTextures(document, buffers, path.parent, found)
     texts = find_gltf_materials(document, materials, textures, found)
     tell_contents(document, found)
+    views = gltf_views(document, lights, camera, found)
     arrays, looks = plain_arrays(document, buffers, texts, found)
     data = plain_gltf(document)
     # Its import takes longer than to draw a small picture; only a file needs it.
@@ -323,4 +357,4 @@ def _load_scene(path: Path, data: bytes, materials: bool) -> "tuple[trimesh.Scen
     scene = trimesh.load_scene(io.BytesIO(data), file_type="gltf", resolver={"0": arrays}, process=False)
     for geometry in scene.geometry.values():
         geometry.metadata.update(looks[int(geometry.visual.material.name)])
-    return scene, found
+    return scene, found, views

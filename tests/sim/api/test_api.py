@@ -256,7 +256,11 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
             {"method": "angular", "operand": "cosine"},
             "operand cosine: method angular finds no normals",
         ),
-        ("teapot", {"viewer": "near"}, "method quotient: point lights and a near viewer need "),
+        (
+            "teapot",
+            {"viewer": "near", "method": "quotient"},
+            "method quotient: point lights and a near viewer need ",
+        ),
         ("teapot", {"pipes": 3}, "pipes 3: not one of the choices; give one of 1, 2, 4, 8"),
         ("teapot", {"pipes": 16}, "pipes 16: out of range; give one of 1, 2, 4, 8"),
         ("teapot", {"pipes": 8, "size": (40, 7)}, "pipes 8: the picture has 7 rows; give at most one for "),

@@ -78,7 +78,11 @@ KNOWN_LOBES = f"use one of {', '.join(LOBES)}, "
         (["--point-light", "1,2,3,1,1,1,1,-1,0"], "--point-light 1,2,3,1,1,1,1,-1,0", "coefficients of 0 or"),
         (["--spot-light", "1,2,3,0,0,0,10,20"], "--spot-light 1,2,3,0,0,0,10,20", "spot must not be 0, 0, 0"),
         (["--spot-light", "1,2,3,0,1,0,20,10"], "--spot-light 1,2,3,0,1,0,20,10", "give an axis other than"),
-        (["--spot-light", "1,2,3,0,1,0,10,20"], "--method quotient", "use method chord-local"),
+        (
+            ["--spot-light", "1,2,3,0,1,0,10,20", "--method", "quotient"],
+            "--method quotient",
+            "use method chord-local",
+        ),
         (["--roughness", "0.3"], "--roughness 0.3", "leave it out, or give exponent"),
     ],
 )

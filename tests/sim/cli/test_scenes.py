@@ -200,7 +200,8 @@ def test_point_lights(folder, refused, capsys):
     assert json.loads(Path("c.json").read_text())["specialisation"]["different_pixels"] == 0
     capsys.readouterr()
     what = "need the values of a span; use method chord-local"
-    refused("render", "teapot", "--point-light", "3,4,5", thing="--method quotient", says=what)
+    quotient = ["--point-light", "3,4,5", "--method", "quotient"]
+    refused("render", "teapot", *quotient, thing="--method quotient", says=what)
     refused("render", "a.toml", "--method", "linear", thing="--method linear", says=what)
     spot = ["--spot-light", "3,4,5,-3,-3,-5,8,14,1,1,1,0.5,0.1,0", "--method", "chord-local"]
     assert main(["render", "teapot", *spot, "--size", "48x36", "-o", "c.png", "--json", "a.json"]) == 0
