@@ -175,6 +175,12 @@ class ShadingPipeline:
         return replace(self, build=replace(self.build, **changes))
 
     @property
+    def texels_outside(self) -> bool:
+        """Whether textures are in a memory outside of the pipeline."""
+        texture = None if self.albedo is None else self.albedo.texture
+        return texture is not None and texture.memory.external
+
+    @property
     def lobe(self) -> Lobe:
         """The specular unit of a design that `loads_tables`."""
         return cast(Lobe, self.specular)

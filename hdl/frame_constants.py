@@ -5,17 +5,22 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.frame_constants import (
     BANK_ADDRESS,
+    EMISSION_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
     MATERIAL_ADDRESS,
     MAX_MATERIALS,
+    TEXTURE_ADDRESS,
     THRESHOLD_ADDRESS,
+    TINTED_ADDRESS,
 )
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.number.fixed import Format
+from blysk.hdl.albedo.texture_address import descriptor_shape
 from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.lighting.intensity import color_shape
 
@@ -32,12 +37,14 @@ def existing_material(index: Value, materials: int) -> Value:
     return index if materials == 1 << len(index) else Mux(index >= materials, materials - 1, index)
 
 
-def frame_constants_shape(lights: int, threshold: Format | None = None, banks: int = 1) -> data.StructLayout:
+def frame_constants_shape(
+    lights: int, threshold: Format | None = None, banks: int = 1, albedo: Albedo | None = None
+) -> data.StructLayout:
     """Shape of all constants of a frame.
 
     Parameters
     ----------
-    lights, threshold, banks
+    lights, threshold, banks, albedo
         Those of `FrameConstantsUnit`.
     """
     light = {
@@ -49,12 +56,18 @@ def frame_constants_shape(lights: int, threshold: Format | None = None, banks: i
     tables = {} if threshold is None else {"threshold": unsigned(threshold.width)}
     if banks > 1:
         tables["bank"] = range(banks)
+    colored = {} if albedo is None else {"emission": color_shape()}
+    if albedo is not None and albedo.tints:
+        colored["tinted"] = unsigned(1)
+    if albedo is not None and albedo.texture is not None:
+        colored["texture"] = descriptor_shape()
     return data.StructLayout(
         {
             **tables,
             "exponent": unsigned(Specular.EXPONENT_BITS),
             "ambient": color_shape(),
             "lights": data.ArrayLayout(data.StructLayout(light), lights),
+            **colored,
         }
     )
 
@@ -76,6 +89,10 @@ class FrameConstantsUnit(wiring.Component):
     5                        taken by the tables of lobes, where they are loaded: `LobeMemory`
     6                        threshold of a material's table
     7                        bank of a material's table, where there are several
+    8 to 10                  emission red, green, blue, ``UQ(11, 6)`` LSB, with an albedo
+    11                       whether the material is tinted, with tints
+    12, 13                   texture of a material, with textures: `TextureDescriptor.words`
+    14, 15                   taken by the texel memory, with textures: `LoadedTextures.writes`
     16 (light + 1) + 0 to 2  direction to the light, ``SQ(1, 17)``
     16 (light + 1) + 3 to 5  half-way vector, ``SQ(1, 17)``
     16 (light + 1) + 6 to 8  diffuse red, green, blue, ``UQ(11, 6)`` LSB
@@ -99,6 +116,8 @@ class FrameConstantsUnit(wiring.Component):
         Format of a threshold for each material, see `ShadingPipeline.threshold_of`. ``None``: no threshold.
     banks : int
         Number of tables of lobes that materials choose from.
+    albedo : Albedo or None
+        Albedo path of the pipeline.
 
     Raises
     ------
@@ -113,17 +132,24 @@ class FrameConstantsUnit(wiring.Component):
         Whether no write is accepted.
     material : :py:`In(range(materials))`
         Only with several materials: index of the material of the given constants.
-    constants : :py:`Out(frame_constants_shape(lights, threshold, banks))`
+    constants : :py:`Out(frame_constants_shape(lights, threshold, banks, albedo))`
         The constants.
 
     Source: docs/theory/units.md#frame-constants.
     """
 
-    def __init__(self, lights: int, materials: int = 1, threshold: Format | None = None, banks: int = 1):
+    def __init__(
+        self,
+        lights: int,
+        materials: int = 1,
+        threshold: Format | None = None,
+        banks: int = 1,
+        albedo: Albedo | None = None,
+    ):
         if not 1 <= materials <= MAX_MATERIALS:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {materials}")
         self.lights = lights
-        self.materials, self.banks = materials, banks
+        self.materials, self.banks, self.albedo = materials, banks, albedo
         self.tables = {}
         if threshold is not None:
             self.tables[THRESHOLD_ADDRESS] = "threshold"
@@ -132,7 +158,7 @@ class FrameConstantsUnit(wiring.Component):
         members = {
             "write": In(stream.Signature(write_shape())),
             "hold": In(1),
-            "constants": Out(frame_constants_shape(lights, threshold, banks)),
+            "constants": Out(frame_constants_shape(lights, threshold, banks, albedo)),
         }
         if materials > 1:
             members["material"] = In(range(materials))
@@ -150,6 +176,9 @@ class FrameConstantsUnit(wiring.Component):
         for address, name in self.tables.items():
             words[address] = self.constants[name]
             of_material.add(address)
+        if self.albedo is not None:
+            words |= (colored := self._albedo_words())
+            of_material |= colored.keys()
         for light in range(self.lights):
             base = (light + 1) * LIGHT_STRIDE
             for name, (first, count) in FIELDS_OF_A_LIGHT.items():
@@ -201,3 +230,16 @@ class FrameConstantsUnit(wiring.Component):
                 with m.If(written):
                     m.d.sync += register.eq(word_data[: len(code)])
         return m
+
+    def _albedo_words(self) -> dict[int, Value]:
+        """Words of the constants of an albedo, by their address."""
+        constants = self.constants
+        words = {EMISSION_ADDRESS + k: Value.cast(color) for k, color in enumerate(constants.emission)}
+        if self.albedo.tints:
+            words[TINTED_ADDRESS] = Value.cast(constants.tinted)
+        if self.albedo.texture is not None:
+            bits = Value.cast(constants.texture)
+            base = Value.cast(constants.texture.base)
+            first = bits[: len(bits) - len(base)]
+            words |= {TEXTURE_ADDRESS: first, TEXTURE_ADDRESS + 1: base}
+        return words

@@ -7,10 +7,14 @@ from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.frame_constants import TEXEL_ADDRESS, TEXELS_ADDRESS
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo
+from blysk.hdl.albedo.albedo import AlbedoUnit, span_albedo_shape
+from blysk.hdl.albedo.texel_memory import texels_shape
+from blysk.hdl.albedo.texture_address import texel_request_shape
+from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo, connect_wide_fifo
 from blysk.hdl.core.shapes import normal_shape
-from blysk.hdl.core.stream import FIFO_LATENCY, connect, connect_fifo
+from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_fifo
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.methods.registry import unit_of
@@ -25,7 +29,7 @@ def span_shape(model: ShadingPipeline) -> data.StructLayout:
 
     The operands are unit normals at the first and last pixel centre, the ends of the true line, values of
     each light, or vectors N/W with their steps. Without lights there are no operands. With several materials
-    there is ``material``.
+    there is ``material``, and with an albedo there are ``attributes``.
 
     Parameters
     ----------
@@ -48,6 +52,8 @@ def span_shape(model: ShadingPipeline) -> data.StructLayout:
         ).members
     if model.materials > 1:
         members["material"] = Shape.cast(range(model.materials))
+    if model.albedo is not None:
+        members["attributes"] = span_albedo_shape(model.albedo)
     return data.StructLayout(members)
 
 
@@ -89,6 +95,9 @@ class ShadingPipelineUnit(wiring.Component):
     ``linear``, may take a cycle more for short spans.
 
     Without lights there is neither interpolator nor multiplier. Every pixel has the ambient colour.
+
+    With an albedo an albedo unit processes each span in parallel with the interpolator. A FIFO holds the
+    albedo of all pixels that may come before their terms, so it does not limit the rate.
 
     In the *compact* style there are these multipliers:
 
@@ -132,6 +141,8 @@ class ShadingPipelineUnit(wiring.Component):
         Pixels.
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants; see `FrameConstantsUnit` for the addresses.
+    texel_request, texel_response
+        The streams of `TextureSamplerUnit`. Only with a texel memory outside.
     status : :py:`Out(status_shape())`
         Counters.
 
@@ -146,17 +157,21 @@ class ShadingPipelineUnit(wiring.Component):
 
     def __init__(self, model: ShadingPipeline | None = None):
         self.model = p = model or ShadingPipeline()
-        super().__init__(
-            {
-                "i": In(stream.Signature(span_shape(p))),
-                "o": Out(stream.Signature(pixel_shape(p.x_bits, p.y_bits))),
-                "write": In(stream.Signature(write_shape())),
-                "status": Out(status_shape()),
-            }
-        )
+        members = {
+            "i": In(stream.Signature(span_shape(p))),
+            "o": Out(stream.Signature(pixel_shape(p.x_bits, p.y_bits))),
+            "write": In(stream.Signature(write_shape())),
+            "status": Out(status_shape()),
+        }
+        if p.texels_outside:
+            memory = p.albedo.texture.memory
+            members["texel_request"] = Out(stream.Signature(texel_request_shape(memory)))
+            members["texel_response"] = In(stream.Signature(texels_shape()))
+        super().__init__(members)
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
         self._interpolator = self._gate = None
         self._shading = PixelShading(p)
+        self._albedo = None
         self.direction = Signal(normal_shape(), name="first_direction")
         self.setup_interval = self._shortest_interval = self.cycles_per_pixel = 1
         self.latency = LATE_FIFO_LATENCY + self._assembler.coordinates_latency
@@ -164,6 +179,22 @@ class ShadingPipelineUnit(wiring.Component):
             self._make_units()
         elif p.build.setup_interval is not None:
             raise ValueError("without lights there is no setup, and no setup_interval")
+        if p.albedo is not None:
+            self._make_albedo()
+
+    def _make_albedo(self) -> None:
+        """The albedo path, and the times that follow from it."""
+        p, shading = self.model, self._shading
+        # A pixel takes a cycle a channel at least, in the compact style.
+        interval = 3 if p.build.compact else 1
+        self._albedo = AlbedoUnit(p.albedo, p.length_bits, interval)
+        behind = shading.latency - shading.light_latency + self._assembler.latency
+        before = self.latency - behind if p.lights else 0
+        # All pixels that may come before their terms.
+        self._waiting_albedos = -(-before // interval) + UNCOUNTED + 2
+        path = SLICE_LATENCY + self._albedo.latency + LATE_FIFO_LATENCY
+        self.latency = max(before, path) + behind
+        self.cycles_per_pixel = max(self.cycles_per_pixel, shading.cycles_per_pixel, interval)
 
     def _make_units(self) -> None:
         """Units from spans to colours, and the times that follow from them."""
@@ -221,13 +252,19 @@ class ShadingPipelineUnit(wiring.Component):
         self._written = Signal(name="written")
         m.submodules.pixel_assembler = assembler = self._assembler
         m.submodules.frame_constants = frame = FrameConstantsUnit(
-            p.lights, p.materials, p.threshold_format, p.banks
+            p.lights, p.materials, p.threshold_format, p.banks, p.albedo
         )
-        sinks = [self._carry_coordinates(m)]
+        sinks, albedo = [self._carry_coordinates(m)], None
+        if p.albedo is not None:
+            albedo, sink = self._carry_albedo(m, frame)
+            sinks.append(sink)
         if p.lights:
             if p.mirror:
                 m.d.comb += self.direction.eq(frame.constants.lights[0].direction)
-            sinks += self._shade(m, frame)
+            sinks += self._shade(m, frame, albedo)
+        elif albedo is not None:
+            m.submodules.intensity = self._shading.intensity
+            self._shading.connect(m, frame.constants, None, None, albedo, assembler.colors)
         else:
             self._shading.connect_constant(m, frame.constants.ambient, assembler.colors)
         connect(m, assembler.o, wiring.flipped(self.o))
@@ -243,6 +280,40 @@ class ShadingPipelineUnit(wiring.Component):
         m.d.comb += copy_fields(source.payload, self.i.payload, layout.members)
         connect_late_fifo(m, "coordinates", source, assembler.coordinates, self._waiting_spans)
         return source.valid, source.ready
+
+    def _carry_albedo(
+        self, m: Module, frame: FrameConstantsUnit
+    ) -> tuple[stream.Interface, tuple[Value, Value]]:
+        """Albedo of the pixels, which wait for their terms; and valid and ready of the path's input."""
+        m.submodules.albedo = unit = self._albedo
+        source = unit.i.signature.flip().create(path=("attributes",))
+        attributes = self.i.payload.attributes
+        m.d.comb += [
+            *copy_fields(source.payload, attributes, attributes.shape().members),
+            source.payload.length.eq(self.i.payload.length),
+        ]
+        connect_wide_fifo(m, "waiting_attributes", source, unit.i, depth=4)
+        albedo = unit.o.signature.create(path=("colored",))
+        connect_late_fifo(m, "albedos", unit.o, albedo, self._waiting_albedos)
+        if unit.model.texture is not None:
+            m.d.comb += copy(unit.constants, frame.constants.texture)
+            if self.model.texels_outside:
+                connect(m, unit.request, wiring.flipped(self.texel_request))
+                connect(m, wiring.flipped(self.texel_response), unit.response)
+            else:
+                self._load_texels(m, unit.write)
+        return albedo, (source.valid, source.ready)
+
+    def _load_texels(self, m: Module, texels: stream.Interface) -> None:
+        """Write texels behind a register of the writes that load them."""
+        of_texels = Signal(name="of_texels")
+        write = self.write.payload
+        m.d.sync += [
+            of_texels.eq((write.address == TEXELS_ADDRESS) | (write.address == TEXEL_ADDRESS)),
+            texels.payload.begins.eq(write.address == TEXELS_ADDRESS),
+            texels.payload.value.eq(write.data),
+        ]
+        m.d.comb += texels.valid.eq(self._written & of_texels)
 
     def _admit(self, m: Module, frame: FrameConstantsUnit, sinks: list[tuple[Value, Value]]) -> Value:
         """Accept spans and writes; whether a span of a pixel or more is accepted on this cycle.
@@ -323,7 +394,9 @@ class ShadingPipelineUnit(wiring.Component):
             with m.If(seen & ~counter.all()):
                 m.d.sync += counter.eq(counter + 1)
 
-    def _shade(self, m: Module, frame: FrameConstantsUnit) -> list[tuple[Value, Value]]:
+    def _shade(
+        self, m: Module, frame: FrameConstantsUnit, albedo: stream.Interface | None
+    ) -> list[tuple[Value, Value]]:
         """Units from spans to colours; valid and ready of those that take spans."""
         p, span = self.model, self.i.payload
         m.submodules.interpolator = interpolator = self._interpolator
@@ -342,7 +415,7 @@ class ShadingPipelineUnit(wiring.Component):
         if self._gate is not None:
             operands, gated = self._decide(m, frame, sinks)
         self._shading.connect_tables(m, self.write.payload, self._written)
-        self._shading.connect(m, frame.constants, operands, gated, self._assembler.colors)
+        self._shading.connect(m, frame.constants, operands, gated, albedo, self._assembler.colors)
         return sinks
 
     def _decide(self, m: Module, frame: FrameConstantsUnit, sinks: list) -> tuple[stream.Interface, Value]:

@@ -35,7 +35,7 @@ class PixelShading:
     slope, tables : Component or None
         Slopes or tables that the lights share.
     intensity : Component or None
-        Intensity unit; ``None`` if colours are constant, without lights.
+        Intensity unit; ``None`` if colours are constant, without lights and albedo.
     transfer : TransferUnit or None
         Transfer unit, if the transfer is not linear.
     light_latency, latency : int
@@ -48,10 +48,10 @@ class PixelShading:
         self.model = p = model
         self.slope = self.tables = self.intensity = self.transfer = None
         self.lights = self._light_units() if p.lights else []
-        if p.lights:
+        if p.lights or p.albedo:
             self.intensity = intensity_unit(p.intensity, p.build.compact)
         if p.transfer != "linear":
-            # Without lights colours are constant, and are encoded all the time.
+            # Constant colours are encoded all the time.
             channels = p.intensity.channels
             interval = channels if p.build.compact and self.intensity is not None else 1
             self.transfer = TransferUnit(channels=channels, initiation_interval=interval)
@@ -94,8 +94,9 @@ class PixelShading:
         self,
         m: Module,
         constants: data.View,
-        operands: stream.Interface,
+        operands: stream.Interface | None,
         gated: Value | None,
+        albedo: stream.Interface | None,
         colors: stream.Interface,
     ) -> None:
         """Connect the units, from operands to colours.
@@ -106,10 +107,12 @@ class PixelShading:
             Module of the pipeline. The intensity unit is its submodule already.
         constants : View
             Frame constants.
-        operands : stream.Interface
-            Operands of pixels.
+        operands : stream.Interface or None
+            Operands of pixels; ``None`` without lights.
         gated : Value or None
             Decision of a gate for each light; ``None``: the operands contain the decision, if any.
+        albedo : stream.Interface or None
+            Albedo of pixels; ``None``: they have none.
         colors : stream.Interface
             Colours of pixels.
         """
@@ -117,7 +120,7 @@ class PixelShading:
         if self.slope is not None:
             m.submodules.slope = self.slope
             m.d.comb += self.slope.exponent.eq(constants.exponent)
-        self._connect_lights(m, operands)
+        self._connect_lights(m, operands, albedo)
         for index, light in enumerate(self.lights):
             m.submodules[f"light_{index}"] = light
             of_light = constants.lights[index]
@@ -146,6 +149,13 @@ class PixelShading:
                 word = constants[self._kind.constant]
                 m.d.comb += Value.cast(light.constants).eq(word)
         m.d.comb += copy(intensity.constants.ambient, constants.ambient)
+        if albedo is not None:
+            m.d.comb += [
+                copy(intensity.i.payload.albedo, albedo.payload),
+                copy(intensity.constants.emission, constants.emission),
+            ]
+            if p.albedo.tints:
+                m.d.comb += intensity.constants.tinted.eq(constants.tinted)
         connect(m, intensity.o, self.encoded(m, colors))
 
     def connect_tables(self, m: Module, write: data.View, written: Value) -> None:
@@ -174,26 +184,33 @@ class PixelShading:
             ]
             m.d.comb += self.tables.write.valid.eq(written & of_table)
 
-    def _connect_lights(self, m: Module, operands: stream.Interface) -> None:
-        """Handshakes from the operands through all lights to the intensity unit.
+    def _connect_lights(
+        self, m: Module, operands: stream.Interface | None, albedo: stream.Interface | None
+    ) -> None:
+        """Handshakes from the operands through all lights to the intensity unit, where the albedo joins.
 
         Equal units with the same input and the same ready of the output are in the same state on every cycle:
         the handshake of the first is that of all. Where lights skip beats, all accept a beat on the same
         cycle, or none does.
         """
         intensity = self.intensity
-        lockstep = self.model.specular is None or not self.lights[0].skips_dark
+        lockstep = self.model.specular is None or not (self.lights and self.lights[0].skips_dark)
         leaders = self.lights[:1] if lockstep else self.lights
+        ready, terms = intensity.i.ready, [light.o.valid for light in leaders]
+        if albedo is not None:
+            # The intensity unit takes the terms and the albedo of a pixel together.
+            ready = ready & albedo.valid
+            m.d.comb += albedo.ready.eq(reduce(and_, terms, intensity.i.ready))
+            terms.append(albedo.valid)
         for light in self.lights:
             others = [other for other in leaders if other is not light and not lockstep]
             m.d.comb += [
                 light.i.valid.eq(reduce(and_, (other.i.ready for other in others), operands.valid)),
-                light.o.ready.eq(reduce(and_, (other.o.valid for other in others), intensity.i.ready)),
+                light.o.ready.eq(reduce(and_, (other.o.valid for other in others), ready)),
             ]
-        m.d.comb += [
-            operands.ready.eq(reduce(and_, (light.i.ready for light in leaders))),
-            intensity.i.valid.eq(reduce(and_, (light.o.valid for light in leaders))),
-        ]
+        if self.lights:
+            m.d.comb += operands.ready.eq(reduce(and_, (light.i.ready for light in leaders)))
+        m.d.comb += intensity.i.valid.eq(reduce(and_, terms))
 
     def connect_constant(self, m: Module, ambient: data.View, colors: stream.Interface) -> None:
         """Give every pixel the ambient colour, of a pipeline without lights."""

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from blysk.bench.units.albedo.albedo import attributes_in
 from blysk.bench.units.cosines.chord_setup import values_of
 from blysk.bench.units.methods.interpolator import SPAN
 from blysk.bench.units.operands import (
@@ -33,9 +34,19 @@ from blysk.bench.units.pipeline_spans import (
     tabled,
 )
 from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant, first, once, together
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.build import Build
 from blysk.golden.cosines.quotient_spans import SpanVectors
-from blysk.golden.frame_constants import BANK_ADDRESS, LOBE_ADDRESS, FrameConstants, writes_of
+from blysk.golden.frame_constants import (
+    BANK_ADDRESS,
+    LOBE_ADDRESS,
+    TEXEL_ADDRESS,
+    TEXELS_ADDRESS,
+    FrameConstants,
+    writes_of,
+)
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -114,23 +125,25 @@ def _measure(rng, count, design):
 # Expected results.
 
 
-def spans_of(beats) -> Spans:
+def spans_of(unit, beats) -> Spans:
     """Spans in input beats of a pipeline."""
     none = np.zeros((len(beats["length"]), 3), dtype=np.int64)
     normals = (beats.get(name, none) for name in ("normal_left", "normal_right"))
     values = values_of(beats) if "values" in beats else None
     of_span = (beats[name] for name in ("x", "y", "length"))
     further = beats.get("material", np.zeros(0, dtype=np.int64)), values, beats.get("factors")
-    vectors = None
+    vectors = attributes = None
+    if "attributes" in beats:
+        attributes = attributes_in(unit.model.albedo, beats["attributes"])
     if "step" in beats:
         vectors = SpanVectors(*(beats[name] for name in SpanVectors._fields))
-    return Spans(*of_span, *normals, *further, vectors)
+    return Spans(*of_span, *normals, *further, vectors, attributes)
 
 
 @once
 def _frames_of(unit, case):
     """Pixels by frame. A frame has the spans between writes, and all constants written before them."""
-    design, spans = unit.model, spans_of(case.beats)
+    design, spans = unit.model, spans_of(unit, case.beats)
     after = np.zeros(len(case.write["address"]), int) if case.write_after is None else case.write_after
     starts = np.unique(np.r_[0, after])
     return [
@@ -158,11 +171,14 @@ def _status(unit, case):
 # Stimuli.
 
 
+_ORDERED = LOBE_ADDRESS, BANK_ADDRESS, TEXELS_ADDRESS, TEXEL_ADDRESS
+"""Addresses of tables and texels, whose writes have an order of their own."""
+
+
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     """Input of spans and constants of each material. These are written over constants of codes ``before``."""
     write = writes_of(constants if isinstance(constants, list) else [constants])
-    # Tables have an order of their own.
-    kept = np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS))
+    kept = np.isin(write["address"], _ORDERED)
     parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
     return Case(beats_of(unit, ends_for(unit.model, spans)), write=together([*parts, write]))
 
@@ -278,7 +294,7 @@ _LOST = 700
 
 def _disordered(rng, write, share):
     """A share of the words of a frame, in any order, without words of tables."""
-    kept = ~np.isin(write["address"], (LOBE_ADDRESS, BANK_ADDRESS)) & (rng.random(len(write["data"])) < share)
+    kept = ~np.isin(write["address"], _ORDERED) & (rng.random(len(write["data"])) < share)
     order = rng.permutation(np.flatnonzero(kept))
     return {name: words[order] for name, words in write.items()}
 
@@ -393,6 +409,25 @@ _OF_VECTORS = {
 }
 
 
+_TEXTURE = TextureSampler(TexelMemory(104))
+_COLORED = {
+    "albedo": replace(preset("quotient"), albedo=Albedo()),
+    "albedo, textures, compact, 2 materials": replace(
+        preset("quotient", materials=2, style="compact"), albedo=Albedo(False, _TEXTURE)
+    ),
+    "albedo, both, tints, chord-local, 2 lights, srgb": replace(
+        preset("chord-local", "blinn", 2), albedo=Albedo(texture=_TEXTURE, tints=True), transfer="srgb"
+    ),
+    "albedo, orthographic, compact, grey": replace(
+        preset("renormalise", style="compact", grey=True), albedo=Albedo(perspective=False)
+    ),
+    "albedo, both, without lights, 2 materials": replace(
+        preset("quotient", lights=0, materials=2), albedo=Albedo(texture=_TEXTURE)
+    ),
+}
+"""Pipelines with an albedo path, by name."""
+
+
 def _variants():
     designs = [("quotient", "blinn"), ("renormalise", "blinn")]
     designs += [("quadratic", model) for model in ("cosquad", "cosquad7", "cosquad_lin")]
@@ -418,6 +453,8 @@ def _variants():
     for name, design in _OF_VECTORS.items():
         yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
     yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local", "cosquad")))
+    for name, design in _COLORED.items():
+        yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
     for name, design in DESIGNS.items():
         yield name, Variant(partial(ShadingPipelineUnit, design))
     for name, design in LONG_DESIGNS.items():

@@ -4,19 +4,27 @@ from dataclasses import replace
 
 import numpy as np
 
+from blysk.bench.units.albedo.albedo import any_attributes
+from blysk.bench.units.albedo.texel_memory import loaded_words
 from blysk.bench.units.cosines.chord_setup import any_factors, any_values
 from blysk.bench.units.cosines.quotient_spans import line_directions
 from blysk.bench.units.methods.quotient_interpolator import any_span_vectors
 from blysk.bench.units.operands import pairs_at, pairs_chosen, turned, unit_codes
+from blysk.golden.albedo.texel_memory import LoadedTextures, TextureDescriptor
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import (
     BANK_ADDRESS,
+    EMISSION_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
     LOBE_ADDRESS,
     MATERIAL_ADDRESS,
+    TEXEL_ADDRESS,
+    TEXELS_ADDRESS,
+    TEXTURE_ADDRESS,
     THRESHOLD_ADDRESS,
+    TINTED_ADDRESS,
     FrameConstants,
 )
 from blysk.golden.lighting.diffuse import Diffuse
@@ -29,6 +37,7 @@ from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.light_frame import light_frame
 from blysk.hdl.pipeline import span_shape
+from blysk.sim.frames.frame import sample_textures
 
 __all__ = [
     "any_constants",
@@ -85,7 +94,7 @@ def any_constants(
         of_bank = lobe.fixed or any_of.tolist()
         banks = rng.integers(0, lobe.banks, design.materials).tolist()
         found = [tabled(design, of, of_bank[bank], bank) for of, bank in zip(found, banks, strict=True)]
-    return found
+    return sample_textures(design, found, rng) if design.albedo else found
 
 
 def tabled(
@@ -137,6 +146,8 @@ def constants_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> 
         first, count = FIELDS_OF_A_FRAME["ambient"]
         ambient = material[first : first + count] & Intensity.COLOR_FORMAT.max_code
         found.append(FrameConstants(int(material[0]) & 0x3FF, ambient, **fields))
+    if design.albedo is not None:
+        found = _colored(design, found, words, write)
     if not design.loads_tables:
         return found
     tables, banks = _tables_written(design, write), words[:, BANK_ADDRESS].tolist()
@@ -147,6 +158,30 @@ def constants_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> 
         replace(of, lobe=tables[bank], bank=bank, threshold=threshold)
         for of, bank, threshold in zip(found, banks, thresholds, strict=True)
     ]
+
+
+def _colored(
+    design: ShadingPipeline, found: list[FrameConstants], words: np.ndarray, write: dict[str, np.ndarray]
+) -> list[FrameConstants]:
+    """Constants with those of an albedo, from the words of each material and the writes of texels."""
+    albedo = design.albedo
+    emission = words[:, EMISSION_ADDRESS : EMISSION_ADDRESS + 3] & Intensity.COLOR_FORMAT.max_code
+    tinted = words[:, TINTED_ADDRESS] & 1
+    found = [
+        replace(of, emission=e, tinted=bool(t) if albedo.tints else None)
+        for of, e, t in zip(found, emission, tinted, strict=True)
+    ]
+    if albedo.texture is None:
+        return found
+    address = write["address"]
+    of_texels = np.isin(address, (TEXELS_ADDRESS, TEXEL_ADDRESS))
+    beats = {"value": write["data"][of_texels], "begins": address[of_texels] == TEXELS_ADDRESS}
+    texels = LoadedTextures(loaded_words(albedo.texture.memory, beats), ())
+    found = [
+        replace(of, texture=TextureDescriptor.of_words(*pair))
+        for of, pair in zip(found, words[:, TEXTURE_ADDRESS : TEXTURE_ADDRESS + 2].tolist(), strict=True)
+    ]
+    return [replace(found[0], texels=texels), *found[1:]]
 
 
 # Spans.
@@ -170,6 +205,7 @@ def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndar
         values=any_values(rng, count, design.lights) if "values" in members else None,
         factors=any_factors(rng, count, len(design.factors)) if design.factors else None,
         vectors=vectors_for(rng, design, length) if "step" in members else None,
+        attributes=any_attributes(rng, design.albedo, length) if design.albedo else None,
     )
 
 

@@ -85,6 +85,13 @@ class TextureDescriptor:
         first = self.width | self.height << LEVEL_BITS | self.wrap[0] << 8 | self.wrap[1] << 10
         return first | int(self.nearest) << 12, self.base
 
+    @classmethod
+    def of_words(cls, first: int, base: int) -> "TextureDescriptor":
+        """The descriptor of two words."""
+        sides, mask = first & 0xFF, (1 << LEVEL_BITS) - 1
+        wrap = first >> 8 & 3, first >> 10 & 3
+        return cls(sides & mask, sides >> LEVEL_BITS, wrap, bool(first >> 12 & 1), base)
+
 
 @dataclass(frozen=True, eq=False)
 class LoadedTextures:

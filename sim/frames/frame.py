@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 from amaranth.lib import data
 
+from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.albedo.attribute_spans import SpanAttributes
 from blysk.golden.cosines.chord_setup import SpanValues
 from blysk.golden.cosines.quotient_spans import SpanVectors
@@ -18,6 +19,7 @@ from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import FILTERS, Texture
 from blysk.hdl.pipeline import ShadingPipelineUnit, span_shape
 from blysk.hdl.pixel_pipelines import WidePipelinesUnit
 from blysk.sim.engines.beats import dtype_of
@@ -29,8 +31,10 @@ __all__ = [
     "SimulatedFrame",
     "attribute_beats",
     "beats_of",
+    "sample_attributes",
     "sample_constants",
     "sample_material",
+    "sample_textures",
 ]
 
 
@@ -255,7 +259,43 @@ def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
         spans = replace(spans, values=SpanValues.quantise(*(start + step * (0, 0.4, 1))))
         if design.factors:
             spans = replace(spans, factors=spans.values.diffuse[:, list(design.factors)])
+    if design.albedo is not None:
+        spans = replace(spans, attributes=sample_attributes(design.albedo, length, rng))
     return spans, sample_constants(design, rng)
+
+
+def sample_attributes(albedo: Albedo, length: np.ndarray, rng: np.random.Generator) -> SpanAttributes:
+    """Attributes of some spans, to check a new model with: any colours, and places over some images."""
+    shape = (2, len(length), albedo.spans.attributes)
+    ends = rng.random(shape)
+    ends[:, :, 3 * albedo.colors :] = rng.uniform(-40, 40, ends[:, :, 3 * albedo.colors :].shape)
+    weights = rng.uniform(0.5, 1, (2, len(length))) if albedo.perspective else None
+    level = rng.integers(0, 4, len(length))
+    given = None if weights is None else (weights[0], weights[1])
+    return SpanAttributes.quantise(
+        albedo.spans, *ends, np.maximum(length, 1), weights=given, level=level, periodic=True
+    )
+
+
+def sample_textures(
+    design: ShadingPipeline, constants: Sequence[FrameConstants], rng: np.random.Generator
+) -> list[FrameConstants]:
+    """Constants with emission, tints and textures of 8x8 texels or fewer, for a design with an albedo."""
+    albedo = design.albedo
+    assert albedo is not None
+    found = [
+        replace(of, emission=rng.integers(0, 255 * 8, 3), tinted=bool(index % 2) if albedo.tints else None)
+        for index, of in enumerate(constants)
+    ]
+    if albedo.texture is not None:
+        memory = albedo.texture.memory
+        side = min(memory.fitting(), 8)
+        images = [Texture(rng.random((side, side, 3)), filter=name) for name in FILTERS]
+        loaded = memory.load(images if side == 8 else images[:1])
+        count = len(loaded.descriptors)
+        found = [replace(of, texture=loaded.descriptors[k % count]) for k, of in enumerate(found)]
+        found[0] = replace(found[0], texels=loaded)
+    return found
 
 
 def sample_constants(design: ShadingPipeline, rng: np.random.Generator | None = None) -> list[FrameConstants]:
@@ -272,7 +312,7 @@ def sample_constants(design: ShadingPipeline, rng: np.random.Generator | None = 
     if design.loads_tables:
         materials = [sample_material(design, index) for index in range(design.materials)]
         constants = with_tables(constants, materials, design)
-    return constants
+    return constants if design.albedo is None else sample_textures(design, constants, rng)
 
 
 def sample_material(design: ShadingPipeline, index: int) -> Material:
