@@ -51,8 +51,8 @@ class Task:
     def key(self) -> str:
         """Hash that tells measurements apart.
 
-        It is of name, settings, libraries' versions, the code of `golden`, `hdl` and `sim`, and the modules
-        of `bench` that the function's module imports.
+        The hash covers name, settings, libraries' versions, the code of `golden`, `hdl` and `sim`, and the
+        modules of `bench` that the function's module imports.
         """
         file = Path(inspect.getsourcefile(self.function))
         parts = (
@@ -138,7 +138,7 @@ def results_of(
 
     def keep(index: int, result: Any) -> None:
         results[index] = result
-        # A cache that fills up or goes away costs the next run its time, no more.
+        # If the cache fills up or is removed, only the next run takes longer.
         with contextlib.suppress(InputError, OSError):
             entry = {"task": tasks[index].name, "settings": tasks[index].settings}
             write_json(paths[index], {**entry, "digest": _digest(result), "result": result})

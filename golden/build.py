@@ -58,8 +58,8 @@ class Build:
         One pixel a cycle, or few multipliers.
     setup_interval : int or None
         Least number of cycles from a span to the next, for methods with this choice. A smaller number needs
-        more multipliers. ``None``: the largest up to 4 (``renormalise``: 3), or the largest of all in the
-        compact style.
+        more multipliers. ``None``: the largest number up to 4 (``renormalise``: 3); in the compact style the
+        largest number of all.
     exponent : int or None
         Specular exponent, fixed at build time; ``None``: the exponent is a frame constant.
     pipes : {1, 2, 4, 8}
@@ -73,7 +73,7 @@ class Build:
     geometry_style : {"throughput", "compact"} or None
         Style of the geometry of a core that takes triangles; ``None``: ``style``.
     coarse : CoarseDepth or None
-        Depth test that drops hidden spans before shading, of a core from triangles to pixels.
+        Depth test that drops hidden spans before shading. Only for a core from triangles to pixels.
     bus : {"native", "axi", "wishbone"}
         Ports: the core's own streams, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
 

@@ -101,7 +101,7 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     Returns
     -------
     draw : callable
-        Draws a frame and reads it back: uint8 array, shape (height, width, 3).
+        Draws a frame and reads it back as a uint8 array, shape (height, width, 3).
     name : str
         Name of the driver, as OpenGL gives it.
     """

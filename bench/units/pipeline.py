@@ -114,7 +114,7 @@ def _measure(rng, count, design):
                     highlight = 1 - np.square(normal - halfway[0] / ONE).sum(axis=-1) / 2
                 highlight = reflect(highlight, exponent) * (cosine > 0)
                 shades.append(255 * np.minimum(ambient + k_d * np.maximum(cosine, 0) + k_s * highlight, 1))
-            # The highlight is cut off where N.L changes its sign, and rounding decides where that is.
+            # The highlight is cut off where N.L changes its sign. Rounding decides this place.
             kept = cosine > 1 / 16
             angle = degrees_between(left, right)[span[kept], 0]
             yield Sample(found[kept].astype(np.float64), shades[0][kept], shades[1][kept], angle)
@@ -199,7 +199,7 @@ def _every_setup(unit, rng, count):
 
 
 def _border(design, rng):
-    """Constants of eight times the full light, steep at the terminator; and the light's vector."""
+    """Constants of eight times the full light, steep at the terminator, and the light's vector."""
     light, peak = (quantise(v)[np.newaxis] for v in sphere(rng, 2))
     colors = (Intensity.color(np.array([color])) for color in ((8, 7, 6), (0.03, 0.5, 0.1)))
     constants = FrameConstants(1, np.zeros(3, dtype=int), light, peak, *colors)
@@ -207,7 +207,7 @@ def _border(design, rng):
 
 
 def _terminator(unit, rng, count):
-    """Spans on the terminator of eight times the full light: there the last bits of N.L show."""
+    """Spans on the terminator of eight times the full light, where the last bits of N.L show."""
     constants, light = _border(unit.model, rng)
     spans = spans_near_terminator(rng, unit.model.interpolator.MAX_ANGLE - 0.01, light)
     return case_of(unit, spans, constants, 0x3FFFF)
@@ -222,7 +222,10 @@ def _roundings(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Long spans of large angles in a row, on the terminator: setups wait; last bits of differences show."""
+    """Long spans of large angles in a row, on the terminator.
+
+    Setups wait, and last bits of differences show.
+    """
     constants, light = _border(unit.model, rng)
     largest = unit.model.interpolator.MAX_ANGLE - 0.01
     normals = normalise(np.cross(rng.normal(size=(304, 3)), light))
@@ -233,7 +236,7 @@ def _long_spans(unit, rng, count):
 
 
 def _highlights(unit, rng, count, *, exponent, invert, brightness=8):
-    """Spans inside a steep highlight of H, or of its opposite: every bit of H is 0 once, and 1 once."""
+    """Spans inside a steep highlight of H, or of its opposite. Every bit of H is 0 once, and 1 once."""
     peak = sphere(rng, 1)[0]
     direction = normalise(sphere(rng, 1)[0] + 3 * peak)
     peak, direction = (quantise(v) ^ -invert for v in (peak, direction))
@@ -247,7 +250,7 @@ def _highlights(unit, rng, count, *, exponent, invert, brightness=8):
 
 
 def _halves(unit, rng, count):
-    """Channels of a half, and of the least step less: there every bit of either term's product counts."""
+    """Channels of a half, and a step less, where every bit of both terms' products counts."""
     # For a pixel's terms d and s and a diffuse colour c the specular colour is
     # (2^22 - 0 or 1 - 2^17 ambient - c d) / s modulo 2^23, where it is a colour.
     design, candidates = unit.model, 32_768
@@ -307,7 +310,7 @@ def _lost(rng, design):
 
 
 def _frames(unit, rng, count):
-    """Constants written between spans, all or some of them: a frame may have one pixel, or none."""
+    """Constants written between spans, all or some of them. A frame may have one pixel or no pixel."""
     design, frames, writes, after = unit.model, [], [], [0]
     while after[-1] < count:
         length = short_lengths(rng, int(rng.choice([1, 2, 5, 20, 80])))
@@ -330,7 +333,10 @@ def _frames(unit, rng, count):
 
 
 def _counters(unit, rng, count):
-    """More spans that are out of range, and empty, than the counters hold; one past the last x."""
+    """More spans that are out of range, and empty spans, than the counters hold.
+
+    A span goes past the last x.
+    """
     design = unit.model
     kinds = any_spans(rng, design, np.array([4, 0, 2]))
     kinds.normal_right[:] = -kinds.normal_left
@@ -483,7 +489,7 @@ RECORD = Record(
         "counters": Stimulus(_counters, stalled=False, variants=_ALL),
     },
     waivers={
-        "tables.read": "No table is written while beats read it: then the register may move.",
+        "tables.read": "No table is written while beats read it, so the register may move.",
         "multiplier_0_product": "A reciprocal and its square are normalised: the first bit is 1 already.",
     },
     still={

@@ -286,7 +286,7 @@ def spans_about(
 
 
 def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.ndarray) -> Spans:
-    """Spans on the terminator, the border of light and shade, of a light whose vector has this code.
+    """Spans on the terminator, the border of light and shade. The light's vector has this code.
 
     The sign of N.L, of 34 bits or rounded to 25, decides whether there is a highlight. So some spans start
     within a few last bits of the terminator. Some cross it as slowly as possible. Along some, N.L rises by a
@@ -321,8 +321,8 @@ def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.nda
 def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarray) -> Spans:
     """Spans along the terminator whose 1 - cosine depends on last bits.
 
-    Some have this word at the border of its rounding. For the others the number of segments of bisection is
-    about to change.
+    For some spans this word is at the border of its rounding. For the others the number of segments of
+    bisection is about to change.
     """
     normaliser = AdaptiveNormaliser()
     across = normalise(np.cross(light, rng.normal(size=3)))

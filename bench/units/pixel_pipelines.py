@@ -62,7 +62,7 @@ def _scanlines(unit, rng, count):
 
 
 def _constants(unit, rng, count):
-    """Constants of any codes, written over others; the material changes often."""
+    """Constants of any codes, written over other constants. The material changes often."""
     design = unit.model.design
     spans = any_spans(rng, design, rng.integers(0, 5, count))
     spans = replace(spans, material=np.arange(count) // 7 % design.materials)
@@ -76,7 +76,7 @@ def _constants(unit, rng, count):
     ]
     write = writes_of(constants)
     others = rng.integers(0, 1 << 18, (6, len(write["data"])))
-    # An index of a material is never changed: it must exist.
+    # An index of a material is never changed, because it must exist.
     others = np.where(write["address"] == MATERIAL_ADDRESS, write["data"], others)
     address = np.tile(write["address"], len(others) + 1)
     beats = beats_of(unit, ends_for(design, spans))
@@ -84,7 +84,7 @@ def _constants(unit, rng, count):
 
 
 def _counters(unit, rng, count):
-    """More empty spans than the counters hold, for all pipelines; one past the last x."""
+    """More empty spans than the counters hold, for all pipelines. A span goes past the last x."""
     design, pipes = unit.model.design, unit.model.pipes
     kinds = any_spans(rng, design, np.array([0, 2]))
     spans = kinds[np.r_[np.zeros(_COUNTED, dtype=int), 1]]
@@ -119,7 +119,7 @@ RECORD = Record(
     },
     axis="",
     waivers={
-        "pixel_assembler.$signal$*": "A pipeline has scanlines of one remainder: the bit is 0 already.",
+        "pixel_assembler.$signal$*": "A pipeline has scanlines of one remainder, so the bit is 0 already.",
     },
     still={
         "without an interpolator no span is out of range": "pipelines.sum_out_of_range_spans[0-15]",

@@ -111,7 +111,7 @@ class Sample:
 
 
 class Decisions(Sample):
-    """Decisions, 1 for yes and 0 for no, and the expected ones. An error is a share of all decisions.
+    """Decisions and expected decisions, 1 for yes and 0 for no. An error is a share of all decisions.
 
     The formula is yes if ``found`` or ``exact`` is yes. So a model error is a yes without need, and an
     arithmetic error a wrong no.
@@ -220,7 +220,7 @@ class Stimulus:
     ----------
     make : callable
         Function from the component, a random generator and a number of beats or pixels to a `Case`. The first
-        paragraph of its docstring says in a sentence or two what is covered.
+        paragraph of its docstring describes the covered inputs in a sentence or two.
     count : int
         Beats or pixels of a test.
     stalled : bool
@@ -233,9 +233,9 @@ class Stimulus:
     long : bool
         Whether it belongs to the long run.
     repeats : int
-        Number of times that it is made, each time with another seed.
+        Number of times that the stimulus is made, each time with another seed.
     variants : tuple of str
-        Names of the variants for which it is made. Empty: all variants.
+        Names of the variants for which the stimulus is made. Empty: all variants.
     """
 
     make: Callable[[Component, np.random.Generator, int], Case]
@@ -248,7 +248,7 @@ class Stimulus:
 
     @property
     def covers(self) -> str:
-        """A sentence or two that say what is covered."""
+        """Description of the covered inputs, in a sentence or two."""
         make = getattr(self.make, "func", self.make)
         return (make.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
 
@@ -300,7 +300,7 @@ class UnitRun:
         rng, start = np.random.default_rng([2026, len(cycles)]), int(input_cycles[0])
         span = int(max(cycles.max(initial=0), input_cycles[-1])) + 1 - start
         end = start + round(span / 2 / TAKEN)
-        # Until no run that keeps its rate is still under way.
+        # The stalls last until every run that keeps its rate has ended.
         free = np.zeros(end + 2 * span + 1000, dtype=bool)
         offered = min(OFFERED * len(input_cycles) / span, 0.9)
         taken = TAKEN * min(len(cycles) / span, 1)
@@ -459,7 +459,7 @@ def together(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]
 
 
 def once(compute: Callable[[Component, Case], Any]) -> Callable[[Component, Case], Any]:
-    """A function of a unit and a case that keeps its last result while the case exists.
+    """A function of a unit and a case, which keeps its last result while the case exists.
 
     Output and status of a case are often needed one after the other, and come from the same model.
     """

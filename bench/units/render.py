@@ -117,7 +117,7 @@ RECORD = Record(
     still={
         "a counter counts more than a run has": "count_spans[9-31]",
         "depths have room whenever the pipeline takes a span": "depths_room[0] depths_level[5]",
-        "shading works on fewer spans than wait at most": "spans_level[9]",
+        "shading works on fewer spans than the largest number of waiting spans": "spans_level[9]",
         "a line of the picture has fewer than 64 pixels": "{spans_payload,read,word}[16-21]",
     },
     remembers=True,

@@ -202,7 +202,7 @@ def corners(rng: np.random.Generator, count: int, grid: Grid = GRID, size: float
     points[kind == 3, 1, 1] = points[kind == 3, 0, 1]
     points[kind == 4, 2, 0] = points[kind == 4, 0, 0]
     points[kind == 5, 2] = points[kind == 5, 1]
-    # Tiny ones, and ones that reach to the ends of the guard band.
+    # Tiny triangles, and triangles that reach to the ends of the guard band.
     tiny = kind == 6
     points[tiny] = (middle + rng.integers(-step, step + 1, (count, 3, 2)))[tiny]
     low, high = grid.coordinate.min_code, grid.coordinate.max_code
@@ -246,7 +246,7 @@ def random_triangles(
 
 
 def ended(triangles: Triangles, grid: Grid = GRID) -> Triangles:
-    """Triangles of which two are changed to cover a small picture, so that their output ends a run.
+    """Triangles. Two of them are changed to cover a small picture, so that their output ends a run.
 
     The last triangle is in front of all triangles. The last triangle of the run with pauses is in front of
     most.

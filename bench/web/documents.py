@@ -68,7 +68,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
             body = _HEADING.sub(lambda m: f'<{m[1]} id="{slug(m[2])}">{m[2]}</{m[1]}>', body)
             body = _IMAGE.sub(lambda match, at=(name, folder): _image(match, *at, pictures), body)
             body = body.replace("<img ", '<img loading="lazy" ')
-            # The page's rules let no element have a style of its own.
+            # The page's security rules allow no style of a single element.
             body = re.sub(r' style="text-align:(left|center|right)"', r' class="\1"', body)
             body = body.replace("<table>", '<div class="scroll"><table>').replace(
                 "</table>", "</table></div>"
@@ -100,7 +100,8 @@ def _link(match: re.Match, name: str, folders: Mapping[str, Path], sources: dict
     address, anchor, others, text = match[1], match[2] or "", match[3], match[4]
     if not address:
         return match[0]
-    # By the names of the site, or by where the files lie now: pages of the units may be anywhere.
+    # Links go by the names in the site, or by the present places of the files. Pages of the units may lie
+    # anywhere.
     folder, _, file = posixpath.normpath(posixpath.join(name, address)).partition("/")
     if folder not in folders or not file or not (folders[folder] / file).is_file():
         target = (folders[name] / address).resolve()

@@ -199,7 +199,7 @@ def _write(folder: Path, files: Mapping[str, str], copies: Mapping[str, Path]) -
     before = (earlier(folder) or {"files": []})["files"]
     everything = [*files, *copies]
     folder.mkdir(exist_ok=True)
-    # First: it tells that the folder is ours, whatever comes between.
+    # This file is written first. It marks the folder as a site's folder, even after an interrupt.
     known = list(dict.fromkeys([*everything, *before]))
     write_json(folder / MARK, {"program": "blysk", "version": version_of("blysk"), "files": known})
     for name in sorted({posixpath.dirname(name) for name in everything} - {""}):

@@ -254,7 +254,7 @@ def _axes(viewer: np.ndarray, up: Sequence[float]) -> np.ndarray:
 
 
 def _rotate(vectors: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    # Term by term, not by a matrix product: equal points must give equal bits at any place in the
-    # array, or two vertices in one place could open a crack.
+    # The sum is made term by term, not by a matrix product. Equal points must give equal bits at any place in
+    # the array. Else two vertices at the same place could open a crack.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack([x * axis[0] + y * axis[1] + z * axis[2] for axis in axes], axis=-1)

@@ -66,7 +66,7 @@ def interpolate(curve: str, normal_left: np.ndarray, normal_right: np.ndarray, t
         if opposite.any():
             axis = np.eye(3)[np.abs(left).argmin(axis=-1)]
             unit = np.where(opposite, normalise(np.cross(left, axis)), unit)
-        # The two-argument form keeps the digits that arccos r loses near r = 1.
+        # The form with two arguments keeps the digits that arccos r loses near r = 1.
         angle = np.where(opposite, np.pi, np.arctan2(sine, r))
         found: np.ndarray = np.cos(t * angle) * left + np.sin(t * angle) * unit
         return found

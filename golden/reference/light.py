@@ -174,7 +174,7 @@ class Light:
         Parameters
         ----------
         points : array, shape (..., 3), optional
-            Points; a light that does not fade does not read them.
+            Points. A light that does not fade does not read them.
 
         Returns
         -------
@@ -207,7 +207,7 @@ class Light:
         return self.position is not None
 
     def turned(self, turn: Callable[[Triple], np.ndarray]) -> "Light":
-        """A directional light with its direction turned; a point light unchanged.
+        """A directional light with its direction turned. A point light stays unchanged.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ class Light:
     def scaled(self, shift: int) -> "Light":
         """The light in a mesh whose unit has been multiplied by ``2**shift``.
 
-        A position is multiplied by that, too. ``k_1 d`` and ``k_2 d^2`` stay.
+        A position is also multiplied by this power of two. ``k_1 d`` and ``k_2 d^2`` stay.
 
         Raises
         ------
@@ -242,7 +242,7 @@ class Light:
         return any(self.color)
 
     def towards(self, points: np.ndarray | None = None) -> np.ndarray:
-        """Unit vectors L from points of the surface to the light; 0 where a point light is at the point.
+        """Unit vectors L from points of the surface to the light. L is 0 where a point light is at the point.
 
         Parameters
         ----------

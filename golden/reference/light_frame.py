@@ -42,8 +42,8 @@ def light_frame(direction: np.ndarray, viewer: np.ndarray) -> LightFrame:
     """Frame of a light and a viewer, both at infinity.
 
     z is ``H = (L + V)/|L + V|``, x is ``(L - V)/|L - V|``, y completes the frame. They are the axes of the
-    quadratic form ``R·V`` of the normal. Where ``L = V`` any x across z serves. Where ``L = -V`` there is no
-    H: x is L, ``cos a`` is 0, and any z across x serves.
+    quadratic form ``R·V`` of the normal. If ``L = V``, any x across z serves. If ``L = -V``, there is no H.
+    Then x is L, ``cos a`` is 0, and any z across x serves.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def light_frame(direction: np.ndarray, viewer: np.ndarray) -> LightFrame:
 
 
 def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Unit vector perpendicular to a unit vector: along ``vector`` as far as that can be told."""
+    """Unit vector perpendicular to a unit vector. It is along ``vector`` as far as rounding allows."""
     across = vector - (vector @ axis) * axis
     if np.linalg.norm(across) < 1e-12:
         other = np.eye(3)[np.abs(axis).argmin()]

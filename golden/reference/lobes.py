@@ -332,7 +332,7 @@ def checked_roughness(roughness: float) -> float:
 def _alpha(roughness: float) -> float:
     """``roughness^2``, large enough that its powers are numbers.
 
-    The lobes are then 0 but at N·H = 1, as they are for any smaller roughness: the next cosine gives 1e-100.
+    The lobes are then 0 except at N·H = 1, as for any smaller roughness. The next cosine gives 1e-100.
     """
     return max(roughness, 2.0**-96) ** 2
 
@@ -341,7 +341,7 @@ def _energy_of_ggx(roughness: float) -> float:
     """``1 / (4 pi I)`` with ``I = (z - ln(1 + z)) / (2 z^2)``, ``z = (1 - alpha^2) / (2 alpha^2)``."""
     alpha = _alpha(roughness)
     z = (1 - alpha) * (1 + alpha) / (2 * alpha * alpha)
-    # Near z = 0 the difference has lost its digits; the series is off by less than z^3 / 10.
+    # Near z = 0 the difference has lost its digits. The series is off by less than z^3 / 10.
     integral = (z - math.log1p(z)) / (2 * z * z) if z > 1e-4 else 0.25 - z / 6 + z * z / 8
     return 1 / (4 * math.pi * integral)
 

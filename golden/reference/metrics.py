@@ -168,7 +168,7 @@ def mnse_published(image: np.ndarray, reference: np.ndarray) -> tuple[float, flo
     Parameters
     ----------
     image, reference : arrays of one shape
-        Values in any one unit; I is the reference, O the image.
+        Values in the same unit. I is the reference, O the image.
 
     Returns
     -------

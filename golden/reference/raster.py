@@ -21,8 +21,8 @@ __all__ = [
 SUBPIXELS = 256
 """Steps in a pixel; projected vertices are rounded to a step."""
 
-# Pixels beyond which a triangle is cut, so that edge functions stay within int64: coordinates within
-# 2^28 steps give products within 2^59.
+# Pixels beyond which a triangle is cut, so that edge functions stay within int64. Coordinates within 2^28
+# steps give products within 2^59.
 _GUARD = float(2**20)
 # Scanlines or fragments handled at once; bounds the memory, changes no result.
 _CHUNK = 1 << 20
@@ -128,8 +128,8 @@ class _Pieces:
     def edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A, B and C of each edge function ``A x + B y + C``, shape (P, 3), with x and y in whole pixels.
 
-        Edge i lies opposite corner i; inside, each function is positive, and the sum of the three is the
-        area.
+        Edge i lies opposite corner i. Inside the triangle each function is positive. The sum of the three is
+        the area.
         """
         start = self.points[:, [1, 2, 0]]
         end = self.points[:, [2, 0, 1]]
@@ -148,13 +148,14 @@ def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tupl
     kept_source = [source[count == 3]]
     for corners_inside in (1, 2):
         chosen = np.flatnonzero(count == corners_inside)
-        # The odd one out becomes corner 0, the winding stays.
+        # The corner that is alone on its side becomes corner 0. The winding stays.
         odd = (inside[chosen] == (corners_inside == 1)).argmax(axis=1)
         order = (odd[:, np.newaxis] + np.arange(3)) % 3
         first, second, third = np.moveaxis(records[chosen[:, np.newaxis], order], 1, 0)
         d_first, d_second, d_third = distance[chosen[:, np.newaxis], order].T
 
-        # Always from the inside to the outside, so that two triangles cut their shared edge in the same bits.
+        # Cuts go from the inside to the outside, so that two triangles cut their shared edge in the same
+        # bits.
         def cut(near: np.ndarray, far: np.ndarray, d_near: np.ndarray, d_far: np.ndarray) -> np.ndarray:
             place: np.ndarray = near + (d_near / (d_near - d_far))[:, np.newaxis] * (far - near)
             return place
@@ -209,7 +210,7 @@ def _assemble(
     turn = np.where(clockwise[:, np.newaxis], [0, 2, 1], [0, 1, 2])
     rows = np.arange(len(area))[:, np.newaxis]
     solid = area != 0
-    # y grows downwards: an area over 0 is clockwise.
+    # y grows downwards, so an area over 0 is clockwise.
     shown = solid & ~((area > 0) & scene.culls[triangle])
     pieces = _Pieces(
         points=points[rows, turn][shown],
@@ -374,9 +375,10 @@ def _drawn(pieces: _Pieces, width: int, height: int) -> tuple[np.ndarray, np.nda
             value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
             before = buffer[pixel]
             np.maximum.at(buffer, pixel, value)
-            # Strictly nearer than the stored depth: at equal depth the lower triangle, drawn before, stays.
+            # A pixel must be nearer than the stored depth. At equal depth the lower triangle, drawn before,
+            # stays.
             winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
-            # The last of several assignments counts; reversed, that is the first span of the chunk.
+            # The last of several assignments counts. In reversed order this is the first span of the chunk.
             index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
             owner[pixel[winner]] = index[winner]
         count += len(piece)
@@ -384,7 +386,7 @@ def _drawn(pieces: _Pieces, width: int, height: int) -> tuple[np.ndarray, np.nda
 
 
 class _End(NamedTuple):
-    """Ends of spans on one side: weights, unit normals, their lengths before, whether one was lost."""
+    """Ends of spans on one side: weights, unit normals, their lengths before, whether a normal was lost."""
 
     weights: np.ndarray
     normal: np.ndarray
@@ -393,7 +395,7 @@ class _End(NamedTuple):
 
 
 def _end(corners: np.ndarray, fallback: np.ndarray, weights: np.ndarray) -> _End:
-    """Normals of corners (count, 3, 3) by their weights; the fallback where they cancel."""
+    """Weighted normals of corners (count, 3, 3), and the fallback where they cancel."""
     normal = np.zeros((len(weights), 3))
     for corner in range(3):
         normal += weights[:, corner, np.newaxis] * corners[:, corner]

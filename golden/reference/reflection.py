@@ -71,7 +71,7 @@ class ReflectionModel:
         return f"<{type(self).__name__} {self.name}>"
 
     def __reduce__(self) -> str | tuple[Any, ...]:
-        # A function without a name of its own cannot be sent to another process; its model's name can.
+        # A function without a name cannot be sent to another process, but the name of its model can.
         if REFLECTION_MODELS.get(self.name) is self:
             return _registered, (self.name,)
         return super().__reduce__()
@@ -180,7 +180,7 @@ class PolynomialModel(ReflectionModel):
     squarings : int
         How often the base is squared, 1 to 3: the power is 2, 4 or 8.
     curve : callable, optional
-        Slope by exponent, if it is no line. Hardware then holds it in a table.
+        Slope by exponent, if the slope is not a line. Hardware then has a table of slopes.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class _Group(click.Group):
         return sorted({*_COMMANDS, *_installed()})
 
     def get_command(self, ctx, cmd_name):
-        # Before the import: Matplotlib looks for its folder when it is imported.
+        # This comes before the import, because Matplotlib looks for its folder when it is imported.
         provide_caches()
         found = _command(cmd_name)
         return found.load() if isinstance(found, LazyCommand) else found
@@ -65,7 +65,10 @@ def _installed() -> dict[str, "EntryPoint"]:
 
 
 def _command(name: str) -> click.Command | None:
-    """A command of this folder or of an installed package, perhaps not loaded; ``None`` if there is none."""
+    """A command of this folder or of an installed package.
+
+    It may not be loaded yet. ``None`` if there is none.
+    """
     if name in _COMMANDS:
         return _COMMANDS[name]
     return _installed()[name].load() if name in _installed() else None
@@ -134,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("default", RuntimeWarning)
             warnings.showwarning = show
             status = _run(sys.argv[1:] if arguments is None else list(arguments))
-        # Here, not at exit, a closed pipe or a full disk behind standard output raises its error.
+        # A closed pipe or a full disk behind standard output raises its error here, not at exit.
         print(end="", flush=True)
         return status
     except (click.Abort, KeyboardInterrupt):

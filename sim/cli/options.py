@@ -69,7 +69,7 @@ def given_options(context: click.Context, names: Iterable[str]) -> dict[str, Any
 
 
 def _values(context: click.Context, name: str) -> Any:
-    """Value of an option; for an option of lights, the lights."""
+    """Value of an option. For an option of lights these are the lights."""
     value, kind = context.params[name], SCENE[name].kind if name in SCENE else None
     if not (isinstance(kind, Lights) and isinstance(value, tuple)):
         return value

@@ -68,7 +68,7 @@ def _status(unit, case):
     misfits = int(np.count_nonzero(~unit.model.given.fits(np.asarray(case.beats["data"], np.uint8))))
     mine = {"frames": ended, "misfits": misfits, "busy": int(not case.beats["last"][-1])}
     counts = [record.status(unit.core, each) for each in _core_cases(unit, case)]
-    # A flag, where the others are counters.
+    # This is a flag. The other members are counters.
     flags = {"overrun": max}
     return {name: flags.get(name, sum)([each[name] for each in counts]) for name in counts[0]} | mine
 
@@ -84,7 +84,7 @@ def _case(unit, rng, count, length):
     data = unit.model.given.pack(_columns(unit.model.given, inner.beats))
     ends = np.cumsum(rng.integers(1, 2 * length, len(data) + 1)) - 1
     last = np.isin(np.arange(len(data)), ends)
-    # Also the beats that end the run, and the run with pauses.
+    # This also holds for the last beats of the run, and of the run with pauses.
     last[[-1, min(PAUSED, len(last)) - 1]] = True
     return replace(inner, beats={"data": data, "last": last.astype(int)})
 

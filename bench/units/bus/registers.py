@@ -52,7 +52,7 @@ def _accesses(unit, rng, count, busy=0):
     data = np.where((kind > 0.2) & (kind < 0.25), rng.choice([0, (1 << 32) - 1], count), data)
     named = [registers.index(unit.model[name]) for name in ("errors", "refused")]
     named += [registers.index(register) for register in unit.model.picture]
-    # Every third access reads back what an earlier one may have changed.
+    # Every third access reads a register that an earlier access may have changed.
     back = np.arange(count) % 3 == 2
     again = np.array([registers[k].address for k in named])[rng.integers(0, len(named), count)]
     counters = {name: int(rng.integers(0, 1 << width)) for name, width, _ in _COUNTERS}
@@ -80,7 +80,7 @@ def _borders(unit, rng, count):
         words = {word & 0xFFFFFFFF for end in ends for word in (end, register.extended(end), end | 1 << 31)}
         for word in sorted(words):
             accesses += [(register.address, 1, word, 15), (register.address, 0, 0, 15)]
-        # Bytes and halves of it, by their own addresses and by that of the word, and no byte at all.
+        # Writes of bytes, of halves and of no byte, at their own addresses and at the word's address.
         for strobe in range(16):
             first = register.address + max((strobe & -strobe).bit_length() - 1, 0)
             accesses += [(place, 1, 0xFFFFFFFF, strobe) for place in (register.address, first)]

@@ -89,7 +89,7 @@ def _corners(unit, rng, count):
     vector = quantise(sphere(rng, len(angles)))
     vector[::3] = left[::3]
     ends = word_ends(rng, count // 2, 9)
-    # The largest dot products of both signs.
+    # These are the largest positive and negative dot products.
     ends[:2], ends[1, 3:6] = COMPONENT.min_code, COMPONENT.max_code
     left, right, vector = (
         np.vstack([v, ends[:, 3 * k : 3 * k + 3]]) for k, v in enumerate((left, right, vector))
@@ -109,7 +109,7 @@ def _variants():
                 partial(AngularSetupUnit, setup),
                 partial(_measure, unit=setup),
                 f"spans to 150 degrees, {LONG}",
-                note="of cos gamma at any pixel; the tables count as arithmetic, but not that of arccos",
+                note="of cos gamma at any pixel; the tables count as arithmetic, except the table of arccos",
                 as_published=name == "arccos as_published",
                 long=name != "half chord",
             ),
@@ -130,7 +130,7 @@ RECORD = Record(
     waivers={
         "cordic_?_*": "The controlling bit is the sign of a word that is not negative.",
         "entry": "The slope of a root from 1/4 to 1 is 1/2 or more; at 0 it is multiplied by 0.",
-        "factor": "The saturation of a factor that is 0.636 to 0.708, and never saturates.",
+        "factor": "It is for the saturation of a factor. The factor is 0.636 to 0.708, and never saturates.",
         "steps": "Both readers of an inverted bit invert it again, or ignore it.",
     },
     still={

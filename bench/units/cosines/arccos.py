@@ -34,7 +34,7 @@ def _cosines(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Both sides of every segment's bounds, of 0 and of 1, ends of the word, cosines in range."""
+    """Both sides of every segment's bounds, of 0 and of 1, extreme codes, cosines in range."""
     one, bounds = unit.model.MAGNITUDE_FORMAT.code(1), unit.model.bounds
     ends = np.r_[0, 1, bounds - 1, bounds, bounds + 1, one - 1, one, one + 1, FORMAT.max_code]
     return Case(np.r_[ends, -ends, FORMAT.min_code, rng.integers(-one, one + 1, count)])

@@ -65,7 +65,7 @@ RECORD = Record(
     },
     waivers={
         "multiplier_?_product": (
-            "Squares end in 00 or 01, so the last bits of three never carry past the second bit; ten are cut."
+            "Squares end in 00 or 01, so the sum of three has no carry past its second bit. Ten bits are cut."
         ),
         "u_aligned": "If a bit above the format of u is set, u saturates whatever the other bits are.",
         "u": "The value of the saturation is the inverted sign, and a sum of squares is not negative.",

@@ -83,7 +83,10 @@ def value_at(differences, pixel) -> np.ndarray:
 
 
 def _measure(rng, count):
-    """N·L and u at any pixel, by the differences in exact arithmetic. The product of unit vectors is 1."""
+    """N·L and u at any pixel, by the differences in exact arithmetic.
+
+    Equal unit vectors have the product 1.
+    """
     length = log_lengths(rng, count, 2)
     pixel = pixel_of(rng, length)
     exact, values = three_values(local_curves(rng, count), count)
@@ -233,11 +236,11 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("highlight_0_slope_out_of_range", "out_of_range"),
-        "Written too often, but read only on the cycle after that on which it is to be written.",
+        "It is written too often, but it is read only on the cycle after the right write.",
     )
     | dict.fromkeys(
         ("diffuse_0_curvature_exact", "highlight_0_ends"),
-        "Held wrong, but read only on the cycle after that on which it is written.",
+        "It is kept wrong, but it is read only on the cycle after the write.",
     )
     | {
         "multiplier_1_1": "A reciprocal and its square are normalised: the first bit is 1 already.",
@@ -252,7 +255,7 @@ RECORD = Record(
         "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
         "a length of 12 bits takes shifts up to 12, and its square up to 25": "shift[4] square_shift[5]",
         "a reciprocal or its square, of 17 bits, is not negative": "multiplier_{0,1}_{1,b}[17]",
-        "the slope of u times 1/(m - 1) has five fraction bits less than what is shifted": "shifter_0_0[0-4]",
-        "the other products have twelve or thirteen less": "shifter_1_0[0-11]",
+        "u's slope times 1/(m - 1) has five fraction bits less than the shifted word": "shifter_0_0[0-4]",
+        "the other products have twelve or thirteen fraction bits less": "shifter_1_0[0-11]",
     },
 )

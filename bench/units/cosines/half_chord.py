@@ -29,7 +29,7 @@ def _measure(rng, count):
     chord, obtuse = chord_of(*span_ends(rng, count, 180.0))
     unit = HalfChord()
     found = unit.compute(chord, obtuse)
-    # The table's lines and the polynomial, in words of the hardware, without further rounding.
+    # Interpolated table and polynomial, in words of the hardware, without further rounding.
     z = chord.codes * 2.0**-36
     halvings = np.clip(np.floor(-np.frexp(z)[1] / 2), 0, 17)
     position = z * 4.0**halvings * 2**unit.ADDRESS_BITS
@@ -58,7 +58,7 @@ def _chords(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Powers of two and one less, the largest chords, chords over 2, and every size."""
+    """Powers of two, powers of two minus 1, the largest chords, chords over 2, and every size."""
     powers = 1 << np.arange(36)
     ends = np.r_[0, powers, powers - 1, FORMAT.max_code, LARGEST + 1, LARGEST - 2, LARGEST + (1 << 17)]
     size = np.trunc(2.0 ** rng.uniform(0, 36, count)).astype(np.int64)
@@ -81,7 +81,7 @@ RECORD = Record(
             _measure,
             "angles 0 to 180 degrees",
             "turn",
-            note="model: the root by lines, the factor by its polynomial",
+            note="model: the root by linear interpolation, the factor by its polynomial",
         ),
         **{
             f"interval {interval}": Variant(partial(HalfChordUnit, initiation_interval=interval))

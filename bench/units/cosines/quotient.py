@@ -40,7 +40,10 @@ def _expect(unit, case):
 
 
 def _squares(model, rng, count):
-    """Squares x^2 + y^2 and z^2 of vectors of lengths 1/8 to 1, near the z axis or across it by logarithm."""
+    """Squares x^2 + y^2 and z^2 of vectors of lengths 1/8 to 1.
+
+    The log of the angle to z or xy is uniform.
+    """
     length = 2.0 ** rng.uniform(-3, 0, count)
     sine = np.where(rng.random(count) < 0.5, 2.0 ** -rng.uniform(0, 20, count), rng.uniform(0, 1, count))
     sine = np.where(rng.random(count) < 0.3, 1 - sine, sine)

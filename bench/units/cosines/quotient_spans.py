@@ -83,7 +83,7 @@ def _spans(unit, rng, count):
 
 
 def _words(unit, rng, count):
-    """Ends of words in every component and light, any steps and exponents, so that sums wrap."""
+    """Extreme codes in every component and light, with any steps and exponents, so that sums wrap."""
     length = np.maximum(rng.choice([1, 1, 1, 2, 3, 4, 5, 6, 7, 9, 40], count) % (1 << unit.length_bits), 1)
     shape = count, len(unit.model.components)
     start, step = (np.maximum(word_ends(rng, *shape), 1 - (1 << 17)) for _ in range(2))

@@ -23,7 +23,7 @@ def _measure(rng, count, unit, shortcut=False):
     step = psi / (length - 1)
     phase = rng.uniform(-np.pi, np.pi, len(length))
     amplitude = rng.uniform(0, 1 - 2.0**-16, len(length))
-    # The shortcut for cos d, by its half angle: near d = 0 a cosine has lost its digits.
+    # The shortcut for cos d, computed from its half angle, because a cosine near d = 0 has lost its digits.
     taken = 2 * np.arcsin(np.sin(psi / 2) / (length - 1)) if shortcut else step
     states = unit.states(*unit.start(amplitude, phase, step), *unit.coefficient(taken), int(length.max()))
     k = np.arange(len(states.codes))[:, np.newaxis]
@@ -33,7 +33,7 @@ def _measure(rng, count, unit, shortcut=False):
         first, second = (amplitude * np.cos(phase - n * step) for n in (0, 1))
         rise = second - first + 2 * first * np.square(np.sin(taken / 2))
         ratio = k * np.sinc(k * taken / np.pi) / np.sinc(taken / np.pi)
-        # Up to 1.1 where the span is wide: out of the result's word.
+        # If the span is wide, this is up to 1.1, which is out of the result's word.
         limit = unit.result_format.max_code * unit.result_format.step
         formula = np.clip((first * np.cos(k * taken) + rise * ratio)[inside], -1, limit)
     pixel = np.broadcast_to(k, inside.shape)[inside]
@@ -102,7 +102,7 @@ def _longest(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Spans of nearly no angle that reach a border of the result's rounding, where one step decides."""
+    """Spans with nearly no angle, at a border of the result's rounding, where one step changes the result."""
     p, length = unit.model, np.full(count // 12, 12)
     cut = p.state_format.fraction_bits - p.result_format.fraction_bits
     starts = []

@@ -126,7 +126,7 @@ RECORD = Record(
         "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
             "span_square_partial[36] span_square_total[36-37] span_aligned[38-39]"
         ),
-        "all words that are read of a table have the same bit there": (
+        "all words that are read from a table have the same bit there": (
             "chord_entry[12-13] chord_entry[34-35] chord_entry[49] "
             "step_entry[10-13] step_entry[34-35] step_entry[47-49] step_entry[71] "
             "phase_entry[10-13] phase_entry[35] "
@@ -134,7 +134,7 @@ RECORD = Record(
             "step_tables.port__data[10-13] step_tables.port__data[34-35] step_tables.port__data[47-49] "
             "step_tables.port__data[71] phase_tables.port__data[10-13] phase_tables.port__data[35]"
         ),
-        "the excess of the square of an angle is less than 1/4, that of an angle less than 1": (
+        "the excess of an angle's square is less than 1/4, and the excess of an angle less than 1": (
             "chord_0_sum[20-22] chord_0_rounded[15-18] chord_0[15-16] chord_1_sum[22] chord_1_rounded[17-18]"
         ),
         "of a step 1 - k is less than 1/4 and 1 - sin d/d less than 1/2, of four steps 1 - k less than 1/2": (

@@ -27,7 +27,7 @@ def _near(unit, rng, count):
 
 
 def _far(unit, rng, count):
-    """Normals of any direction, some with components near 0 and at the ends of the word."""
+    """Normals of any direction, some with components near 0 and with extreme codes."""
     case = _case(rng, count, 2.0)
     low, high = -(1 << 23) + 1, (1 << 23) - 1
     words = [low, high, 0, -1, 1, 4095, 4096, -4096, -4097]

@@ -87,7 +87,7 @@ def _edges(unit, rng, count):
         """The first code of a step of the bound, or the code before it."""
         return (upper << shift) - rng.integers(0, 2, groups)
 
-    # Some groups fill the block twice, the second time less deep.
+    # Some groups fill the block twice. The second time the depths are smaller.
     twice = rng.random(groups) < 0.125
     upper = np.where(twice, 1, rng.integers(2, (1 << given.depth_bits) - 3, groups))
     marked, filled = code(upper + np.where(twice, 2, rng.integers(-1, 2, groups))), code(upper)
@@ -138,7 +138,7 @@ RECORD = Record(
     waivers={"place": "Words are swept in another order, and each word has its turn."},
     still={
         "what a reset finds is swept": "fresh[0] used[0]",
-        "only after a reset all words are swept, and 5 of 30 else": "left[3-4]",
+        "all words are swept only after a reset; else 5 of 30 are swept": "left[3-4]",
         "a scanline has six words, and begins with an even one": "span[12]",
     },
     remembers=True,

@@ -103,7 +103,7 @@ RECORD = Record(
         "few": Stimulus(_few, 2000),
         "same": Stimulus(_same, 500),
         "far": Stimulus(_far, 300),
-        # An odd number: after an even number, a bit that each event inverts would be as before.
+        # The number is odd. After an even number, a bit that each event inverts would be as before.
         "again": Stimulus(_again, 901),
         "nearer": Stimulus(_nearer, 2001),
     },

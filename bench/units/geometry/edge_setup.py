@@ -47,7 +47,7 @@ def _variants():
         ("4 fraction bits", Grid(4), 3, 2),
         ("4 fraction bits, 1 divider", Grid(4), 1, 1),
     ):
-        # One divider of two bits is that of the compact style, without a skid buffer.
+        # The compact style has one divider of two bits, without a skid buffer.
         skid = options[1:] != [1, 2]
         unit = partial(EdgeSetupUnit, *options, skid=skid)
         yield name, Variant(unit, note="exact", long=options[1] + options[2] == 3)

@@ -38,7 +38,7 @@ def _below(unit, rng, count):
 
 
 def _flat(unit, rng, count):
-    """Triangles as high as the grid, nearly flat on top, so that the upper edge is short or missing."""
+    """Triangles as high as the grid and nearly flat on top, so that the upper edge is short or missing."""
     triangles, grid = random_triangles(rng, count, unit.grid, 500.0), unit.grid
     ends = grid.coordinate.min_code, grid.coordinate.max_code
     triangles.x[:] = rng.integers(ends[0], ends[1], triangles.x.shape)

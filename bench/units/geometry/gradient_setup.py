@@ -31,7 +31,7 @@ def _beats(rng, stages):
 
 
 def _attributes(unit, rng, count, size=12.0):
-    """Attributes of triangles of all kinds, some values at the ends of the word."""
+    """Attributes of triangles of all kinds. Some values are extreme codes."""
     stages = Stages(random_triangles(rng, 4 * count, size=size), WHOLE)
     return Case(first(_beats(rng, stages), count))
 
@@ -72,7 +72,7 @@ RECORD = Record(
     still={
         "lower halves of words are narrower than a multiplier": "multiplier_1_{b,1}[9-17] "
         "multiplier_2_{a,0}[16-17]",
-        "an attribute has a fraction bit less than a product": "rise[0]",
+        "an attribute has one fraction bit less than a product": "rise[0]",
         "half a step is added to what was cut": "fraction_word[0]",
         "a bit for the rounding is shifted in": "shifter_0_0[0]",
     },

@@ -36,7 +36,7 @@ def _case(rng, length, angle):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, short spans mixed. Sine and cosine of 26 degrees have odd codes."""
+    """Spans of every length, with short spans between. Sine and cosine of 26 degrees have odd codes."""
     return _case(rng, np.maximum(4095 >> rng.integers(0, 13, count), 1), np.radians(26))
 
 

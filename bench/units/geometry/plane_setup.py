@@ -41,7 +41,7 @@ def _measure(rng, count):
     scales = scales_of_corners(beats, GRID)
     kept = ~scales.sliver
     width = beats["area"] / beats["long_height"] / GRID.steps
-    # The shift, 8 less the exponent of 1/W, from its five bits.
+    # The shift, 8 minus the exponent of 1/W, from its five bits.
     shift = (scales.column_shift + 3) % 32 - 3
     found = scales.width_reciprocal.values * 2.0 ** (8.0 - shift) * width
     return Sample(found[kept], np.ones(kept.sum()), None, np.log2(width[kept]))

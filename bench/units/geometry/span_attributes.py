@@ -83,7 +83,7 @@ def _status(unit, case):
 
 
 def _case(unit, triangles, frame, count):
-    # Only low triangles: a few high triangles would fill the run.
+    # The triangles are low, because a few high triangles would fill the run.
     low = np.ptp(triangles.y, axis=1) < 64 * GRID.steps
     stages = Stages(triangles[low], frame)
     rows = stages.clipped
@@ -140,7 +140,7 @@ def _any(unit, rng, count):
 
 RECORD = Record(
     name="span_attributes",
-    title="N/W and depth at both ends of each span, and of each piece of a wide one",
+    title="N/W and depth at both ends of each span, and of each piece of a wide span",
     source="docs/theory/geometry.md#normals",
     variants={
         "": Variant(SpanAttributesUnit, note="exact sums of the steps"),
@@ -160,6 +160,6 @@ RECORD = Record(
     axis="",
     still={
         "a counter counts more events than a run has": "count_empty[8-31] count_cut[9-31]",
-        "of attributes side by side each is the last": "found[456]",
+        "attributes are side by side, so each is the last": "found[456]",
     },
 )

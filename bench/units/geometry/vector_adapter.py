@@ -29,7 +29,7 @@ def _expect(unit, case):
     words = {name: value for name, value in case.beats.items() if name not in ("start", "shift")}
     words |= {name: Fixed(format, case.beats[name]) for name, format in _FORMATS.items() if name in words}
     words |= {name: words[name].astype(bool) for name in ("flip", "turned")}
-    # Of the other end, the model needs only what the shift tells.
+    # The model reads the other end only for the shift.
     start = Fixed(SPAN_NORMAL, case.beats["start"])
     reach = 1 << (SPAN_NORMAL.fraction_bits - 1 - case.beats["shift"])
     right = Fixed(SPAN_NORMAL, np.repeat(reach[:, np.newaxis], 3, axis=1))
@@ -67,7 +67,7 @@ def _any(unit, rng, count):
 
 
 def _sizes(unit, rng, count):
-    """Powers of two, and a step less. They decide each bit of a shift."""
+    """Powers of two, and powers of two minus a step. They decide each bit of a shift."""
     beats = {}
     for name in _VECTORS:
         bits = _FORMATS[name].width - 1

@@ -33,7 +33,7 @@ def _vectors(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Squared lengths next to the borders of the table's segments, vectors along axes, ends of the word."""
+    """Squared lengths next to the borders of the table's segments, vectors along axes, extreme codes."""
     squared = (np.arange(128, 512) / 512)[:, np.newaxis] + np.arange(-2, 3) * 2.0**-20
     length = np.sqrt(np.r_[squared.ravel(), 4 * squared.ravel()])
     direction = sphere(rng, len(length))

@@ -52,7 +52,7 @@ def _near(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """A picture anywhere. Boxes begin or end at its borders, or 2^k pixels beside, or are 2^k pixels high."""
+    """Pictures at any place. Boxes begin or end at borders or 2^k pixels beside, or are 2^k pixels high."""
     grid, first = unit.grid, rng.integers(-2048, 2047, 2)
     end = np.minimum(first + 2 ** rng.integers(0, 11, 2), 2048)
     frame = FrameSettings(*(int(end) for end in (*first, *end)))
@@ -75,7 +75,7 @@ def _borders(unit, rng, count):
 
 RECORD = Record(
     name="vertex_sort",
-    title="Corners of triangles from top to bottom, orientation, and what is not drawn",
+    title="Corners of triangles from top to bottom, orientation, and dropped triangles",
     source="[T] figure 4.10",
     variants={
         "": Variant(VertexSortUnit, note="exact"),

@@ -93,7 +93,7 @@ def spans_about(rng, halfway, cosine, degrees, spread):
     """
     top = np.clip(cosine + rng.normal(size=len(halfway)) * spread, -1, 1)
     top = turned(rng, halfway, np.degrees(np.arccos(top)))
-    # The great circle through the point nearest to H stands at a right angle to the way there.
+    # The span's great circle is at a right angle to the line from H to the nearest point.
     side = normalise(np.cross(top, halfway + 1e-9 * sphere(rng, len(halfway))))
     share = rng.uniform(-0.2, 1.2, len(halfway))
     ends = []
@@ -166,7 +166,7 @@ def _variants():
             _measure,
             "spans to 45 degrees, 1 to 16 pixels, N_l within twice the highlight's radius of H, n 1 to 1000",
             "rate",
-            note="of all spans; model: let through without a lit pixel; arithmetic: stopped with a lit one",
+            note="of all spans; model: let through without a lit pixel; arithmetic: stopped with a lit pixel",
         ),
     )
     for interval in (1, 2, 3, 5, 8, 15):
@@ -203,9 +203,9 @@ RECORD = Record(
             "Without the bit the difference carries past the bits that are cut off once in 2^15 spans."
         ),
         "partial_0": "T (2 - u) is not negative, and less than 2: the controlling bit is 0.",
-        "total_0": "Of bits that are cut off: it carries into what is kept once in 2^14 spans.",
+        "total_0": "It is a bit that is cut off. It carries into the kept bits once in 2^14 spans.",
         "cut": "1 - N_l·N_r is less than 4, also of words that are no unit vectors.",
-        "$auto$ff.cc:*": "All beats begin on the same turn: the unit waits only on the turn of its results.",
+        "$auto$ff.cc:*": "All beats begin on one turn, as the unit waits only on the turn of its results.",
     },
     still={
         "the exponent stays for a run, so that what follows from it does not fall": (

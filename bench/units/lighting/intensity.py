@@ -114,7 +114,7 @@ def _sizes(unit, rng, count):
 
 
 def _halves(unit, rng, count):
-    """Sums of a half LSB or the least step less, where every bit of a product and of the sum counts."""
+    """Sums of half an LSB, and sums a step smaller, where every bit of a product and of the sum counts."""
     colors = np.repeat([[[8191]], [[6003]]], 3, axis=-1)
     ambient = np.array([3, 100, 40]) * 64 + 5
     wanted = (1 << 22) - np.arange(2)[:, np.newaxis]

@@ -39,7 +39,7 @@ def _measure(rng, count):
             viewer, light = sphere(rng, share), sphere(rng, share)
             halfway = normalise(viewer + light)
             normal = turned(rng, halfway, np.minimum(spread_angles(rng, share, 90), 89))
-            # A viewer sees the front: N.V > 0, and so N.H > 0 wherever there is light.
+            # A viewer sees the front. So N.V > 0, and N.H > 0 wherever there is light.
             kept = dot(normal, viewer) > 0.01
             normal, light, halfway = (quantise(v[kept]) for v in (normal, light, halfway))
             cosine = product.compute(*component_words(normal, light))

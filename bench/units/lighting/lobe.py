@@ -100,7 +100,7 @@ def _highlights(unit, rng, count):
 
 
 def _tables(unit, rng, count):
-    """Tables of any curve, others in each run, one of them replaced. Also lost values and single values."""
+    """Tables of any curve, which differ in each run. One is replaced. Some values are lost or single."""
     p = unit.model
     tables = []
     for _ in range(p.banks):
@@ -212,12 +212,12 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("last", "active"),
-        "Of one bank, a table that ends later only writes past the end of the memory.",
+        "With one bank, a table that ends later only writes past the end of the memory.",
     )
     | {
         "memory.follows": "Writes of a run come without gaps; a test of the unit has some.",
         "memory.$signature__addr": "Nothing is written after the number of a bank that there is not.",
-        "table__word": "No bank is written while beats read it: then the register may move.",
+        "table__word": "No bank is written while beats read it, so the register may move.",
     },
     still={"with one bank the last address is the same for every table": "memory.last[0-8]"},
 )

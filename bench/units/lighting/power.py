@@ -62,7 +62,7 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("s_*", "x_?_sum", "x_?_difference"),
-        "The lowest of 17 bits that are cut off in the end: it carries past them once in 2^17 terms.",
+        "It is the lowest of 17 bits that are cut off in the end. It carries past them once in 2^17 terms.",
     )
     | {"x_9": "It is for the saturation, and p + q - pq never does."},
     still={

@@ -211,6 +211,6 @@ RECORD = Record(
         "argument": (
             "An argument of 1 or more is lit under an exponent of 1 only, for which the bit is cut off."
         ),
-        "slope_word": "The slope is n / 2: the 17 bits from its first leave out the lowest.",
+        "slope_word": "The slope is n / 2. The 17 bits from its first bit on leave out the lowest bit.",
     },
 )

@@ -43,7 +43,7 @@ def parabolas_near(rng: np.random.Generator, least: np.ndarray, largest_bulge: f
     count = len(least)
     curvature = 2 * largest_bulge * 10.0 ** rng.uniform(-6, 0, count)
     curvature[::3] *= -1
-    # The place of the vertex: on the span, or far off, where the parabola is a slope.
+    # The place of the vertex. It is on the span, or far off, and then the parabola is nearly a line.
     vertex = rng.uniform(0, 1, count)
     vertex[::4] = rng.choice([-1, 1], len(vertex[::4])) * 10.0 ** rng.uniform(0, 2, len(vertex[::4]))
     three = curvature[:, None] * np.square(np.array([0, 0.5, 1]) - vertex[:, None])
@@ -116,7 +116,7 @@ def _last_bits(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Spans far from every highlight. A bulge or a rise is up to 3 units of any bit off its limit."""
+    """Spans far from every highlight. A bulge or a rise differs from its limit by up to 3 units of a bit."""
     p, shape = unit.model, (count, unit.lights)
     left = rng.integers(FORMAT.max_code // 2, FORMAT.max_code // 4 * 3, shape)
     off = rng.integers(-3, 4, (2, *shape)) << rng.integers(0, 22, (2, *shape))
@@ -129,7 +129,7 @@ def _borders(unit, rng, count):
 
 
 def _thresholds(unit, rng, count):
-    """Thresholds of no exponent, with the least and the largest code, and a least u about them."""
+    """Thresholds that belong to no exponent, with the least and largest code, and a least u near them."""
     format = unit.model.THRESHOLD_FORMAT
     code = rng.choice([0, 1, format.max_code, rng.integers(format.max_code), 1 << rng.integers(format.width)])
     nearest = min(code * format.step / 2, 2.0)
@@ -146,7 +146,7 @@ def _variants():
             _measure,
             "spans of 3 to 19 pixels, least u to twice the highlight's, n 1 to 1000",
             "rate",
-            note="of all spans; model: let through without a lit pixel; arithmetic: stopped with a lit one",
+            note="of all spans; model: let through without a lit pixel; arithmetic: stopped with a lit pixel",
         ),
     )
     for name, specular in (
@@ -175,7 +175,7 @@ RECORD = Record(
     axis="n u in the middle of the span",
     logarithmic=True,
     waivers={
-        "threshold": "Inverted by its first bit, which no exponent sets: its threshold would be 4 or more.",
+        "threshold": "Its first bit inverts it. No exponent sets this bit: its threshold would be 4 or more.",
         "least_0": "The bulge has another sign for a single value, a power of two.",
     },
     still={

@@ -52,7 +52,7 @@ _GROUPS = 32
 
 
 def _measure(rng, count, method):
-    """N·L and 1 - N·H along spans. The product of two unit vectors is 1."""
+    """N·L and 1 - N·H along spans. Equal unit vectors have the product 1."""
 
     def samples():
         for length in np.array_split(span_lengths(rng, count), _GROUPS):
@@ -134,7 +134,7 @@ def operand_beats(unit: Component, operands: Operands, **others: np.ndarray) -> 
     beats = np.zeros(operands.cosine.codes.shape, dtype_of(unit.o.payload.shape().elem_shape))
     for name in beats.dtype.names:
         if name == "factor":
-            # Of the lights that fade; of others it is 0.
+            # Factors of the lights that fade. Other lights have the factor 0.
             beats[name][:, list(unit.factors)] = operands.factor.codes
         else:
             beats[name] = others[name] if name in others else getattr(operands, name).codes
@@ -164,7 +164,7 @@ def status(unit: Component, case: Case) -> dict[str, int]:
 def case_of(
     unit: Component, rng: np.random.Generator, left: np.ndarray, right: np.ndarray, length: np.ndarray
 ) -> Case:
-    """Spans between normals of these codes, with lights from anywhere. H of the first light is a normal."""
+    """Spans between normals of these codes, with lights from any side. H of the first light is a normal."""
     length = np.maximum(length % (1 << unit.length_bits), 1)
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[0] = left[len(left) // 2]

@@ -39,7 +39,7 @@ EXPONENT = 60
 
 _STILL = {
     "twice a number is even": "{diffuse,highlight}_0_second_difference[0]",
-    "spans come while under 28 are counted inside, under 12 long ones, and three more before they count": (
+    "spans come while under 28 spans and 12 long spans are counted inside; three more come uncounted": (
         "spans_inside[5] lengths.inner_level[5] long_inside[4] behind[4]"
     ),
 }
@@ -49,7 +49,7 @@ _METHOD = LocalChordInterpolator()
 
 
 def _measure(rng, count):
-    """N·L and 1 - N·H along spans. The product of two unit vectors is 1."""
+    """N·L and 1 - N·H along spans. Equal unit vectors have the product 1."""
     length = span_lengths(rng, count)
     curves = local_curves(rng, len(length))
     values, codes = three_values(curves, len(length))

@@ -32,7 +32,7 @@ _LARGEST = 120.0
 
 
 def _measure(rng, count):
-    """N·L and 1 - N·H along spans with ends of ratios to 1:4. The product of two unit vectors is 1."""
+    """N·L and 1 - N·H along spans with ends of ratios to 1:4. Equal unit vectors have the product 1."""
     length = span_lengths(rng, count)
     spans = len(length)
     around = sphere(rng, 1)

@@ -97,7 +97,7 @@ def _last_bits(unit, rng, count):
     angles = rng.uniform(0, 95, len(length))
     angles[::2] = 10.0 ** rng.uniform(-4, 1, len(angles[::2]))
     ends = code_pairs_at(rng, len(length), angles)
-    # The third of five pixels is the normal half-way.
+    # The third of five pixels has the normal half-way.
     border = pairs_chosen(
         *code_pairs_at(rng, 1500, 90),
         lambda u: (u < ONE_SQUARED.codes) & (abs(u % (1 << 17) - (1 << 16)) < 4),
@@ -144,13 +144,13 @@ RECORD = Record(
         "fsm_state": (
             "In the first state all bits of the state are 0, and so is the controlling bit of the next."
         ),
-        "write_index": "Ends are 16 of 32 segments apart at most: the bit, 32, is 0 already.",
+        "write_index": "Ends are at most 16 of 32 segments apart. So the bit of 32 is 0 already.",
         "inner_level": "The level falls from 1 on only, so that the controlling bit, the borrow, is not set.",
         "angle": "It is for u of 1 or more, and from 45 degrees on the cosine is read in its place.",
     },
     still={
-        "ends that are bisected are two of 32 segments apart at least": "top.index[0]",
-        "half of 32 segments is the most that ends are apart or written last": "half[5] write_index[5]",
+        "ends that are bisected are at least two of 32 segments apart": "top.index[0]",
+        "ends are at most half of 32 segments apart, also when written last": "half[5] write_index[5]",
         "the unit has 16 spans inside at most": "ready_spans[5-6]",
         "a reciprocal is normalised and not negative, so that its first bits are 01": (
             "reciprocal[16-17] reciprocals.table_port__data[16]"

@@ -83,7 +83,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Last bits of products and sums, which are rounded off, and u at the border of its rounding.
+    """Operands for the last bits of products and sums, which are rounded off, and u at a border of rounding.
 
     The first pairs are arbitrary. Later pairs lie within a shrinking distance of the border, some on it.
     """
@@ -136,7 +136,7 @@ RECORD = Record(
     },
     waivers={
         "operands": (
-            "While the output is stalled, the operands of a beat four cycles before are read no more."
+            "While the output is stalled, the operands of a beat four cycles before are not read any more."
         ),
     },
     still={"the first sum of the polynomials is 0.056, or 0.136 to 0.303": "total_2[17]"},

@@ -101,7 +101,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Spans of one level at the borders of roundings, where a single step of a product decides."""
+    """Spans of one level at the borders of roundings, where a single step of a product changes the result."""
 
     def at_border(u):
         # At the borders of both roundings of u, to 20 and to 17 fraction bits.

@@ -54,7 +54,7 @@ def _every_length(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many spans, because the last bits of products and reciprocals are mostly shifted out."""
+    """Many spans, because the last bits of products and reciprocals are usually shifted out."""
     return _case(unit, rng, np.floor(2 ** rng.uniform(0, LENGTH_BITS, count)).astype(np.int64))
 
 

@@ -47,7 +47,7 @@ def _normals(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Ends of the words, where G and P saturate; and middles near the mean of any ends, where G and P fit."""
+    """Extreme codes, where G and P saturate, and middles near the mean of any ends, where G and P fit."""
     left, right = word_ends(rng, count, 3), word_ends(rng, count, 3)
     format = MiddleNormal.FORMAT
     middle = rng.choice([format.min_code, format.max_code, 0], (count, 3))

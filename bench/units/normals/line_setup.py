@@ -52,7 +52,7 @@ def _lines(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Ends of the words, and differences next to a border of their lower word."""
+    """Extreme codes, and differences next to a border of their lower word."""
     left, right = any_lines(rng, count)
     words = np.array([_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code])
     left[: count // 2] = rng.choice(words, (count // 2, 3))
@@ -96,6 +96,6 @@ RECORD = Record(
             "multiplier_1_{1,b}[7-17] multiplier_2_{0,a}[7-17]"
         ),
         "a product of 7 by 17 bits has 24": "multiplier_2_product[24-35]",
-        "twice P r has three fraction bits less than what is shifted": "shifter_0_0[0-2]",
+        "twice P r has three fraction bits less than the shifted word": "shifter_0_0[0-2]",
     },
 )

@@ -59,7 +59,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Last bits of products and sums, which are rounded off, and u at the border of a step."""
+    """Operands for last bits that are rounded off, and u at the border of a step."""
     left, right = code_pairs_at(rng, count, rng.uniform(0, 60, count))
     few = left[:1500], right[:1500]
     border = pairs_chosen(*few, lambda u: (u < ONE_SQUARED.codes // 2) & ((u + 8) % (1 << 16) < 16))

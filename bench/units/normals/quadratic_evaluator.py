@@ -55,7 +55,7 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Curves of real spans at every angle and length, opposite normals too, and ends of all words."""
+    """Curves of real spans at every angle and length, also with opposite normals, and extreme codes."""
     angles = np.repeat([0, 1e-4, 1, 45, 89.9, 90, 90.01, 135, 180], 5)
     length = np.r_[np.tile([1, 2, 3, 16, 4095], 9), np.full(8, 33)]
     real = curves_of(*component_words(*code_pairs_at(rng, len(angles), angles)))

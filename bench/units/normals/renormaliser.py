@@ -46,7 +46,7 @@ def _lengths(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Ends of the words, 0 and its neighbours, largest components next to every power of two, axes."""
+    """Extreme codes, 0 and its neighbours, largest components next to every power of two, axes."""
     words = [_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code]
     ends = np.array(np.meshgrid(*[words] * 3)).reshape(3, -1).T
     powers = (1 << np.arange(_FORMAT.fraction_bits))[:, np.newaxis] + np.arange(-1, 2)
@@ -92,10 +92,10 @@ RECORD = Record(
     axis="length of the vector",
     logarithmic=True,
     waivers={
-        "dot_product.*": "The dot product inside is accepted at once, so that its skid buffer never shows.",
+        "dot_product.*": "The dot product inside is accepted at once, so its skid buffer is never used.",
     },
     still={
-        "c2 is at most 0.695, c1 0.9988, and what is subtracted from it is not negative": (
+        "c2 is at most 0.695, c1 at most 0.9988, and the word subtracted from c1 is not negative": (
             "coefficients.port__data[35] coefficients.port__data[47] c1_10[16] slope[16]"
         ),
         "a product of two numbers less than 1/16 and 1 is less than 1/16": "square_term[28] linear_term[33]",

@@ -12,7 +12,7 @@ __all__ = ["RECORD"]
 
 
 def _lists() -> DrawCommands:
-    """Seven lists of any commands, the third of an end alone."""
+    """Seven lists of any commands. The third has only an end."""
     rng = np.random.default_rng(2026)
     rows, starts = [], []
     for size in (5, 12, 0, 1, 7, 2, 20):

@@ -17,7 +17,7 @@ _AXIS = (0.3, 1.0, -0.2)
 
 @cache
 def _motion() -> Motion:
-    """Two slots, one with a memory's mesh before a camera, one with any codes."""
+    """Two slots. One has a memory's mesh before a camera, and one has any codes."""
     memory = any_memory()
     camera = Camera.framing(memory.world(memory.parts[0]).vertices, (0.2, 0.4, 1.0), "perspective")
     made = Motion.of(memory, camera, (640, 480), _AXIS)

@@ -24,7 +24,7 @@ def _lines(unit, rng, count):
 
 
 def _grey(unit, rng, count):
-    """Runs of each of the 256 bytes without a control period, for the balance alone."""
+    """Runs of each of the 256 bytes without a control period, to test the balance."""
     data = np.resize(np.repeat(rng.permutation(256), 12), count)
     return Case({"data": data, "control": np.zeros_like(data), "active": np.ones_like(data)})
 

@@ -90,7 +90,7 @@ RECORD = Record(
     },
     axis="W, near planes",
     still={
-        "a number from 1 on begins with 1, and its reciprocal over 1/2 does": (
+        "a number from 1 on begins with 1, and so does its reciprocal over 1/2": (
             "mantissa[25] {table_0_row,reciprocal_row,port__data}[27]"
         )
     },
