@@ -10,12 +10,14 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from blysk.golden.frames.albedo_bound import albedo_bound
 from blysk.golden.frames.border import border_mask, border_name, highlight_step
 from blysk.golden.frames.frame import Picture
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands
-from blysk.golden.frames.quotient_bound import quotient_bound, quotient_triangle_bound
+from blysk.golden.frames.quotient_bound import light_errors, quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.lighting.transfer import Transfer
 from blysk.golden.pipeline import ShadingPipeline
@@ -213,7 +215,7 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
         The bound of the method error. ``None``: no bound is known, in one of these cases:
 
         - another method than ``chord-local``, ``renormalise`` and ``quotient``;
-        - vertex colours or textures;
+        - vertex colours or textures, see `pixel_bound`;
         - a pipeline for other materials than the scene's;
         - a measured curve;
         - a roughness under `LEAST_ROUGHNESS`;
@@ -225,7 +227,24 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
     return design.interpolator.bound(_Bounds(scene, design, cut))
 
 
-def encoded_bound(bound: float, least: float, transfer: str) -> float:
+def pixel_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> np.ndarray | None:
+    """Bound as of `error_bound` for each pixel of a scene with vertex colours or textures.
+
+    Parameters
+    ----------
+    scene, design, cut
+        As for `error_bound`. The design has an albedo.
+
+    Returns
+    -------
+    float64 array, shape (height, width, 3), or None
+        In LSB of linear light, see `albedo_bound`. ``None``: no bound is known, as for methods other than
+        ``quotient``.
+    """
+    return None if design.specular is None else design.interpolator.bound(_PixelBounds(scene, design, cut))
+
+
+def encoded_bound(bound: ArrayLike, least: ArrayLike, transfer: str) -> float:
     """Bound in LSB of a transfer's codes, from a bound in LSB of linear light.
 
     Before the transfer a colour is at most ``e`` off, the bound without the half LSB of its own rounding, but
@@ -234,19 +253,20 @@ def encoded_bound(bound: float, least: float, transfer: str) -> float:
 
     Parameters
     ----------
-    bound : float
-        Bound of `error_bound`.
-    least : float
-        The least exact channel of the frame, in [0, 1], linear light.
+    bound : float, or float64 array
+        Bound of `error_bound`, or bounds of pixels. At least a pixel is needed.
+    least : float, or float64 array of the same shape
+        The least exact channel of the frame, or the exact channels of pixels, in [0, 1], linear light.
     transfer : str
         One of `TRANSFERS`.
 
     Source: docs/theory/textures.md#transfer.
     """
+    bound, least = np.asarray(bound), np.asarray(least)
     if transfer == "linear":
-        return bound
+        return float(bound.max())
     error = bound - 0.5 + Transfer.OPERAND_FORMAT.step / 2
-    return slope(max(least - error / 255, 0), transfer) * error + 0.5
+    return float((slope(np.maximum(least - error / 255, 0), transfer) * error + 0.5).max())
 
 
 @dataclass(frozen=True)
@@ -264,6 +284,24 @@ class _Bounds:
 
     def by_tolerance(self) -> float | None:
         return _tolerance_bound(self.scene, self.design)
+
+
+@dataclass(frozen=True)
+class _PixelBounds:
+    """Bounds the error of each pixel of a frame with albedo, see `ErrorBounds`."""
+
+    scene: Scene
+    design: ShadingPipeline
+    cut: Raster
+
+    def by_vectors(self) -> np.ndarray | None:
+        if self.design.albedo is None:
+            return None
+        errors = light_errors(self.scene, self.design, self.cut)
+        return albedo_bound(self.scene, self.design.albedo, self.cut, errors)
+
+    def by_tolerance(self) -> np.ndarray | None:
+        return None
 
 
 @dataclass(frozen=True)
@@ -320,6 +358,9 @@ def compare(scene: Scene, design: ShadingPipeline, frame: Picture) -> Comparison
     frame : Picture
         The frame of the pipeline.
     """
+    if scene.has_albedo:
+        pixels = pixel_bound(scene, design, frame.cut_raster)
+        return _compare(scene, design, frame.image, frame.raster, frame.cut_raster, pixels)
     bound = error_bound(scene, design, frame.cut_raster)
     return _compare(scene, design, frame.image, frame.raster, frame.cut_raster, bound)
 
@@ -368,7 +409,7 @@ def _compare(
     image: np.ndarray,
     raster: Raster,
     cut_raster: Raster | None,
-    bound: float | None,
+    bound: float | np.ndarray | None,
 ) -> Comparison:
     """Comparison by float64 frames, one at a time, as a large frame has 400 MB."""
     nothing = FrameErrors(*[math.nan] * len(fields(FrameErrors)))
@@ -403,8 +444,14 @@ def _compare(
         figures |= _mean_squares(image, exact)
         del exact
     golden = timed(render, scene, "phong", model, raster).image
-    least = float(golden.reshape(-1, 3)[pixels].min(initial=1))
-    figures["bound_lsb"] = None if bound is None else encoded_bound(bound, least, transfer)
+    exact = golden.reshape(-1, 3)[pixels]
+    if isinstance(bound, np.ndarray):
+        steady = ~border
+        bound = bound.reshape(-1, 3)[pixels][steady] if steady.any() else None
+        figures["bound_lsb"] = None if bound is None else encoded_bound(bound, exact[steady], transfer)
+    else:
+        least = exact.min(initial=1)
+        figures["bound_lsb"] = None if bound is None else encoded_bound(bound, least, transfer)
     golden = encode_frame(golden, transfer)
     if not mask.any():
         figures |= dict.fromkeys(("method_error", "total_error"), nothing)

@@ -104,7 +104,7 @@ class HighlightLimits:
                     made[parameter] = _Curve(lobe.reflection, parameter, lobe.scale)
                 curves[index] = made[parameter]
         transfer = "linear" if design is None else design.transfer
-        steepest = slope(0.0 if scene.has_albedo else _least_light(scene), transfer)
+        steepest = float(slope(0.0 if scene.has_albedo else _least_light(scene), transfer))
         return cls(np.asarray(exponents, dtype=np.float64), tuple(curves), steepest)
 
     def tolerance(self, material: np.ndarray, u: np.ndarray) -> np.ndarray:

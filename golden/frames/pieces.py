@@ -118,13 +118,10 @@ class Pieces:
         turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & lit
         chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
         if setup:
-            kept = diffuse.left, diffuse.slope, diffuse.curvature
-            wrong[chosen] = _mistakes_sign(
-                self.scene,
-                self.raster,
-                *(field[chosen] for field in (self.origin, self.first, self.last, turns_dark, *kept)),
-                limits.slope,
-            )
+            kept = self.origin, self.first, self.last, turns_dark
+            curve = diffuse.left, diffuse.slope, diffuse.curvature
+            given = (field[chosen] for field in (*kept, *curve))
+            wrong[chosen] = _mistakes_sign(self.scene, self.raster, limits.slope, *given)
         return wrong
 
     def _fades_wrong(
@@ -315,6 +312,7 @@ def _misses_of_pixels(
 def _mistakes_sign(
     scene: Scene,
     raster: Raster,
+    transfer_slope: float,
     origin: np.ndarray,
     first: np.ndarray,
     last: np.ndarray,
@@ -322,7 +320,6 @@ def _mistakes_sign(
     left: np.ndarray,
     slope: np.ndarray,
     curvature: np.ndarray,
-    transfer_slope: float,
 ) -> np.ndarray:
     """Whether N·L of a pixel of a span might have the wrong sign, for the lights in ``lights``."""
     result = np.zeros(len(origin), dtype=bool)

@@ -1,6 +1,7 @@
 """Bound of a frame's error by the quotient method, from the vectors of its own spans."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,20 @@ from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
-__all__ = ["quotient_bound", "quotient_triangle_bound"]
+__all__ = ["LightErrors", "light_errors", "quotient_bound", "quotient_triangle_bound"]
+
+
+class LightErrors(NamedTuple):
+    """Bounds of the light on a material, in each channel; 1 is the full channel.
+
+    Parameters
+    ----------
+    diffuse, highlight : float64 arrays, shape (3,)
+        Bounds of the errors of the sums of diffuse and of specular terms.
+    """
+
+    diffuse: np.ndarray
+    highlight: np.ndarray
 
 
 def quotient_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> float:
@@ -43,9 +57,22 @@ def quotient_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> float:
     """
     if not len(cut.length):
         return 0.5
+    return _bound(scene, light_errors(scene, design, cut))
+
+
+def light_errors(scene: Scene, design: ShadingPipeline, cut: Raster) -> list[LightErrors]:
+    """Bounds of the light on each material, without the rounding of colour operands.
+
+    Parameters
+    ----------
+    scene, design, cut
+        As for `quotient_bound`. A design without lights has no errors.
+    """
+    if not (design.lights and len(cut.length)):
+        return [LightErrors(*np.zeros((2, 3)))] * len(scene.materials)
     vectors = span_vectors(scene, cut, design)
-    errors = [QuotientErrors.of(vectors, cut.length, design.mirror, further) for further in (False, True)]
-    return _bound(scene, design, *errors)
+    errors = (QuotientErrors.of(vectors, cut.length, design.mirror, further) for further in (False, True))
+    return _light_errors(scene, design, *errors)
 
 
 def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
@@ -94,7 +121,7 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     mirrored = 2.0**-15 * renderer.mirrors
     errors = replace(errors, turn=errors.turn + mirrored)
     if not renderer.rows:
-        return _bound(scene, renderer.design, errors)
+        return _bound(scene, _light_errors(scene, renderer.design, errors))
     longest = np.maximum(*(np.linalg.norm(end, axis=1) for end in (left, right))) * steps
     own = component + 0.5 + np.where(last > 0, of_step, 0) + LightAdapter.AXIS_ERROR * longest / np.sqrt(3)
     if (shortest <= 4 * own).any():
@@ -102,7 +129,7 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     further = QuotientErrors.of_words(own, shortest, last, renderer.mirrors, component)
     # The codes of sin a and cos a of the first light change q, too.
     further = replace(further, mismatch=further.mismatch + mirrored)
-    return _bound(scene, renderer.design, errors, further)
+    return _bound(scene, _light_errors(scene, renderer.design, errors, further))
 
 
 def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
@@ -115,23 +142,29 @@ def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
     return np.where(sliver, np.abs(across).max(axis=1), 0)
 
 
-def _bound(
+def _bound(scene: Scene, errors: list[LightErrors]) -> float:
+    """Bound of a pixel, from the bounds of the light on each material."""
+    largest = max(float((of.diffuse + of.highlight).max()) for of in errors)
+    return 0.5 + 255 * largest + (1 + 2 * len(scene.lights)) / 128
+
+
+def _light_errors(
     scene: Scene, design: ShadingPipeline, errors: QuotientErrors, further: QuotientErrors | None = None
-) -> float:
-    """Bound of a pixel, from the bounds of directions of the first light and of further lights."""
+) -> list[LightErrors]:
+    """Bounds of the light on each material, from those of directions of the first and of further lights."""
     lobe = design.lobe
     kinds = [errors] if further is None or len(scene.lights) < 2 else [errors, further]
-    largest = 0.0
+    found = []
     for material in scene.materials:
         parameter = design.highlight_parameter(material)
         table = lobe.line_error(parameter) + Lobe.ERROR
         highlights = [bounds.highlight(lobe.reflection, parameter) + table for bounds in kinds]
-        total = np.zeros(3)
+        sums = LightErrors(*np.zeros((2, 3)))
         for index, light in enumerate(() if material.unlit else scene.lights):
             kind = min(index, len(kinds) - 1)
             bounds, highlight = kinds[kind], highlights[kind]
             reflection = material.reflection(distant_cosine(light, scene.distant_viewer))
-            diffuse = np.multiply(material.diffuse, bounds.cosine + 2.0**-18)
-            total += light.color * (diffuse + np.multiply(reflection, highlight))
-        largest = max(largest, float(total.max()))
-    return 0.5 + 255 * largest + (1 + 2 * len(scene.lights)) / 128
+            sums.diffuse[:] += np.multiply(material.diffuse, bounds.cosine + 2.0**-18) * light.color
+            sums.highlight[:] += np.multiply(reflection, highlight) * light.color
+        found.append(sums)
+    return found

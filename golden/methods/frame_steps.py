@@ -5,14 +5,14 @@ the step that suits it.
 """
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.reference.raster import Raster
 
-__all__ = ["ErrorBounds", "ExactShading", "SpanCutter", "SpanFiller"]
+__all__ = ["Bound", "ErrorBounds", "ExactShading", "SpanCutter", "SpanFiller"]
 
 
 class SpanCutter(Protocol):
@@ -69,11 +69,15 @@ class ExactShading(Protocol):
         """By operands from the values of spans, as of `LocalChordInterpolator.exact_operands`."""
 
 
-class ErrorBounds(Protocol):
-    """Ways to bound the error of a frame, in LSB; ``None`` where no bound is known."""
+Bound = TypeVar("Bound", covariant=True)
+"""Of a frame, or of each of its pixels."""
 
-    def by_tolerance(self) -> float | None:
+
+class ErrorBounds(Protocol[Bound]):
+    """Ways to bound the error of a frame or of its pixels, in LSB; ``None`` where no bound is known."""
+
+    def by_tolerance(self) -> Bound | None:
         """From the tolerances of cut spans, see `error_bound`."""
 
-    def by_vectors(self) -> float | None:
+    def by_vectors(self) -> Bound | None:
         """From the vectors of the spans, see `quotient_bound`."""

@@ -16,7 +16,7 @@ from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
+from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.normals.dot_product import DotProduct
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
 from blysk.golden.number.fixed import Fixed, Format
@@ -368,8 +368,8 @@ class Interpolator(ABC):
     def exact_frame(self, shading: ExactShading) -> np.ndarray:
         """A frame by the method in exact arithmetic: float64 array, shape (height, width, 3)."""
 
-    def bound(self, bounds: ErrorBounds) -> float | None:
-        """Bound of the error of a frame against exact normals, in LSB; ``None``: no bound is known."""
+    def bound(self, bounds: ErrorBounds[Bound]) -> Bound | None:
+        """Bound of the error of a frame or its pixels against exact normals, in LSB; ``None``: unknown."""
         return None
 
     def triangle_axes(self, scene: Scene, lights: int, highlights: bool) -> np.ndarray | None:

@@ -17,7 +17,7 @@ from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.lighting.value_gate import ValueGate
-from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
+from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.fixed import SQ, Fixed
@@ -215,7 +215,7 @@ class LocalChordInterpolator(Interpolator):
         """A frame by the quadratics through the values of spans, in exact arithmetic."""
         return shading.by_values(self.exact_operands)
 
-    def bound(self, bounds: ErrorBounds) -> float | None:
+    def bound(self, bounds: ErrorBounds[Bound]) -> Bound | None:
         """Bound from the tolerances of cut spans."""
         return bounds.by_tolerance()
 

@@ -13,7 +13,7 @@ from blysk.golden.frame_constants import FrameConstants, LightMeanings
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
-from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
+from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.fixed import Format
 from blysk.golden.number.spans import pixels_of
@@ -176,7 +176,7 @@ class QuotientInterpolator(Interpolator):
         """A frame by normals on the true line, in exact arithmetic."""
         return shading.by_lines()
 
-    def bound(self, bounds: ErrorBounds) -> float | None:
+    def bound(self, bounds: ErrorBounds[Bound]) -> Bound | None:
         """Bound from the vectors of the spans, see `QuotientErrors`."""
         return bounds.by_vectors()
 

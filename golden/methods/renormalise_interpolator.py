@@ -8,7 +8,7 @@ import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.geometry.geometry import Geometry
-from blysk.golden.methods.frame_steps import ErrorBounds, ExactShading, SpanCutter, SpanFiller
+from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
@@ -101,7 +101,7 @@ class RenormaliseInterpolator(NormalInterpolator):
         """A frame by normals on the true line, in exact arithmetic."""
         return shading.by_lines()
 
-    def bound(self, bounds: ErrorBounds) -> float | None:
+    def bound(self, bounds: ErrorBounds[Bound]) -> Bound | None:
         """Bound from the tolerances of spans; the method's curve keeps these tolerances."""
         return bounds.by_tolerance()
 

@@ -415,7 +415,8 @@ class _Sums:
         shape: Sequence[int],
         albedo: ArrayLike | None,
     ):
-        self.material, self.albedo = material, albedo
+        self.material = material
+        self.albedo = None if albedo is None else np.asarray(albedo, dtype=np.float64)
         self.total = np.empty(shape)
         self.total[...] = material.ambient_term(ambient_light)
         self.gloss = self.total if albedo is None or material.tinted else np.zeros(shape)
@@ -444,12 +445,11 @@ class _Sums:
     @property
     def intensity(self) -> np.ndarray:
         """Both sums together, with albedo and emission."""
-        if self.albedo is None:
-            return self.total + self.material.emission
-        tinted = self.total * self.albedo
+        found: np.ndarray = self.total if self.albedo is None else self.total * self.albedo
         if self.gloss is not self.total:
-            tinted += self.gloss
-        return tinted + self.material.emission
+            found += self.gloss
+        found = found + np.array(self.material.emission)
+        return found
 
 
 def saturate(values: np.ndarray) -> np.ndarray:

@@ -34,12 +34,15 @@ def wrapped(index: np.ndarray, size: int | np.ndarray, wrap: str) -> np.ndarray:
     int64 array, same shape
         0 to ``size - 1``.
     """
+    found: np.ndarray
     if wrap == "clamp":
-        return np.clip(index, 0, size - 1)
-    if wrap == "repeat":
-        return index % size
-    tile = index % (2 * size)
-    return np.minimum(tile, 2 * size - 1 - tile)
+        found = np.clip(index, 0, size - 1)
+    elif wrap == "repeat":
+        found = index % size
+    else:
+        tile = index % (2 * size)
+        found = np.minimum(tile, 2 * size - 1 - tile)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,26 +105,31 @@ def decode(encoded: npt.ArrayLike, transfer: str = "srgb") -> np.ndarray:
     return found
 
 
-def slope(least: float, transfer: str = "srgb") -> float:
+def slope(least: npt.ArrayLike, transfer: str = "srgb") -> np.ndarray:
     """Largest slope of `encode` over light of a value or more: 12.92 at black, 0.44 at full light.
 
     Parameters
     ----------
-    least : float
-        The least linear light, 0 to 1.
+    least : float array, any shape
+        The least linear light, 0 or more.
     transfer : str
         One of `TRANSFERS`.
+
+    Returns
+    -------
+    float64 array, same shape
 
     Raises
     ------
     ValueError
         If the transfer is unknown.
     """
+    least = np.clip(np.asarray(least, dtype=np.float64), 0, 1)
     if _is_linear(transfer):
-        return 1.0
-    if least <= _LAST_LINEAR:
-        return LARGEST_SLOPE
-    return float(_SCALE / _EXPONENT * min(least, 1) ** (1 / _EXPONENT - 1))
+        return np.ones_like(least)
+    curve = _SCALE / _EXPONENT * np.maximum(least, _LAST_LINEAR) ** (1 / _EXPONENT - 1)
+    found: np.ndarray = np.where(least <= _LAST_LINEAR, LARGEST_SLOPE, curve)
+    return found
 
 
 def _is_linear(transfer: str) -> bool:
