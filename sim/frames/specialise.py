@@ -152,8 +152,14 @@ def _without_dark_lights(
     if count:
         reason = f"{full.lights - count} of {full.lights} lights: they light nothing"
         return scenes, [Reduction(reason, {"lights": count, "factors": factors})]
-    nothing = {"lights": 0, "specular": None, "gate": False, "factors": ()}
+    nothing = {"lights": 0, **_no_specular(full)}
     return scenes, [Reduction("no light path: no light lights anything", nothing)]
+
+
+def _no_specular(design: ShadingPipeline) -> dict[str, Any]:
+    """Changes that leave out the specular path, and tints with it."""
+    tints = {"albedo": {"tints": False}} if design.albedo is not None else {}
+    return {"specular": None, "gate": False, "factors": (), **tints}
 
 
 def _without_equal_materials(
@@ -192,7 +198,7 @@ def _without_highlights(
 ) -> list[Reduction]:
     if design.specular is None or not design.lights:
         return []
-    nothing = {"specular": None, "gate": False, "factors": ()}
+    nothing = _no_specular(design)
     if not any(of.specular.any() for of in constants):
         return [Reduction("no specular path: every k_s is 0", nothing)]
     if not design.interpolator.serves_gate:

@@ -7,12 +7,14 @@ import pytest
 
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of, prepare
+from blysk.golden.frames.surface import design_for
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import Texture
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import FrameSimulator
@@ -208,6 +210,32 @@ def test_no_light_at_all(material, lights):
     special = fitted(scene, full_of(scene))
     assert reasons(special)["lights"] == "no light path: no light lights anything"
     assert cost_of(ShadingPipelineUnit(special.design)).multiplier_count == 0
+
+
+def test_albedo():
+    """Texture and tint tell materials apart, an albedo has colours, and tints need specular light."""
+    mesh = replace(FLOOR, coordinates=FLOOR.vertices[:, ::2], material=np.array([0, 1]))
+    grey = Material(0.1, 0.5, 0.3, 30)
+    images = [Texture(np.random.default_rng(seed).random((4, 4, 3))) for seed in (1, 2)]
+    textured = [replace(grey, texture=image) for image in images]
+    black = replace(textured[0], specular=0)
+    for materials, count in (
+        (textured, 2),
+        ((textured[0], replace(textured[0], tinted=True)), 2),
+        ((black, replace(black, tinted=True)), 2),
+        ((textured[0], replace(grey, texture=images[0])), 1),
+    ):
+        scene = scene_of(materials, size=(60, 50), mesh=mesh)
+        special = fitted(scene, design_for(full_of(scene), scene))
+        assert special.design.materials == count
+        assert "grey" not in reasons(special)
+    for material in (black, replace(grey, texture=images[0], unlit=True)):
+        scene = scene_of(
+            replace(material, tinted=True), size=(60, 50), mesh=replace(mesh, material=mesh.material * 0)
+        )
+        special = fitted(scene, design_for(full_of(scene), scene))
+        assert special.design.specular is None
+        assert not special.design.albedo.tints
 
 
 def test_one_channel():
