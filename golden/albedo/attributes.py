@@ -47,7 +47,7 @@ class Attributes:
     d              SQ(-1, 19)   18 bits for the multipliers; rounded
     U of a colour  UQ(0, 23)    shifted; saturates at 0 and 1; in the product cut to UQ(0, 17)
     U of u, v      SQ(2, 23)    shifted; in the product rounded to SQ(1, 17), saturates
-    A              SQ(2, 23)    UQ(2, 23) of a colour; ``2 d U`` and ``U/2`` are cut
+    A              SQ(2, 23)    UQ(1, 23) of a colour; ``2 d U`` and ``U/2`` are cut
     colour         UQ(1, 16)    rounded; saturates at 1
     coordinate     SQ(13, F)    ``base + A 2^range``; rounded to F = ``share_bits``
     ============== ============ ==================================================================
@@ -177,7 +177,7 @@ class Attributes:
         if self.spans.colors:
             inside = numerators[:, :3].saturate(UQ(0, 23))
             if given:
-                inside = self._quotient(inside, inside.truncate(17), *given).wrap(UQ(2, 23))
+                inside = self._quotient(inside, inside.truncate(17), *given).wrap(UQ(1, 23))
             one = 1 << self.COLOR_FORMAT.fraction_bits
             rounded = inside.round_half_up(self.COLOR_FORMAT.fraction_bits)
             colors = Fixed(self.COLOR_FORMAT, np.minimum(rounded.codes, one))

@@ -160,7 +160,7 @@ class AttributesUnit(PipelinedUnit):
             moved = g.register(f"{name}_shifted", shifted, numerator, shift, since=bend, formula="U' = 2^k·U")
             if name.startswith("colors"):
                 moved = operand = g.register(f"{name}_inside", lambda u: u.saturate(UQ(0, 23)), moved)
-                total, left = UQ(2, 23), lambda u: u.truncate(17)
+                total, left = UQ(1, 23), lambda u: u.truncate(17)
             else:
                 operand = g.register(
                     f"{name}_operand", lambda u: u.round_half_up(17).saturate(SQ(1, 17)), moved

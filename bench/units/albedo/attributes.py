@@ -110,7 +110,12 @@ RECORD = Record(
     title="Vertex colours and texture coordinates by one reciprocal of 1/W",
     source="docs/theory/textures.md#quotient",
     variants={
-        "both": Variant(partial(AttributesUnit, _BOTH)),
+        "both": Variant(
+            partial(AttributesUnit, _BOTH),
+            partial(_measure, model=_BOTH),
+            "1/W from 2^-15 to 1, colours and coordinates",
+            note="coordinates in parts of 2^range",
+        ),
         "colours": Variant(
             partial(AttributesUnit, _COLORS),
             partial(_measure, model=_COLORS),
@@ -120,7 +125,7 @@ RECORD = Record(
         "coordinates": Variant(
             partial(AttributesUnit, _COORDINATES),
             partial(_measure, model=_COORDINATES),
-            "1/W from 2^-15 to 1, coordinates within 2^range texels",
+            "1/W from 2^-15 to 1, coordinates",
             note="in parts of 2^range",
             long=True,
         ),

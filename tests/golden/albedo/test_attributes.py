@@ -21,7 +21,10 @@ def test_reciprocal_is_within_its_bound_over_the_whole_table():
         assert (found == shift).all()
         assert np.abs(rest.values).max() < 0.126
         x = np.ldexp(weight.astype(float), shift - 22)
-        relative = (rest.values + 0.5 + halves / 4) * x - 1
+        reciprocal = rest.values + 0.5 + halves / 4
+        # So a colour's quotient is under 2.
+        assert reciprocal.max() <= 1
+        relative = reciprocal * x - 1
         assert np.abs(relative).max() <= Attributes.RECIPROCAL_ERROR
 
 
