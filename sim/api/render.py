@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any, Unpack, cast
 
 from blysk.golden.frames.prepare import constants_of
+from blysk.golden.frames.surface import design_for
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED
@@ -159,7 +160,10 @@ def prepare_rendering(
             scenes = tuple(scenes_of(loaded, settings, frames or 1))
             made = _built(settings, made)
             if design is None:
-                made = made.for_materials(scenes[0].materials, settings["geometry"] == "software")
+                if scenes[0].has_albedo and settings["geometry"] == "hardware":
+                    reason = "hardware geometry draws no vertex colours and no textures"
+                    raise settings.refuse("geometry", reason, "use software")
+                made = design_for(made, scenes[0], settings["geometry"] == "software")
             _check_scene(scenes[0], made, settings)
             stage(SPECIALISING if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)

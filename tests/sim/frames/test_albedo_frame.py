@@ -1,0 +1,72 @@
+"""Frames with vertex colours and textures through RTL: the model's pixels, and float64 within its bound."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import blysk
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texture_sampler import TextureSampler
+from blysk.golden.frames.frame import frame_buffer
+from blysk.golden.frames.prepare import prepare
+from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.light import Light
+from blysk.golden.reference.lighting import Material
+from blysk.golden.reference.renderer import render
+from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import Texture
+from blysk.sim.errors import OptionError
+
+GLOSSY = Material((0.1,) * 3, (0.6,) * 3, (0.3,) * 3, 50)
+RNG = np.random.default_rng(3)
+
+
+def floor():
+    """Two triangles at a grazing angle, with vertex colours and texture coordinates over four images."""
+    corners = np.array([(x, 0.0, z) for z in (-3, 3) for x in (-1, 1)])
+    normals = normalise(corners * (0.1, 0, 0) + (0, 1, 0))
+    coordinates = corners[:, ::2] * (1, 0.5)
+    return Mesh(
+        corners,
+        np.array([(0, 2, 1), (1, 2, 3)]),
+        normals,
+        colors=RNG.random((4, 3)),
+        coordinates=coordinates,
+    )
+
+
+@pytest.mark.parametrize("engine", ["pysim", pytest.param("cxxrtl", marks=pytest.mark.long)])
+def test_colours_times_texels(engine):
+    """Perspective, a tinted material with levels: the pixels of the model, half an LSB from float64."""
+    mesh = floor()
+    texture = Texture(RNG.random((8, 8, 3)))
+    camera = Camera.framing(mesh.vertices, (0.2, 0.3, 1), projection="perspective")
+    size = (24, 18) if engine == "pysim" else (320, 240)
+    material = replace(GLOSSY, texture=texture, tinted=True, emission=(0.02, 0, 0.01))
+    scene = Scene(mesh, camera, *size, material, (Light((0.3, 1, 0.5)),))
+    frame = blysk.render(scene, engine=engine, transfer="linear")
+    design = frame.design
+    assert design.albedo == Albedo(texture=TextureSampler(), tints=True)
+    prepared = prepare(scene, design)
+    pixels = design.compute(prepared.spans, prepared.constants)
+    expected = frame_buffer(scene, prepared.cut_raster, pixels.color, "linear")
+    np.testing.assert_array_equal(frame.image, expected)
+    error = np.abs(expected - 255 * render(scene).image)
+    assert 0.45 < error.max() < 0.55
+
+
+@pytest.mark.long
+def test_render_of_a_mesh_with_colours():
+    """By the interface for Python, with its default transfer."""
+    mesh = blysk.Mesh(*(getattr(floor(), name) for name in ("vertices", "faces", "normals")))
+    mesh = replace(mesh, colors=np.array([(1.0, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]))
+    frame = blysk.render(mesh, view="0.2,0.3,1", size=(24, 18), engine="pysim")
+    assert frame.error.steady_lsb < 0.8
+    assert len(np.unique(frame.image)) > 30
+
+
+def test_hardware_geometry_refuses_colours():
+    with pytest.raises(OptionError, match="hardware geometry draws no vertex colours and no textures"):
+        blysk.render(floor(), geometry="hardware", size=(40, 30), engine="pysim")
