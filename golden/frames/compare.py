@@ -10,19 +10,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from blysk.golden.frames.albedo_bound import albedo_bound
 from blysk.golden.frames.border import border_mask, border_name, highlight_step
+from blysk.golden.frames.error_bound import encoded_bound, error_bound, pixel_bound, triangle_bound
 from blysk.golden.frames.frame import Picture
-from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import line_ends, local_operands
-from blysk.golden.frames.quotient_bound import light_errors, quotient_bound, quotient_triangle_bound
 from blysk.golden.geometry.scene_triangles import SceneTriangles
-from blysk.golden.lighting.transfer import Transfer
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.golden.reference.lighting import distant_cosine
-from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
 from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
@@ -33,7 +27,7 @@ from blysk.golden.reference.renderer import (
     visible_mask,
 )
 from blysk.golden.reference.scene import Scene
-from blysk.golden.reference.transfer import encode_frame, slope
+from blysk.golden.reference.transfer import encode_frame
 from blysk.golden.render import Renderer
 
 __all__ = [
@@ -42,8 +36,6 @@ __all__ = [
     "compare",
     "compare_image",
     "compare_triangles",
-    "encoded_bound",
-    "error_bound",
     "method_in_float64",
     "target_of",
 ]
@@ -186,168 +178,6 @@ def target_of(design: ShadingPipeline) -> ReflectionModel:
     return _model_of(design) if design.loads_tables else BLINN
 
 
-def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None) -> float | None:
-    """Bound of the error against exact normals of every pixel with the same model, in LSB of linear light.
-
-    For each material that is not unlit, multiply each light's colour by the sum of diffuse and specular
-    reflection, and add these products of all lights. Let c be the largest channel of these sums; 1 is the
-    full channel. Then::
-
-        arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
-
-    The half is the rounding of the pixel. The quarter is the tolerance of cut spans. For codes of sRGB
-    ``chord-local`` divides it by a slope of the transfer, see `HighlightLimits`. It is checked at some
-    places of a span; a proof for all places is missing (docs/theory/chord.md#where-spans-are-cut). The
-    sixteenth holds the rounding of operands and terms. It is at least 1/128, for the ambient operand.
-
-    The bound holds for spans from software, and off the border of every light, see `border_mask`.
-
-    Parameters
-    ----------
-    scene, design
-        As for `compare`.
-    cut : Raster, optional
-        The shaded spans. With them ``quotient`` has a bound, see `quotient_bound`.
-
-    Returns
-    -------
-    float or None
-        The bound of the method error. ``None``: no bound is known, in one of these cases:
-
-        - another method than ``chord-local``, ``renormalise`` and ``quotient``;
-        - vertex colours or textures, see `pixel_bound`;
-        - a pipeline for other materials than the scene's;
-        - a measured curve;
-        - a roughness under `LEAST_ROUGHNESS`;
-        - ``renormalise`` with a lobe for which `Lobe.scale_of` gives a scale. Its words of 1 - N·H are too
-          coarse for this sharp lobe.
-    """
-    if design.specular is None or scene.has_albedo:
-        return None
-    return design.interpolator.bound(_Bounds(scene, design, cut))
-
-
-def pixel_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> np.ndarray | None:
-    """Bound as of `error_bound` for each pixel of a scene with vertex colours or textures.
-
-    Parameters
-    ----------
-    scene, design, cut
-        As for `error_bound`. The design has an albedo.
-
-    Returns
-    -------
-    float64 array, shape (height, width, 3), or None
-        In LSB of linear light, see `albedo_bound`. ``None``: no bound is known, as for methods other than
-        ``quotient``.
-    """
-    return None if design.specular is None else design.interpolator.bound(_PixelBounds(scene, design, cut))
-
-
-def encoded_bound(bound: ArrayLike, least: ArrayLike, transfer: str) -> float:
-    """Bound in LSB of a transfer's codes, from a bound in LSB of linear light.
-
-    Before the transfer a colour is at most ``e`` off, the bound without the half LSB of its own rounding, but
-    with 1/128 LSB of the rounding of the transfer's input. The slope of the transfer never rises. So the
-    bound is the slope at the least colour that may occur, times e, plus the half LSB of the code.
-
-    Parameters
-    ----------
-    bound : float, or float64 array
-        Bound of `error_bound`, or bounds of pixels. At least a pixel is needed.
-    least : float, or float64 array of the same shape
-        The least exact channel of the frame, or the exact channels of pixels, in [0, 1], linear light.
-    transfer : str
-        One of `TRANSFERS`.
-
-    Source: docs/theory/textures.md#transfer.
-    """
-    bound, least = np.asarray(bound), np.asarray(least)
-    if transfer == "linear":
-        return float(bound.max())
-    error = bound - 0.5 + Transfer.OPERAND_FORMAT.step / 2
-    return float((slope(np.maximum(least - error / 255, 0), transfer) * error + 0.5).max())
-
-
-@dataclass(frozen=True)
-class _Bounds:
-    """Bounds the error of a frame with specular light, see `ErrorBounds`."""
-
-    scene: Scene
-    design: ShadingPipeline
-    cut: Raster | None
-
-    def by_vectors(self) -> float | None:
-        if self.cut is None or not self.design.lights:
-            return None
-        return quotient_bound(self.scene, self.design, self.cut)
-
-    def by_tolerance(self) -> float | None:
-        return _tolerance_bound(self.scene, self.design)
-
-
-@dataclass(frozen=True)
-class _PixelBounds:
-    """Bounds the error of each pixel of a frame with albedo, see `ErrorBounds`."""
-
-    scene: Scene
-    design: ShadingPipeline
-    cut: Raster
-
-    def by_vectors(self) -> np.ndarray | None:
-        if self.design.albedo is None:
-            return None
-        errors = light_errors(self.scene, self.design, self.cut)
-        return albedo_bound(self.scene, self.design.albedo, self.cut, errors)
-
-    def by_tolerance(self) -> np.ndarray | None:
-        return None
-
-
-@dataclass(frozen=True)
-class _TriangleBounds:
-    """Bounds the error of a picture by triangles, see `ErrorBounds`; no tolerance tells of its spans."""
-
-    scene: Scene
-    renderer: Renderer
-    sent: SceneTriangles
-
-    def by_vectors(self) -> float | None:
-        if not self.renderer.design.lights:
-            return None
-        return quotient_triangle_bound(self.scene, self.renderer, self.sent)
-
-    def by_tolerance(self) -> float | None:
-        return None
-
-
-def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
-    """Bound from the tolerances of cut spans, as `error_bound` states it."""
-    model = _model_of(design)
-    made = design.for_materials(scene.materials)
-    if made.interpolator != design.interpolator:
-        return None
-    if design.loads_tables:
-        own = made.lobe
-        if model.name not in TABLE_MODELS or replace(own, banks=design.banks) != design.lobe:
-            return None
-        parameters = [design.highlight_parameter(material) for material in scene.materials]
-        if model.PARAMETER == "roughness" and min(of or 0 for of in parameters) < LEAST_ROUGHNESS:
-            return None
-        if design.interpolator.value_setup is None and own.scale_of(parameters):
-            return None
-    viewer, brightness = scene.distant_viewer, 0.0
-    for material in scene.materials:
-        total = np.zeros(3)
-        for light in () if material.unlit else scene.lights:
-            reflected = material.diffuse + material.reflection(distant_cosine(light, viewer))
-            total += light.color * reflected
-        brightness = max(brightness, float(total.max()))
-    # Spans of an exact curve are not cut for its error.
-    steepest = 1.0 if design.interpolator.curve_is_exact else HighlightLimits.of(scene, design).slope
-    return 0.5 + max(brightness / 16, 1 / 128) + brightness / 4 / steepest
-
-
 def compare(scene: Scene, design: ShadingPipeline, frame: Picture) -> Comparison:
     """Errors of a frame against three frames of the golden renderer. NaN if the frame shows no surface.
 
@@ -384,10 +214,8 @@ def compare_triangles(
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     """
-    design, bound = renderer.design, None
-    if design.specular is not None and not scene.has_albedo:
-        bound = design.interpolator.bound(_TriangleBounds(scene, renderer, sent))
-    return _compare(scene, design, image, rasterise(scene), None, bound)
+    bound = triangle_bound(scene, renderer, sent)
+    return _compare(scene, renderer.design, image, rasterise(scene), None, bound)
 
 
 def compare_image(scene: Scene, design: ShadingPipeline, image: np.ndarray) -> Comparison:

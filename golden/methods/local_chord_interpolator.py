@@ -52,7 +52,7 @@ class LocalChordInterpolator(Interpolator):
 
     Fit and arithmetic together have a budget of error, at full reflection: 0.4 LSB in the specular term and
     0.12 in the diffuse term. The reference is exactly normalised interpolation. The budget is checked at
-    these places; a proof for every pixel is missing. `blysk.golden.frames.compare.error_bound` has the bound
+    these places; a proof for every pixel is missing. `blysk.golden.frames.error_bound` has the bound
     of a frame.
 
     Where N·L changes its sign the highlight ends at any brightness. A pixel whose N·L is within the error of

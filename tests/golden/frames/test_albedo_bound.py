@@ -7,7 +7,8 @@ import pytest
 
 from blysk.golden.frames.albedo_bound import albedo_errors
 from blysk.golden.frames.border import border_mask
-from blysk.golden.frames.compare import compare, encoded_bound, pixel_bound
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.error_bound import encoded_bound, pixel_bound
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.frames.surface import design_for
@@ -94,10 +95,19 @@ def test_bounds_follow_the_slope_of_the_pixel():
     assert encoded_bound(bound, least, "linear") == 0.9
 
 
+@pytest.mark.parametrize("method", ["chord-local", "renormalise"])
+def test_bounds_by_tolerance_hold(method):
+    scene = scene_of("perspective", *CASES["both, tinted"][:2], tinted=True)
+    for transfer in ("linear", "srgb"):
+        design = replace(design_for(preset(method, "blinn", lights=2), scene), transfer=transfer)
+        found = compare(scene, design, model_frame(scene, design))
+        assert 0.5 < found.method_error.steady_lsb <= found.bound_lsb < (1.2 if transfer == "linear" else 6)
+
+
 def test_no_bound_where_none_is_known():
     """Another method; and words that may miss the nearest of so many texels."""
     scene = scene_of("perspective", None)
-    for method in ("linear", "chord-local", "renormalise"):
+    for method in ("linear", "quadratic"):
         design = design_for(preset(method, "blinn", lights=2), scene)
         assert pixel_bound(scene, design, prepare(scene, design).cut_raster) is None
     image = np.random.default_rng(5).random((256, 256, 3))

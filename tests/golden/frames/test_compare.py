@@ -7,7 +7,8 @@ import pytest
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.frames.border import BORDER, border_mask, highlight_step
-from blysk.golden.frames.compare import compare, compare_image, encoded_bound, error_bound, target_of
+from blysk.golden.frames.compare import compare, compare_image, target_of
+from blysk.golden.frames.error_bound import encoded_bound, error_bound
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import MODELS, preset
 from blysk.golden.reference.camera import Camera

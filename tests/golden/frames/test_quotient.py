@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from blysk.golden.frames.border import BORDER
-from blysk.golden.frames.compare import compare, error_bound
+from blysk.golden.frames.compare import compare
+from blysk.golden.frames.error_bound import error_bound
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.presets import preset
