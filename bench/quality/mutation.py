@@ -244,10 +244,11 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     kept, known = [], {}
     for number, text in enumerate(listed, 1):
         mutant = _described(text, top["cells"], behind)
-        # Three kinds of faults are left out: of clocks, which are not small; of memory contents, which must
-        # be constant; of cells where an output bit inverts another bit, because a bit might then depend on
-        # itself.
-        if not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant):
+        # Four kinds of faults are left out: of clocks, which are not small; of memory contents, which must be
+        # constant; of controls that a memory's port does not have; of cells where an output bit inverts
+        # another bit, because a bit might then depend on itself.
+        small = not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant)
+        if small and not _of_missing_control(text, top["cells"]):
             kept.append(text.replace("mutate", f"mutate -ctrl mutant {width} {number}", 1))
             known[number] = mutant
     (folder / "mutants.txt").write_text("\n".join(kept))
@@ -287,6 +288,19 @@ def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
         if bit in named and (cell["port_directions"][port] == "output" or readers[bit] == 1)
     }
     return 2 * max(len(chosen), len(found))
+
+
+def _of_missing_control(command: str, cells: Mapping[str, Any]) -> bool:
+    """Whether a mutant is of a reset of a memory's port, or of the enable of a port without a clock.
+
+    Yosys refuses a memory with them.
+    """
+    cell, port = re.search(r"-cell (\S+) -port (\S+)", command).groups()
+    found = cells[cell.removeprefix("\\")]
+    if not found["type"].startswith("$memrd"):
+        return False
+    has_clock = int(found["parameters"]["CLK_ENABLE"], 2)
+    return port.removeprefix("\\") in ("ARST", "SRST", *(() if has_clock else ("EN",)))
 
 
 def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], str]) -> str:

@@ -69,7 +69,7 @@ RECORD = Record(
     stimuli={
         "places": Stimulus(_places, 400, repeats=30),
         "small": Stimulus(_small, 300, stalled=False, repeats=20),
-        "strips": Stimulus(_strips, 300, stalled=False, repeats=12),
+        "strips": Stimulus(_strips, 600, stalled=False, repeats=24),
         "alone": Stimulus(_alone, 300, stalled=False, repeats=12),
     },
     axis="",

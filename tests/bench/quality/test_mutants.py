@@ -50,6 +50,15 @@ def test_status_tells_whether_the_score_is_reached(monkeypatch, capsys, survivor
 
 
 @pytest.mark.long
+def test_controls_that_a_memory_lacks_are_left_alone(tmp_path):
+    """Its ports have neither clock nor reset before they are mapped. Yosys refuses other values there."""
+    record = RECORDS["texel_memory"]
+    known = mutate(record.variants[record.default].unit(), 200, mutants.SEED, tmp_path)
+    assert not [mutant for mutant in known.values() if re.search(r"memrd\S* ([AS]RST|EN)\[", mutant)]
+    assert [mutant for mutant in known.values() if "memrd" in mutant]
+
+
+@pytest.mark.long
 def test_proofs_tell_faults_from_the_unit(tmp_path):
     """No killed mutant is equivalent, and the unit is equivalent to itself."""
     record = RECORDS["diffuse"]
