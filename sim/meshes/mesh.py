@@ -96,9 +96,10 @@ def load_mesh(
     A sampler's filter for enlarging serves both ways. Levels are chosen, not blended.
 
     Of an OBJ file these are read from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded,
-    at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``. The factors of glTF are linear, as
-    k_d is. So they are used without conversion, and Kd, too. If a material file is missing, or lacks a name,
-    the colours are ``None``. Materials of no face are left out, and equal materials merged.
+    at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``; ``Ke``, ``illum 0``. The factors of
+    glTF are linear, as k_d is. So they are used without conversion, and Kd, too. If a material file is
+    missing, or lacks a name, the colours are ``None``. Materials of no face are left out, and equal materials
+    merged.
 
     *Colours of other formats* are read by the curve of sRGB:
 

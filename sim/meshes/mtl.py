@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from blysk.golden.lighting.specular import MAX_EXPONENT
+from blysk.golden.reference.light import Triple
 from blysk.golden.reference.texture import Texture
 from blysk.golden.text import plain_text
 from blysk.sim.meshes.images import NOT_THERE, OUTSIDE, find_image, read_texture
@@ -22,13 +23,12 @@ from blysk.sim.run_files import reads
 __all__ = ["ObjImage", "find_obj_materials", "plain_lines"]
 
 # Keywords of materials that are read, and those that count only together with others that are told.
-_KNOWN = {"Kd", "Ks", "Ns", "Pr", "Pm", "Ni", "sharpness", "Pcr", "anisor", "map_aat"}
+_KNOWN = {"Kd", "Ks", "Ke", "Ns", "Pr", "Pm", "Ni", "sharpness", "Pcr", "anisor", "map_aat"}
 # Others, each with its meaning, and with the number that changes nothing.
 _UNREAD = {
     "d": ("alpha", 1),
     "Tr": ("alpha", 0),
     "Tf": ("transmission", 1),
-    "Ke": ("emission", 0),
     "Ka": ("ambient colour", math.nan),
     "Ps": ("sheen", 0),
     "Pc": ("clearcoat", 0),
@@ -191,7 +191,8 @@ def _library_files(name: str, folder: Path, found: Found) -> list[Path]:
 def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], found: Found) -> FileMaterial:
     """A material of a material file.
 
-    Texels of map_Kd multiply Kd, which is white if it is missing.
+    Texels of map_Kd multiply Kd, which is white if it is missing. Ke, without an image of its own, is light
+    of the surface itself. With illum 0 the surface shows Kd, whatever the lights.
 
     If the material has a roughness Pr or a metallic factor Pm, these replace Ks and Ns. A missing Pr is then
     1, a missing Pm 0, and a missing Kd white. What else changes its look is told.
@@ -222,10 +223,12 @@ def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], f
                 f"material {name!r} has {keyword} {shown(given)!r}, not a number from 0 to 1", ONE_MATERIAL
             )
         factors[keyword] = number
+    looks: dict[str, Any] = {"texture": texture(), "unlit": values.get("illum") == ["0"]}
+    if "Ke" in values and "map_ke" not in maps:
+        looks["emission"] = _emission(values["Ke"], name)
     if factors.keys() & values.keys():
         base = colors.get("Kd", (1.0, 1.0, 1.0))
-        made = FileMaterial.of_metallic_roughness(name, base, *factors.values())
-        return replace(made, texture=texture())
+        return replace(FileMaterial.of_metallic_roughness(name, base, *factors.values()), **looks)
     exponent = None
     if "Ns" in values:
         number = _float(" ".join(values["Ns"]))
@@ -236,7 +239,18 @@ def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], f
                 ONE_MATERIAL,
             )
         exponent = max(1, math.floor(number + 0.5))
-    return FileMaterial(name, colors.get("Kd"), colors.get("Ks"), exponent, texture=texture())
+    return FileMaterial(name, colors.get("Kd"), colors.get("Ks"), exponent, **looks)
+
+
+def _emission(words: list[str], name: str) -> Triple | None:
+    """Light of a material itself; ``None`` if it is 0."""
+    numbers = [_float(word) for word in (words * 3 if len(words) == 1 else words)]
+    if len(numbers) != 3 or not all(0 <= number < math.inf for number in numbers):
+        raise Refused(
+            f"material {name!r} has Ke {shown(' '.join(words))!r}, not three numbers from 0", ONE_MATERIAL
+        )
+    red, green, blue = numbers
+    return (red, green, blue) if any(numbers) else None
 
 
 def _unread(values: dict[str, list[str]]) -> Iterator[str]:
@@ -249,8 +263,8 @@ def _unread(values: dict[str, list[str]]) -> Iterator[str]:
         if keyword == "Tr" and "d" in values:
             continue
         if keyword == "illum":
-            # 1 is without a highlight.
-            if numbers == [1] and not any(map(_float, values.get("Ks", ["1"]))):
+            # 0 is without light, and 1 without a highlight.
+            if words == ["0"] or (numbers == [1] and not any(map(_float, values.get("Ks", ["1"])))):
                 continue
             yield " ".join([keyword, *words])
         else:

@@ -224,6 +224,21 @@ def test_obj_materials_with_and_without_images(tmp_path):
     assert loaded.materials[2].metallic == 1
 
 
+def test_obj_light_of_its_own(tmp_path):
+    """Ke is emission, unless an image says where; illum 0 shows Kd without light."""
+    of_each = ("Ke 0.5 0 2", "Kd 1 0 0\nillum 0", "Ke 1\nmap_Ke c.png", "Ke 0 0 0\nKd 0 0 1")
+    text = "".join(f"newmtl {name}\n{text}\n" for name, text in zip("abcd", of_each, strict=True))
+    put(tmp_path / "a.mtl", text)
+    faces = "".join(f"usemtl {name}\nf 1 2 3\n" for name in "abcd")
+    loaded = check(load(tmp_path / "a.obj", f"mtllib a.mtl\n{CORNERS}{faces}"))
+    assert [material.emission for material in loaded.materials] == [(0.5, 0, 2), None, None, None]
+    assert [material.unlit for material in loaded.materials] == [False, True, False, False]
+    assert loaded.ignored == ("1 texture",)
+    for words in ("-1 0 0", "x", "1 2", "inf 0 0", "nan"):
+        put(tmp_path / "a.mtl", f"newmtl a\nKe {words}\n")
+        check_refused(tmp_path / "a.obj", "has Ke", "not three numbers from 0")
+
+
 # PLY
 
 HEAD = "ply\nformat ascii 1.0\n{}element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
