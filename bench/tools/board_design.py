@@ -84,7 +84,7 @@ def gpu_of(
     with settings.located():
         if settings["size"] != VGA.size:
             raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
-        loaded = load(settings, lights=MAX_LIGHTS, local=False)
+        loaded = load(settings, lights=MAX_LIGHTS, local=False, albedo=False)
         (scene,) = scenes_of(loaded, settings)
         design = _design(settings, scene, board)
     scenes = _presets(scene, settings["up"])

@@ -8,8 +8,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Unpack, cast
 
+from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of
-from blysk.golden.frames.surface import design_for
+from blysk.golden.frames.surface import design_for, with_albedo
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED
@@ -21,7 +22,7 @@ from blysk.sim.api.rendered_frame import RenderedFrame
 from blysk.sim.api.scene import load, scenes_of
 from blysk.sim.api.settings import Settings, check_engine, rendering_settings
 from blysk.sim.api.signature import with_options
-from blysk.sim.errors import CompilerMissing, OptionError
+from blysk.sim.errors import CompilerMissing, InputError, OptionError
 from blysk.sim.frames.figures import difference_figures, saving_figures
 from blysk.sim.frames.frame import FrameSimulator, SimulatedFrame
 from blysk.sim.frames.specialise import Specialisation, specialise
@@ -151,7 +152,9 @@ def prepare_rendering(
         made = _built(settings, design or _design(settings))
         stage("loading the mesh")
         most = MAX_LIGHTS if design is None else design.lights
-        loaded = load(settings, lights=most, local=design is None and _serves_local(settings))
+        local = design is None and _serves_local(settings)
+        albedo = settings["geometry"] == "software" if design is None else design.albedo is not None
+        loaded = load(settings, lights=most, local=local, albedo=albedo)
         if loaded.lights and design is None:
             made = _built(settings, _design(settings))
         seconds = {"load": perf_counter() - start}
@@ -160,10 +163,7 @@ def prepare_rendering(
             scenes = tuple(scenes_of(loaded, settings, frames or 1))
             made = _built(settings, made)
             if design is None:
-                if scenes[0].has_albedo and settings["geometry"] == "hardware":
-                    reason = "hardware geometry draws no vertex colours and no textures"
-                    raise settings.refuse("geometry", reason, "use software")
-                made = design_for(made, scenes[0], settings["geometry"] == "software")
+                made = _fitted(made, scenes[0], settings)
             _check_scene(scenes[0], made, settings)
             stage(SPECIALISING if settings["specialise"] else "")
             smallest = _specialised(scenes, made, settings)
@@ -181,6 +181,25 @@ def prepare_rendering(
                 _shrink(settings, error)
     seconds["build"] = perf_counter() - start - seconds["load"]
     return Rendering(loaded, scenes, smallest, settings["specialise"], used, simulator, seconds)
+
+
+def _fitted(design: ShadingPipeline, scene: Scene, settings: Settings) -> ShadingPipeline:
+    """The design for the materials, colours of vertices and textures of a scene."""
+    if scene.has_albedo and settings["geometry"] == "hardware":
+        reason = "hardware geometry draws no vertex colours and no textures"
+        raise settings.refuse("geometry", reason, "use software")
+    try:
+        fitted = design_for(design, scene, settings["geometry"] == "software")
+    except ValueError as error:
+        reason, _, remedy = str(error).partition("; ")
+        raise InputError("textures", reason, remedy) from None
+    if fitted.albedo is not None:
+        constants = [FrameConstants.of(scene, index=index) for index in range(len(scene.materials))]
+        try:
+            with_albedo(constants, scene, fitted)
+        except ValueError as error:
+            raise settings.refuse("lights", str(error), "make the light darker", "") from None
+    return fitted
 
 
 def _large(design: ShadingPipeline) -> str:

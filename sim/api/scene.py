@@ -21,7 +21,7 @@ from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.api.signature import with_options
 from blysk.sim.frames.animation import equal_distance, turned, turntable
 from blysk.sim.meshes.loaded_mesh import LoadedMesh, merged
-from blysk.sim.meshes.materials import surfaces
+from blysk.sim.meshes.materials import FileMaterial, surfaces
 from blysk.sim.meshes.mesh import given_mesh, load_mesh
 
 __all__ = ["load", "scene", "scenes_of"]
@@ -99,7 +99,9 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         return scenes_of(loaded, settings)[0]
 
 
-def load(settings: Settings, *, lights: int = MAX_LIGHTS, local: bool = True) -> LoadedMesh:
+def load(
+    settings: Settings, *, lights: int = MAX_LIGHTS, local: bool = True, albedo: bool = True
+) -> LoadedMesh:
     """The mesh of a scene, with its materials.
 
     Lights of a file become those of the settings, unless an option names lights. If one of them has a
@@ -114,6 +116,9 @@ def load(settings: Settings, *, lights: int = MAX_LIGHTS, local: bool = True) ->
         Most lights of a file.
     local : bool
         Whether lights of a file may have positions.
+    albedo : bool
+        Whether pixels may have colours of vertices and textures. If not, the mesh lacks them, and ``ignored``
+        says so.
 
     Raises
     ------
@@ -121,9 +126,11 @@ def load(settings: Settings, *, lights: int = MAX_LIGHTS, local: bool = True) ->
         As `load_mesh`. If a scene file names the mesh, the error names this file and its key.
     """
     source = settings.source
-    if isinstance(source, Mesh | Scene):
-        mesh = source if isinstance(source, Mesh) else source.mesh
-        return LoadedMesh(mesh, type(source).__name__.lower(), 0, 0)
+    if isinstance(source, Scene):
+        return LoadedMesh(source.mesh, "scene", 0, 0)
+    if isinstance(source, Mesh):
+        loaded = LoadedMesh(source, "mesh", 0, 0, materials=(FileMaterial(colored=len(source.colors) > 0),))
+        return loaded if albedo else _without_albedo(loaded)
     if not isinstance(source, str | os.PathLike):
         return given_mesh(source, settings["crease"])
     with settings.mesh_located():
@@ -141,7 +148,7 @@ def load(settings: Settings, *, lights: int = MAX_LIGHTS, local: bool = True) ->
     if loaded.camera is not None and not _sees(loaded.camera, loaded.mesh, settings["size"]):
         told = "a camera that does not see the mesh"
         loaded = replace(loaded, camera=None, ignored=(*loaded.ignored, told))
-    return _without_albedo(loaded)
+    return loaded if albedo else _without_albedo(loaded)
 
 
 def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
@@ -154,7 +161,7 @@ def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
 
 
 def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
-    """A mesh as pipelines without an albedo draw it. What they leave out is told."""
+    """A mesh without colours of vertices and textures, which are told."""
     materials, mesh = loaded.materials, loaded.mesh
     told = ["vertex colours"] if len(mesh.colors) else []
     textures = len({id(material.texture) for material in materials if material.texture is not None})
