@@ -91,18 +91,6 @@ def test_a_scene_warns_of_what_is_not_read(tmp_path):
     assert told == "statements: p"
 
 
-def test_a_scene_of_pipelines_without_albedo(tmp_path):
-    """Colours are told, and a default stays in place of white, as if the file had no colours."""
-    path = tmp_path / "a.obj"
-    path.write_text("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 1\nf 1 2 3\n")
-    with pytest.warns(RuntimeWarning, match="^a is drawn without: vertex colours$"):
-        made = blysk.scene(path)
-    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    plain = blysk.scene(path)
-    assert made.materials == plain.materials
-    assert len(made.mesh.colors) == len(made.mesh.coordinates) == 0
-
-
 def test_frame_is_that_of_the_model(frame):
     expected = model_frame(frame.scene, frame.design)
     np.testing.assert_array_equal(frame.image, expected.image)
