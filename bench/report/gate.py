@@ -318,7 +318,7 @@ def _command(meshes, method, size, models, exponents, figures) -> int:
     """Measure the savings of the highlight gate: pixels and cycles."""
     if figures:
         check_writable(figures)
-    loaded = [load_mesh(source) for source in meshes or ["teapot"]]
+    loaded = [load_mesh(source, materials=False) for source in meshes or ["teapot"]]
     count = len(loaded) * len(models) * len(exponents)
     rows = list(progress(measure(loaded, models, exponents, *size, method), total=count, unit="frames"))
     if figures:

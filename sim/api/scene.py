@@ -52,7 +52,7 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     crease : float
         Edges over this angle are sharp in a mesh file without normals; degrees, by default 40.
     materials : {"file", "one"}
-        Use the mesh file's materials, or one material for all faces; by default ``"file"``.
+        Use the mesh file's materials and colours, or one material for all faces; by default ``"file"``.
     projection : {"perspective", "orthographic"}
         Projection of the camera; by default perspective.
     view : three floats or str
