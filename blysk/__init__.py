@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from blysk.golden.reference.geometry import Mesh
     from blysk.golden.reference.lighting import Light, Material
     from blysk.golden.reference.scene import Scene
+    from blysk.golden.reference.texture import Texture
     from blysk.sim.api.costed_design import Design
     from blysk.sim.api.design import design
     from blysk.sim.api.render import render
@@ -42,6 +43,7 @@ __all__ = [
     "RenderedFrame",
     "Scene",
     "SimulationError",
+    "Texture",
     "Turntable",
     "design",
     "render",
@@ -64,6 +66,7 @@ _MODULES = {
     "RenderedFrame": "sim.api.rendered_frame",
     "Scene": "golden.reference.scene",
     "SimulationError": "sim.errors",
+    "Texture": "golden.reference.texture",
     "Turntable": "sim.api.turntable",
     "design": "sim.api.design",
     "render": "sim.api.render",
