@@ -16,7 +16,7 @@ def coordinates_shape(x_bits: int = 12, y_bits: int = 12, length_bits: int = 12)
 
 
 def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
-    """Shape of a pixel: coordinates, colour, and a flag of the last pixel of its span."""
+    """Shape of a pixel: coordinates, colour, and whether it is the last pixel of its span."""
     return data.StructLayout(
         {
             "x": unsigned(x_bits),

@@ -102,7 +102,7 @@ class BandBuffer:
         Raises
         ------
         ValueError
-            If the picture has another size than the display, or an index has no band.
+            If the picture has another size than the display, or an index is out of range.
         """
         size = (self.mode.vertical.visible, self.mode.horizontal.visible, 3)
         if np.shape(picture) != size:

@@ -16,8 +16,9 @@ class BandDepth:
     A word holds a depth and a tag of ``tag_bits`` bits: the number of the band in which it was written,
     modulo ``2^tag_bits``. A word with another tag than the present tag reads as `DepthTester.CLEARED`. An old
     tag must not become the present tag again. So when a band begins, ``swept`` words are written with the tag
-    before the present tag, beginning with the words that were swept longest ago. With ``2^t`` tags every word
-    is swept again at most ``2^t - 2`` bands later, one band before its tag would be the present tag.
+    before the present tag, beginning with the words that were swept longest ago. Let t be ``tag_bits``. A
+    word's next sweep comes at most ``2^t - 2`` bands after its last sweep. One band later the word's tag
+    would be the present tag.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ class BandDepth:
         Parameters
         ----------
         begins : bool array, shape (N,)
-            Steps on which a band begins. Their other words have no effect.
+            Steps on which a band begins. The other operands of these steps have no effect.
         writes : bool array, shape (N,)
             Steps that write ``depth`` after they have read.
         place, depth : int64 arrays, shape (N,)
@@ -68,7 +69,7 @@ class BandDepth:
         Raises
         ------
         ValueError
-            If an index has no word.
+            If an index is out of range.
         """
         for wrong in place[(place < 0) | (place >= self.words)][:1]:
             raise ValueError(f"a band has words 0 to {self.words - 1}, not {wrong}")
@@ -77,7 +78,7 @@ class BandDepth:
         order = np.argsort(key, kind="stable")
         step = np.arange(len(key))
         wrote = np.where((writes & ~begins)[order], step, -1)
-        # The last write before each step of the same key.
+        # For each step, the last write before it with the same key.
         last = np.r_[-1, np.maximum.accumulate(wrote)[:-1]] if len(key) else wrote
         same = (last >= 0) & (key[order][np.maximum(last, 0)] == key[order])
         result = np.empty(len(key), dtype=np.int64)

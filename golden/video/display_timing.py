@@ -85,10 +85,10 @@ VGA = DisplayMode()
 
 @dataclass(frozen=True)
 class DisplayTiming:
-    """Position, a flag of the picture, and both sync signals, for each cycle of the pixel clock.
+    """Position, whether it is in the picture, and both sync signals, for each cycle of the pixel clock.
 
     Cycle 0 is the first pixel below the picture. So the blank lines come before the first frame. The position
-    counts the porches, too: x is below the line's total, y below the frame's total. The vertical sync signal
+    includes the porches: x is below the line's total, y below the frame's total. The vertical sync signal
     changes at the start of the horizontal pulse. So its porches count from the last pixel's end.
 
     Parameters

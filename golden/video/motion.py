@@ -170,7 +170,7 @@ class Motion:
         Raises
         ------
         ValueError
-            If an index has no slot.
+            If an index is out of range.
         """
         if np.size(slot) and not 0 <= np.min(slot) <= np.max(slot) < self.slots:
             raise ValueError(f"slots are 0 to {self.slots - 1}, not {np.min(slot)} to {np.max(slot)}")

@@ -1,4 +1,4 @@
-"""TMDS encoder, a byte of colour as ten bits with few transitions and no direct current, and decoder."""
+"""TMDS encoder and decoder: a byte of colour as ten bits with few transitions and no direct current."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,10 @@ class TmdsEncoder:
     latency = 3
 
     def chain(self, byte: np.ndarray) -> np.ndarray:
-        """The nine bits before the balance, bits 0 to 7, and 8 for XOR, for any shape of bytes."""
+        """The nine bits before the balance: bits 0 to 7 of the chain, and bit 8, which is 1 for XOR.
+
+        Bytes have any shape.
+        """
         bits = bits_of(byte, 8)
         ones = bits.sum(-1)
         use_xnor = (ones > 4) | ((ones == 4) & (bits[..., 0] == 0))

@@ -20,7 +20,7 @@ _SETTLES = 3
 
 
 def given_shape(layout: ByteLayout) -> data.StructLayout:
-    """Shape of an incoming beat: bytes, and a flag of the last beat of its frame."""
+    """Shape of an incoming beat: bytes, and whether it is the last beat of its frame."""
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1})
 
 

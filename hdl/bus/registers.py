@@ -21,14 +21,14 @@ __all__ = ["RegistersUnit", "access_shape", "answer_shape", "front_members"]
 
 
 def access_shape() -> data.StructLayout:
-    """Shape of an access: byte address, a flag of a write, the word, and a strobe for each byte."""
+    """Shape of an access: byte address, whether it is a write, the word, and a strobe for each byte."""
     return data.StructLayout(
         {"address": ADDRESS_BITS, "write": 1, "data": WORD_BITS, "strobe": WORD_BITS // 8}
     )
 
 
 def answer_shape() -> data.StructLayout:
-    """Shape of an answer: the read word (0 for a write), and a flag of a refusal."""
+    """Shape of an answer: the read word (0 for a write), and whether the access is refused."""
     return data.StructLayout({"data": WORD_BITS, "error": 1})
 
 

@@ -43,7 +43,7 @@ class HalfwayVectorUnit(wiring.Component):
     def elaborate(self, platform):
         """Half of the sum has the same bits as the sum, with another binary point.
 
-        H is 0 if the sum is lost.
+        If L and V are opposite, the normaliser finds no direction (``lost``), and H is 0.
         """
         m = Module()
         m.submodules.normaliser = normaliser = self._normaliser

@@ -41,7 +41,7 @@ def corners_shape(grid: Grid = GRID) -> dict:
 
 
 def triangle_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of a triangle: corners in any order, the index of its material, a flag of two-sided material."""
+    """Shape of a triangle: corners in any order, index of its material, whether the material is two-sided."""
     return data.StructLayout(
         corners_shape(grid) | {"material": unsigned(MATERIAL_BITS), "two_sided": unsigned(1)}
     )

@@ -23,7 +23,7 @@ _SHIFT_BITS = 4
 
 
 def highlight_shape(model: HighlightOperand) -> data.StructLayout:
-    """Shape of a unit's input: the operand, and a flag of a dark beat, whose term is 0."""
+    """Shape of a unit's input: the operand, and whether the beat is dark. A dark beat has the term 0."""
     return data.StructLayout({"operand": FixedShape(model.operand_format), "dark": unsigned(1)})
 
 

@@ -40,7 +40,7 @@ def coefficient(model: Bisection, power: int, first_step: Value) -> FixedValue:
 class BisectionUnit(PipelinedUnit):
     """Normal half-way between two: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 N_a . N_b``.
 
-    `Bisection`, the bit-accurate model, has formats, variants, error bounds and the flag of too wide spans.
+    `Bisection`, the bit-accurate model, has formats, variants, error bounds and the rule for spans too wide.
 
     A beat needs ``s + 6`` multiplications: three of the dot product, s Horner steps, three scalings. With an
     initiation interval I, ``ceil((s + 6) / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The

@@ -151,7 +151,7 @@ class BisectionChainUnit(wiring.Component):
         ]
 
     def _factor(self, m: Module, r: "_Registers", multiplier: SteppedMultiplier) -> None:
-        """``e`` of a round by Horner's form, and the flag of a span that is too wide."""
+        """``e`` of a round by Horner's form, and whether the span is too wide."""
         p, aligned = self.model.bisection, multiplier.product.scale(-1)
         for done in range(p.steps):
             power = p.steps - done

@@ -10,7 +10,7 @@ __all__ = ["DisplayTimingUnit", "timing_shape"]
 
 
 def timing_shape(mode: DisplayMode) -> data.StructLayout:
-    """Shape of a cycle of the pixel clock: position, a flag of the picture, both sync signals."""
+    """Shape of a cycle: position, whether it is in the picture (``active``), both sync signals."""
     return data.StructLayout(
         {
             "x": unsigned((mode.horizontal.total - 1).bit_length()),
@@ -36,7 +36,7 @@ class DisplayTimingUnit(wiring.Component):
     Members
     -------
     o : :py:`Out(timing_shape(model.mode))`
-        The cycle.
+        Position, ``active`` and sync signals of the present cycle.
 
     Source: docs/theory/video.md#display.
     """
@@ -46,7 +46,7 @@ class DisplayTimingUnit(wiring.Component):
         super().__init__({"o": Out(timing_shape(self.model.mode))})
 
     def elaborate(self, platform):
-        """Count pixels, and lines at the end of each."""
+        """Count the pixels of a line. At the end of each line count the lines."""
         m = Module()
         line, frame = self.model.mode.horizontal, self.model.mode.vertical
         shape: data.StructLayout = self.o.shape()

@@ -19,7 +19,7 @@ def command_shape() -> data.StructLayout:
 
 
 def walk_request_shape(commands: int) -> data.StructLayout:
-    """Shape of a request for a walk: start address of the list, and a flag of a frame's first band."""
+    """Shape of a request for a walk: start address of the list, and whether the band is a frame's first."""
     bits = max((commands - 1).bit_length(), 1)
     return data.StructLayout({"start": unsigned(bits), "first_band": unsigned(1)})
 

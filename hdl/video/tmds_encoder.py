@@ -9,14 +9,14 @@ from blysk.hdl.core.pipelined_unit import PipelinedUnit
 __all__ = ["SYMBOL", "TmdsEncoderUnit"]
 
 SYMBOL = data.StructLayout({"data": 8, "control": 2, "active": 1})
-"""Shape of an input: the byte ``data`` is sent if ``active``, else ``control``, ``c0 + 2 c1``."""
+"""Shape of an input. If ``active``, the byte ``data`` is sent, else ``control``: two bits, ``c0 + 2 c1``."""
 
 
 class TmdsEncoderUnit(PipelinedUnit):
     """Ten bits for a byte or a control period. `TmdsEncoder` is the bit-accurate model.
 
-    The unit gives a word a cycle, 3 cycles after its input: XOR or XNOR; the excess of ones; the balance. It
-    has no multipliers.
+    The unit gives a word a cycle, 3 cycles after its input. The first cycle makes the chain by XOR or XNOR,
+    the second counts its ones, the third inverts the word or not. The unit has no multipliers.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ class TmdsEncoderUnit(PipelinedUnit):
     disparity : Signal
         Number of ones minus number of zeros sent since the last control word. It exists from `elaborate` on.
     chain, excess : Value
-        The word's eight bits before the balance, and half of their ones minus zeros. They come a cycle before
-        the output.
+        The word's eight bits before the balance, and half of the difference of their ones and zeros. They
+        come a cycle before the output.
 
     Source: docs/theory/video.md#tmds.
     """
@@ -46,7 +46,10 @@ class TmdsEncoderUnit(PipelinedUnit):
         super().__init__(SYMBOL, unsigned(BITS), latency=self.model.latency)
 
     def datapath(self, m, operands):
-        """XOR or XNOR by the ones of the byte, the chain's excess of ones, inversion and disparity."""
+        """The chain, its ones minus its zeros, then the inversion and the disparity.
+
+        The number of ones in the byte chooses XOR or XNOR.
+        """
         byte = operands.data
         ones = Signal(range(9), name="ones")
         use_xor, chain = Signal(name="use_xor"), Signal(8, name="chain")
