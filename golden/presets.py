@@ -121,7 +121,7 @@ def default_method(
 ) -> str:
     """The method of a design that names none.
 
-    It is ``quotient``, which models of R·V need. Near lights and a near viewer get ``chord-local``, the only
+    It is ``quotient``, which models of R·V need. Point lights and a near viewer get ``chord-local``, the only
     method that serves them. Three options, which ``quotient`` lacks, get ``renormalise``, the most exact
     method of normals:
 

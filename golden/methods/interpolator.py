@@ -137,7 +137,7 @@ class Interpolator(ABC):
 
     @property
     def serves_local(self) -> bool:
-        """Whether L and H may differ from pixel to pixel: near lights and viewer, and lights that fade."""
+        """Whether L and H may differ from pixel to pixel: point lights, a near viewer, lights that fade."""
         return False
 
     @property

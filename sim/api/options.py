@@ -63,10 +63,13 @@ __all__ = [
 ]
 
 SLOW_SIZE = (160, 120)
-"""Largest picture of the engine pysim if it replaces cxxrtl, and its default size: width and height."""
+"""Width and height of the largest picture that pysim simulates in place of cxxrtl.
+
+Pictures with waveforms have this size by default.
+"""
 
 MAX_FRAMES = 9999
-"""Most frames of a turntable: four digits in their names."""
+"""Largest number of frames of a turntable. Their file names have four digits."""
 
 COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
 """Options of a material."""
@@ -75,7 +78,10 @@ ColorLike = str | float | Triple
 """A colour: ``"#rrggbb"``, one number, or three."""
 
 Source = Union[str, os.PathLike[str], Mesh, Sequence[Any], "trimesh.Trimesh", "trimesh.Scene"]
-"""``"teapot"``, a mesh or scene file, a mesh (or of trimesh), or arrays: vertices, faces, perhaps normals."""
+"""``"teapot"``, the name of a mesh file or scene file, a `Mesh`, a mesh or scene of trimesh, or arrays.
+
+The arrays are vertices, faces and, if known, normals.
+"""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """Names of engines. ``"auto"`` takes ``"cxxrtl"``, or ``"pysim"`` if no C++ compiler works."""
@@ -185,7 +191,7 @@ class Direction(Vector):
 
 
 LIGHTS = ("lights", "point_lights", "spot_lights")
-"""Options of lights, in the order of their lights."""
+"""Options of lights. A scene has the lights of the first option first, and so on."""
 
 VIEW_WORDS = ("front", "back", "left", "right", "top", "bottom")
 _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -198,7 +204,7 @@ SCENE: dict[str, Option] = {
     "back_faces": Option(
         Choice("treatment of back faces", BACK_FACES),
         "flip",
-        "Back faces. flip turns their normals, show takes them as they are, cull leaves the faces out.",
+        "Back faces. flip turns their normals, show keeps their normals, cull leaves the faces out.",
         "back_faces",
     ),
     "triangles": Option(
@@ -225,8 +231,8 @@ SCENE: dict[str, Option] = {
     "view": Option(
         Direction({word: word for word in VIEW_WORDS}),
         (0.4, 0.5, 1.0),
-        "Direction from the mesh to the viewer. The camera shows the whole mesh. The words and the default "
-        "turn with --up. Options of the camera replace the camera of a file.",
+        "Direction from the mesh to the viewer. The camera shows the whole mesh. The directions of the words "
+        "and the default direction turn with --up. Options of the camera replace the camera of a file.",
         "camera.view",
     ),
     "position": Option(
@@ -253,7 +259,8 @@ SCENE: dict[str, Option] = {
     "viewer": Option(
         Choice("viewer", VIEWERS),
         "distant",
-        "distant: highlights seen from one direction. near: from the camera, by --method chord-local.",
+        "distant: highlights are seen from one direction. near: highlights are seen from the camera. near "
+        "needs --method chord-local.",
         "camera.viewer",
     ),
     "lights": Option(
@@ -274,7 +281,7 @@ SCENE: dict[str, Option] = {
         ),
         None,
         "Position of a light in the mesh's units, its colour, and its attenuation. At distance d the light "
-        "counts 1/(K0 + K1 d + K2 d^2), at most 1. Takes --method chord-local.",
+        "is multiplied by 1/(K0 + K1 d + K2 d^2), limited to 1. Needs --method chord-local.",
     ),
     "spot_lights": Option(
         Lights(
@@ -313,8 +320,9 @@ DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
         None,
-        "Method of interpolation along a span.  [default: quotient; near lights: chord-local; --gate: "
-        "quadratic; --operand, --setup-interval or a model without a table: renormalise]",
+        "Method of interpolation along a span.  [default: quotient; with point lights or a near viewer: "
+        "chord-local; with --gate: quadratic; with --operand, with --setup-interval, or for a model "
+        "without a table: renormalise]",
         "pipeline.method",
     ),
     "model": Option(
@@ -360,7 +368,7 @@ DESIGN: dict[str, Option] = {
 
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
-    "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials, with up to 64 lobe tables."),
+    "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials. They share up to 64 lobe tables."),
     "factors": Option(
         Whole(0, MAX_LIGHTS),
         0,
@@ -387,7 +395,7 @@ BUILD: dict[str, Option] = {
         Choice("core", TOPS),
         None,
         "shader: spans to pixels. geometry: triangles to spans. render: triangles to pixels.  [default: "
-        "shader; with hardware geometry render]",
+        "shader; with --geometry hardware: render]",
     ),
     "bus": Option(
         Choice("bus", PORTS),
@@ -398,7 +406,8 @@ BUILD: dict[str, Option] = {
     "setups": Option(
         Few(*SETUPS),
         1,
-        "Lanes of triangle setup in hardware geometry. Two lanes take twice as many small triangles.",
+        "Lanes of triangle setup in hardware geometry. Two lanes take twice as many small triangles in "
+        "the same time.",
         "pipeline.setups",
     ),
     "coarse": Option(
@@ -408,7 +417,7 @@ BUILD: dict[str, Option] = {
         "size. Needs a core from triangles to pixels.",
     ),
 }
-"""Options of a core, of Verilog. They are fields of `Build`, which `design.built` sets."""
+"""Options of the Verilog of a core. They are fields of `Build`, which `design.built` sets."""
 
 RENDERING: dict[str, Option] = {
     **{name: BUILD[name] for name in ("geometry", "pipes", "setups")},
@@ -476,7 +485,7 @@ class DesignOptions(TypedDict, total=False):
 
 
 class SharedOptions(TypedDict, total=False):
-    """Options that are both in `BUILD` and, of the same type, in `RENDERING`, by their names in Python."""
+    """Options of `BUILD` that `RENDERING` has with the same type, by their names in Python."""
 
     geometry: Literal["software", "hardware"]
     pipes: Literal[1, 2, 4, 8]

@@ -68,10 +68,10 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     field_of_view : float
         See `Camera`; by default 30.
     viewer : {"distant", "near"}
-        See `Scene`; by default ``"distant"``. ``"near"`` takes the method ``chord-local``.
+        See `Scene`; by default ``"distant"``. ``"near"`` needs the method ``chord-local``.
     lights : Light or dict or numbers or str, or a sequence of these
         At most 16; by default the lights of a glTF file, else one light from (-0.5, 0.8, 0.7). A dict has
-        fields of `Light`. Numbers are a direction, or direction and colour. Lights with a position take the
+        fields of `Light`. Numbers are a direction, or direction and colour. Lights with a position need the
         method ``chord-local``. They may fade by distance or be spots. Lights of colour 0 are off, and left
         out.
     point_lights, spot_lights

@@ -62,7 +62,7 @@ Keys of a scene file (only mesh.file is required):
     type=Choice("engine", get_args(Engine)),
     default="auto",
     show_default=True,
-    help="cxxrtl is compiled; pysim is Amaranth's own. auto: cxxrtl, or without a C++ compiler pysim at a "
+    help="cxxrtl is compiled; pysim is Amaranth's own. auto: cxxrtl; without a C++ compiler pysim at a "
     "smaller size.",
 )
 @click.option(

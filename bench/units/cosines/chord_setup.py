@@ -45,7 +45,7 @@ FORMATS = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIG
 
 
 def local_curves(rng: np.random.Generator, spans: int) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """N·L and ``1 - N·H`` along spans with near lights and a near viewer: a function of span and t."""
+    """N·L and ``1 - N·H`` along spans with point lights and a near viewer: a function of span and t."""
     start = rng.normal(size=(spans, 3))
     step = rng.uniform(0, 0.3, (spans, 1)) * sphere(rng, spans)
     to_viewer = sphere(rng, spans)
