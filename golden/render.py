@@ -79,7 +79,7 @@ class Renderer:
     Raises
     ------
     ValueError
-        If the method takes values, or other words than the geometry gives.
+        If the method takes values, or other words than the geometry gives. If the design has an albedo.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -91,6 +91,8 @@ class Renderer:
         suits = self.design.interpolator.geometry(self.design.lights)
         if self.geometry is _OF_THE_METHOD:
             object.__setattr__(self, "geometry", suits)
+        if self.design.albedo is not None:
+            raise ValueError("hardware geometry has no vertex colours and no textures; leave them out")
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
             raise ValueError(f"method {self.design.method} takes {taken}, the geometry gives {given}")

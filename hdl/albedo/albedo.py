@@ -9,8 +9,8 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.albedo.attribute_spans import AttributeSpansUnit, attribute_span_shape
 from blysk.hdl.albedo.attributes import AttributesUnit
 from blysk.hdl.albedo.texel_memory import texel_write_shape, texels_shape
-from blysk.hdl.albedo.texture_address import TextureAddressUnit, descriptor_shape, texel_request_shape
-from blysk.hdl.albedo.texture_filter import TextureFilterUnit, albedo_shape
+from blysk.hdl.albedo.texture_address import descriptor_shape, texel_request_shape
+from blysk.hdl.albedo.texture_filter import albedo_shape
 from blysk.hdl.albedo.texture_sampler import TextureSamplerUnit
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.memory import connect_wide_fifo
@@ -19,9 +19,6 @@ from blysk.hdl.core.stream import connect
 from blysk.hdl.core.views import copy, copy_fields
 
 __all__ = ["AlbedoUnit", "span_albedo_shape"]
-
-_MEMORY_LATENCY = 2
-"""Cycles of a texel memory inside."""
 
 _WAITING = 32
 """Vertex colours that wait for their texels; a sample in a memory inside takes fewer cycles."""
@@ -137,8 +134,7 @@ class AlbedoUnit(wiring.Component):
         if p.texture is not None:
             self._sampler = TextureSamplerUnit(p.texture, initiation_interval, waiting)
             members["constants"] = In(descriptor_shape())
-            of_filter = TextureFilterUnit(p.texture.filter, initiation_interval).latency
-            self.latency += TextureAddressUnit(p.texture.address).latency + _MEMORY_LATENCY + of_filter
+            self.latency += self._sampler.latency
             if p.texture.memory.external:
                 members["request"] = Out(stream.Signature(texel_request_shape(p.texture.memory)))
                 members["response"] = In(stream.Signature(texels_shape()))

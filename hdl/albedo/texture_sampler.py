@@ -58,6 +58,11 @@ class TextureSamplerUnit(wiring.Component):
     response : :py:`In(stream.Signature(texels_shape()))`
         Texels of the requests, in their order. Only if the memory is outside.
 
+    Attributes
+    ----------
+    latency : int
+        Cycles from a place to its colour. A memory outside adds its own latency.
+
     Source: docs/theory/textures.md#texture-unit.
     """
 
@@ -66,6 +71,11 @@ class TextureSamplerUnit(wiring.Component):
         if waiting < 4:
             raise ValueError(f"waiting must be at least 4, not {waiting}")
         self.initiation_interval, self._waiting = initiation_interval, waiting
+        self._address = TextureAddressUnit(p.address)
+        self._filter = TextureFilterUnit(p.filter, initiation_interval)
+        self._memory = None if p.memory.external else TexelMemoryUnit(p.memory)
+        inside = 0 if self._memory is None else self._memory.latency
+        self.latency = self._address.latency + inside + self._filter.latency
         members = {
             "i": In(stream.Signature(texture_place_shape(p.address))),
             "o": Out(stream.Signature(albedo_shape())),
@@ -81,15 +91,14 @@ class TextureSamplerUnit(wiring.Component):
     def elaborate(self, platform):
         """The three units; a place goes on to the memory and to the FIFO on the same cycle."""
         m, p = Module(), self.model
-        m.submodules.address = address = TextureAddressUnit(p.address)
-        m.submodules.filter = texture_filter = TextureFilterUnit(p.filter, self.initiation_interval)
+        m.submodules.address, m.submodules.filter = address, texture_filter = self._address, self._filter
         connect(m, wiring.flipped(self.i), address.i)
         connect(m, texture_filter.o, wiring.flipped(self.o))
         m.d.comb += address.constants.eq(self.constants)
         if p.memory.external:
             request, response = self.request, self.response
         else:
-            m.submodules.memory = memory = TexelMemoryUnit(p.memory)
+            m.submodules.memory = memory = self._memory
             request, response = memory.i, memory.o
             connect(m, wiring.flipped(self.write), memory.write)
         weight = stream.Signature(address.o.payload.shape().members["weight"])

@@ -153,7 +153,10 @@ def core_of(design: ShadingPipeline) -> wiring.Component:
     Raises
     ------
     ValueError
-        If the design does not fit triangles (see `Renderer`), or has fewer scanlines than pipelines.
+        If the design does not fit triangles (see `Renderer`), or has fewer scanlines than pipelines. If
+        texels are outside of a core on a bus.
     """
     build = design.build
+    if build.bus != "native" and design.texels_outside:
+        raise ValueError("a core on a bus needs its texels inside: take a memory that is not external")
     return TOPS[build.top].unit(design) if build.bus == "native" else BusUnit(design)

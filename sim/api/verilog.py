@@ -54,11 +54,27 @@ def header_of(unit: ShadingUnit) -> list[str]:
     ]
     if made.lights:
         lines += made.interpolator.input_lines(made.lights, made.specular is not None, made.factors)
+    lines += _albedo_lines(made)
     lines += [
         f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
         "before the first span: hold rst high for a cycle, then write every frame constant in any order",
     ]
     return lines
+
+
+def _albedo_lines(design: ShadingPipeline) -> list[str]:
+    """Description of the attributes of a span, in lines."""
+    albedo = design.albedo
+    if albedo is None:
+        return []
+    names = ["vertex colour, 0 to 1"] * albedo.colors
+    names += ["u and v, (texels of the level - base) / 2^range"] * (albedo.texture is not None)
+    over = " over W, times a scale of the span; weight: 1/W times the same scale, at most 1 - 4 2^-23"
+    return [
+        "The albedo of a pixel multiplies its ambient and diffuse light; emission is added.",
+        f"i_attributes_start, SQ(1, 23): {'; '.join(names)}" + (";" if albedo.perspective else ""),
+        *([f"each{over}"] if albedo.perspective else []),
+    ]
 
 
 def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[str]:
@@ -150,9 +166,14 @@ def _descriptions(unit: ShadingUnit | RendererUnit) -> Mapping[str, str]:
     """Descriptions of the ports of a core with pixels as output."""
     if isinstance(unit, RendererUnit):
         return triangle_descriptions(unit)
-    fields = {f"i_{field}" for field in unit.i.payload.shape().members}
+    members = unit.i.payload.shape().members
+    ports = {f"i_{field}" for field in members} | set(unit.signature.members)
+    if "attributes" in members:
+        ports |= {f"i_attributes_{field}" for field in members["attributes"].members}
     texts = port_descriptions(unit.model.pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
-    return {port: text for port, text in texts.items() if not port.startswith("i_") or port in fields}
+    return {
+        port: text for port, text in texts.items() if not port.startswith(("i_", "texel_")) or port in ports
+    }
 
 
 @with_options(BUILD, BuildOptions)

@@ -172,6 +172,8 @@ def _without_equal_materials(
             material.two_sided,
             material.tinted,
             material.texture,
+            # With an albedo it is not part of the ambient colour.
+            material.emission if scenes[0].has_albedo else None,
         )
         for of, material in zip(_constants(scenes[0], None, full.mirror), scenes[0].materials, strict=True)
     ]

@@ -14,8 +14,10 @@ from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Pixels, ShadingPipeline, Spans
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.lighting import Light
+from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import Texture
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit
 from blysk.sim.errors import InputError
@@ -67,9 +69,11 @@ def teapot_frame(
         if k in design.factors:
             light = {"position": np.multiply(8, way), "attenuation": (0.5, 0.1, 0), "spot": np.negative(way)}
         lights.append(Light(color=np.roll((1.0, 0.8, 0.6), k) / design.lights, **light))
+    mesh, materials = _colored(mesh, materials, design)
+    projection = "orthographic" if design.albedo and not design.albedo.perspective else "perspective"
     scene = Scene(
         mesh=replace(mesh, material=np.arange(len(mesh.faces)) % design.materials),
-        camera=Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), "perspective", width / height),
+        camera=Camera.framing(mesh.vertices, (0.4, 0.5, 1.0), projection, width / height),
         width=width,
         height=height,
         material=materials,
@@ -80,6 +84,24 @@ def teapot_frame(
     spans = spans[np.r_[0, : len(spans)]]
     spans.length[0] = 0
     return spans, prepared.constants, design.compute(spans, prepared.constants)
+
+
+def _colored(
+    mesh: Mesh, materials: Sequence[Material], design: ShadingPipeline
+) -> tuple[Mesh, Sequence[Material]]:
+    """The mesh with colours of its normals, and materials with a texture, if the design shows them."""
+    albedo = design.albedo
+    if albedo is None:
+        return mesh, materials
+    if albedo.colors:
+        mesh = replace(mesh, colors=mesh.normals / 2 + 0.5)
+    if albedo.texture is not None:
+        side = min(albedo.texture.memory.fitting(), 8)
+        place = np.indices((side, side)).sum(axis=0)[:, :, np.newaxis]
+        texture = Texture((place + np.array([0, 2, 4])) % 8 / 7)
+        mesh = replace(mesh, coordinates=mesh.vertices[:, :2])
+        materials = [replace(of, texture=texture) for of in materials]
+    return mesh, materials
 
 
 def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[str, np.ndarray]]:

@@ -1,6 +1,7 @@
 """Layouts of bytes against the C ABI, as ctypes and the C compiler have it; packing against hardware."""
 
 import ctypes
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from amaranth.hdl import Module, Shape, Signal, Value
 from amaranth.lib import data
 from amaranth.sim import Simulator
 
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.bus.byte_layout import ByteLayout, Field
 from blysk.golden.presets import preset
 from blysk.hdl.bus.byte_layout import bytes_of, fields_of, layout_of, misfits
@@ -20,6 +23,7 @@ SHAPES = {
     "triangle": triangle_shape(),
     "span": span_shape(preset("linear", "cosquad")),
     "values": span_shape(preset("chord-local", "cosquad", lights=2)),
+    "albedo": span_shape(replace(preset("quotient"), albedo=Albedo(texture=TextureSampler()))),
     "true span": true_spans_shape(),
     "pixel": pixel_shape(),
 }

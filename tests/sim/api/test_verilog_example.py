@@ -1,11 +1,15 @@
 """The worked example of a Verilog header, read as an engineer would, against the frame's own constants."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import blysk
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.bus.registers import constant_registers
 from blysk.golden.frame_constants import LOBE_ADDRESS, address_table
 from blysk.golden.presets import preset
@@ -96,3 +100,17 @@ def test_header_has_an_instance_of_every_port():
     ports = re.search(r"^module core \(([^)]*)\);", text, re.MULTILINE)[1]
     instance = re.search(r"^// core core_0 \((.*?)^// \);", text, re.MULTILINE | re.DOTALL)[1]
     assert re.findall(r"\.(\w+)\(\1\)", instance) == re.findall(r"\w+", ports)
+
+
+@pytest.mark.long
+def test_every_attribute_is_described():
+    """With textures inside; other memories have ports of their own."""
+    design = blysk.design(method="linear", model="cosquad")
+    for external in (False, True):
+        texture = TextureSampler(TexelMemory(8, external))
+        text = blysk.verilog(replace(design, albedo=Albedo(texture=texture)), name="core")
+        wanted = r"// (i_attributes_|texel_re)\w+ +(in|out)put"
+        lines = [line for line in text.splitlines() if re.match(wanted, line)]
+        assert len(lines) > (30 if external else 16)
+        # Without a description a line ends with the format.
+        assert not any(line.rstrip().endswith(")") for line in lines)

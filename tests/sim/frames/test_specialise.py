@@ -213,7 +213,7 @@ def test_no_light_at_all(material, lights):
 
 
 def test_albedo():
-    """Texture and tint tell materials apart, an albedo has colours, and tints need specular light."""
+    """Texture, tint and emission tell materials apart. Tints need specular light."""
     mesh = replace(FLOOR, coordinates=FLOOR.vertices[:, ::2], material=np.array([0, 1]))
     grey = Material(0.1, 0.5, 0.3, 30)
     images = [Texture(np.random.default_rng(seed).random((4, 4, 3))) for seed in (1, 2)]
@@ -223,6 +223,7 @@ def test_albedo():
         (textured, 2),
         ((textured[0], replace(textured[0], tinted=True)), 2),
         ((black, replace(black, tinted=True)), 2),
+        ((black, replace(black, emission=(0.1, 0, 0))), 2),
         ((textured[0], replace(grey, texture=images[0])), 1),
     ):
         scene = scene_of(materials, size=(60, 50), mesh=mesh)

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from shutil import copytree, which
@@ -13,6 +14,9 @@ from shutil import copytree, which
 import numpy as np
 import pytest
 
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.presets import preset
 from blysk.hdl.emit.verilog import emit
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -83,6 +87,10 @@ def rows(path):
         preset(lights=0),
         pytest.param(preset("chord-local", "cosquad", lights=2, materials=3), marks=pytest.mark.long),
         pytest.param(preset("linear", None, grey=True, exponent=9), marks=pytest.mark.long),
+        pytest.param(
+            replace(preset(lights=0), albedo=Albedo(texture=TextureSampler(TexelMemory(104)))),
+            marks=pytest.mark.long,
+        ),
     ],
     ids=str,
 )
