@@ -112,8 +112,9 @@ def _spans(unit, rng, count):
 
 
 def _words(unit, rng, count):
-    """Any words, steps and exponents, so that sums wrap. Spans have 0 to 9 pixels, and a few have 40."""
+    """Any words, steps and exponents, so that sums wrap. Spans have 0 to 40 pixels, or a power of two."""
     length = rng.choice([0, 0, 1, 1, 1, 2, 2, 3, 4, 5, 9, 40], count)
+    length[:12] = rng.permutation(1 << np.arange(12)) % (1 << unit.length_bits)
     p = unit.model
     start, step = (any_codes(rng, p.WORD_FORMAT, count, p.attributes + 1) for _ in range(2))
     exponent = rng.integers(0, 16, count)
@@ -123,9 +124,15 @@ def _words(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of steps count."""
+    """Spans of 3000 to 4095 pixels, where the last bits of steps count. Half of them have any steps."""
     length = np.maximum(rng.integers(3000, 4096, 8) % (1 << unit.length_bits), 1)
-    return Case(_beats(unit, quantised_spans(rng, unit.model, length)[0], length))
+    beats = _beats(unit, quantised_spans(rng, unit.model, length)[0], length)
+    # Flat lines have the largest exponent. With odd steps all bits of an accumulator are used.
+    lines = beats[::2]
+    lines["exponent"] = [15, 15, 14, 0]
+    for name in lines["step"].dtype.names:
+        lines["step"][name] = any_codes(rng, unit.model.WORD_FORMAT, *lines["step"][name].shape) | 1
+    return Case(beats)
 
 
 def _measure(rng, count, model):

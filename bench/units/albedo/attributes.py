@@ -19,7 +19,7 @@ __all__ = ["RECORD", "any_words"]
 def any_words(
     rng: np.random.Generator, model: AttributeSpans, count: int
 ) -> tuple[AttributeWords, np.ndarray]:
-    """Words of pixels with 1/W from 2^-15 to 1 by logarithm, and their attributes.
+    """Words of pixels with 1/W from 2^-15 to 1 by logarithm, half of them over 1/2, and their attributes.
 
     Every fourth attribute is an end of its range, or 0. There U is off by up to 3 steps, as in spans.
 
@@ -35,7 +35,8 @@ def any_words(
     exact[::4] = np.where(rng.random(exact[::4].shape) < 0.3, 0, rng.choice([least, np.ones_like(least)]))
     weight = np.full(count, 1 - 2.0**-21)
     if model.perspective:
-        weight = np.maximum(np.floor(2.0 ** rng.uniform(8, 23, count)), 252) * 2.0**-23
+        octave = np.where(rng.random(count) < 0.5, rng.uniform(8, 22, count), rng.uniform(22, 23, count))
+        weight = np.maximum(np.floor(2.0**octave), 252) * 2.0**-23
     codes = np.rint(exact * weight[:, np.newaxis] * 2.0**23).astype(np.int64)
     codes[::4] += rng.integers(-3, 4, codes[::4].shape)
     format = model.WORD_FORMAT
@@ -69,7 +70,7 @@ def _expect(unit, case):
 
 
 def _pixels(unit, rng, count):
-    """Pixels with 1/W from 2^-15 to 1, and attributes of every size, the ends of their ranges among them."""
+    """Pixels with 1/W from 2^-15 to 1, half of them over 1/2, and attributes of every size."""
     return Case(attribute_word_beats(unit, any_words(rng, unit.model.spans, count)[0]))
 
 
