@@ -32,7 +32,7 @@ from blysk.hdl.video.clocks import ClockUnit
 from blysk.hdl.video.output_cells import OutputCells
 from blysk.sim.api.design import design_of
 from blysk.sim.api.options import DESIGN, SCENE
-from blysk.sim.api.scene import load, scenes_of
+from blysk.sim.api.scene import load, scenes_of, warn_of_ignored
 from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.errors import InputError
 
@@ -85,6 +85,7 @@ def gpu_of(
         if settings["size"] != VGA.size:
             raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
         loaded = load(settings, lights=MAX_LIGHTS, local=False, albedo=False)
+        warn_of_ignored(loaded)
         (scene,) = scenes_of(loaded, settings)
         design = _design(settings, scene, board)
     scenes = _presets(scene, settings["up"])

@@ -24,7 +24,7 @@ from blysk.sim.meshes.loaded_mesh import LoadedMesh, merged
 from blysk.sim.meshes.materials import FileMaterial, surfaces
 from blysk.sim.meshes.mesh import given_mesh, load_mesh
 
-__all__ = ["load", "scene", "scenes_of"]
+__all__ = ["load", "scene", "scenes_of", "warn_of_ignored"]
 
 # Options that replace the camera of a file.
 _CAMERA = ("projection", "view", "position", "target", "up", "field_of_view")
@@ -93,10 +93,15 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     settings = read_settings(source, options, SCENE)
     with settings.located():
         loaded = load(settings)
-        if loaded.ignored:
-            text = f"{loaded.name} is drawn without: {'; '.join(loaded.ignored)}"
-            warnings.warn(text, RuntimeWarning, stacklevel=2)
+        warn_of_ignored(loaded)
         return scenes_of(loaded, settings)[0]
+
+
+def warn_of_ignored(loaded: LoadedMesh) -> None:
+    """Warn the caller's caller of contents of a mesh that are not drawn."""
+    if loaded.ignored:
+        text = f"{loaded.name} is drawn without: {'; '.join(loaded.ignored)}"
+        warnings.warn(text, RuntimeWarning, stacklevel=3)
 
 
 def load(

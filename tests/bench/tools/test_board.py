@@ -127,6 +127,13 @@ def test_lights_of_the_presets():
     assert scenes[3].lights == scenes[2].lights
 
 
+def test_contents_of_a_file_that_a_board_does_not_draw_are_told(tmp_path):
+    text = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text(text)
+    with pytest.warns(RuntimeWarning, match="a is drawn without: vertex colours"):
+        gpu_of(BOARDS["ulx3s-85f"], str(tmp_path / "a.obj"), {})
+
+
 BUILT = Built(
     {"multipliers": (3, 28)},
     (
