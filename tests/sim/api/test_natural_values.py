@@ -188,7 +188,8 @@ def test_help_has_every_option_with_its_default():
         default = "" if option.default is None else f", default {option.default!r}"
         assert re.search(rf"^{name} : .+{re.escape(default)}$", text, re.MULTILINE), name
     assert not re.search("--[a-z]", text)
-    assert 'by method="chord-local"' in " ".join(text.split())
+    assert 'needs method="chord-local"' in " ".join(text.split())
+    assert 'setup_interval="' not in text
     assert inspect.signature(blysk.design).parameters.keys() == COUNTS.keys() | DESIGN.keys()
     for function, options in ((blysk.scene, SCENE), (blysk.design, {**COUNTS, **DESIGN})):
         described = re.findall(r"^\s*([a-z_, ]+)( : .*)?$", function.__doc__, re.MULTILINE)
