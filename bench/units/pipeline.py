@@ -489,7 +489,7 @@ RECORD = Record(
         "counters": Stimulus(_counters, stalled=False, variants=_ALL),
     },
     waivers={
-        "tables.read": "No table is written while beats read it, so the register may move.",
+        "tables.read": "No table is written while beats read it, so the register may change on a write.",
         "multiplier_0_product": "A reciprocal and its square are normalised: the first bit is 1 already.",
     },
     still={

@@ -339,7 +339,8 @@ class Record:
         Whether this axis is logarithmic.
     waivers : dict
         By name of a signal of the default variant: the reason why a fault there may survive, or the test that
-        finds it.
+        finds it. Some faults invert a bit only where another bit of the same word, the *controlling bit*, has
+        a certain value.
     still : dict
         Register bits of the default variant that cannot toggle: signals with their bits, by reason.
     remembers : bool

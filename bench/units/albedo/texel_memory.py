@@ -50,7 +50,7 @@ RECORD = Record(
     stimuli={"requests": Stimulus(_requests, 300)},
     axis="",
     waivers={
-        "nothing": "Writes of a run come without gaps; a test of the unit has some.",
+        "nothing": "Writes of a run come without gaps. A test of the unit has gaps.",
         "read*": "Nothing is written while requests are inside.",
     },
 )

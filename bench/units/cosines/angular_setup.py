@@ -130,7 +130,7 @@ RECORD = Record(
     waivers={
         "cordic_?_*": "The controlling bit is the sign of a word that is not negative.",
         "entry": "The slope of a root from 1/4 to 1 is 1/2 or more; at 0 it is multiplied by 0.",
-        "factor": "It is for the saturation of a factor. The factor is 0.636 to 0.708, and never saturates.",
+        "factor": "The bit serves the saturation of a factor, but a factor is 0.636 to 0.708.",
         "steps": "Both readers of an inverted bit invert it again, or ignore it.",
     },
     still={

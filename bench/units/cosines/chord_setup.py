@@ -236,11 +236,11 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("highlight_0_slope_out_of_range", "out_of_range"),
-        "It is written too often, but it is read only on the cycle after the right write.",
+        "The fault writes the word too often. The word is read only on the cycle after the right write.",
     )
     | dict.fromkeys(
         ("diffuse_0_curvature_exact", "highlight_0_ends"),
-        "It is kept wrong, but it is read only on the cycle after the write.",
+        "The fault keeps a wrong word. The word is read only on the cycle after a write.",
     )
     | {
         "multiplier_1_1": "A reciprocal and its square are normalised: the first bit is 1 already.",

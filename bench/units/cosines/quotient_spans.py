@@ -148,7 +148,7 @@ RECORD = Record(
     logarithmic=True,
     still={
         "w's second difference is positive and under 2": "second[97] change_1[48]",
-        "that of z is a multiple of 2^3": "second[98-100]",
+        "z's second difference is a multiple of 2^3": "second[98-100]",
         "cos a is not negative": "line_z0_b[17]",
     },
 )

@@ -115,10 +115,10 @@ RECORD = Record(
         "last bits": Stimulus(_last_bits, 3000, stalled=False, repeats=2),
     },
     waivers={
-        "*_first": "The bit is below the bits of a cosine, where the word has zeros; or it has been read.",
+        "*_first": "The bit is below a cosine's bits, where the word has zeros, or the word has been read.",
         "*_x_0": "The controlling bit is below the bits of a cosine, where x has zeros.",
         "reciprocal_square": "While the output is stalled, the register holds a word that has been read.",
-        "span_aligned": "Three squares, each up to 2^34, by 4 at most, are less than 2^38: the bit is 0.",
+        "span_aligned": "Three squares, each up to 2^34, times 4 at most, are less than 2^38: the bit is 0.",
         "span_square_total": "While the output is stalled, the register holds a word that has been read.",
         "rho_rounded": "A word under 1 is rounded to 1 at most, and the bit stands for 2: it is 0.",
     },
@@ -137,7 +137,7 @@ RECORD = Record(
         "the excess of an angle's square is less than 1/4, and the excess of an angle less than 1": (
             "chord_0_sum[20-22] chord_0_rounded[15-18] chord_0[15-16] chord_1_sum[22] chord_1_rounded[17-18]"
         ),
-        "of a step 1 - k is less than 1/4 and 1 - sin d/d less than 1/2, of four steps 1 - k less than 1/2": (
+        "for a step 1 - k is under 1/4 and 1 - sin d/d under 1/2; for four steps 1 - k is under 1/2": (
             "step_0_sum[20-22] step_0_rounded[15-18] step_0[15-16] "
             "step_1_sum[21-22] step_1_rounded[16-18] step_1[16] "
             "phase_0_sum[21-22] phase_0_rounded[16-18] phase_0[16]"
@@ -146,13 +146,13 @@ RECORD = Record(
             "reciprocal_entry[16] reciprocal_entry[33] reciprocal[16] reciprocal_square[16] "
             "reciprocals.port__data[16] reciprocals.port__data[33]"
         ),
-        "a square rounds up to 1 in one span in 2^17 only": "psi_square_rounded[17]",
+        "a square rounds up to 1 only in one span of 2^17": "psi_square_rounded[17]",
         "an eighth of Q is at most 0.31, so that its word, which is 1/2 or more, is shifted": "step_fine[27]",
-        "K is not negative, and less than 1, to which it is not rounded up": (
+        "K is not negative, and is less than 1 also when it is rounded": (
             "*_coefficient_exact[34] *_coefficient_rounded[17-18]"
         ),
         "psi/sin psi - 1 is at least 1 - sin d/d": "excess_difference[17]",
-        "rho is 1/2 or more, after it is halved where it is 1 or more, and less than 2 before": (
+        "rho is less than 2; its word, halved where rho is 1 or more, is 1/2 or more": (
             "rho_exact[35] rho_halved[35] rho_rounded[18] rho[16]"
         ),
         "a cosine has ten bits less than x": (

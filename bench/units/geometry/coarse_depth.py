@@ -135,7 +135,7 @@ RECORD = Record(
         "edges": Stimulus(_edges, 2000),
     },
     axis="",
-    waivers={"place": "Words are swept in another order, and each word has its turn."},
+    waivers={"place": "The fault changes the order in which words are swept. Every word is still swept."},
     still={
         "what a reset finds is swept": "fresh[0] used[0]",
         "all words are swept only after a reset; else 5 of 30 are swept": "left[3-4]",

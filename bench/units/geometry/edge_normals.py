@@ -85,8 +85,9 @@ RECORD = Record(
     },
     axis="",
     waivers={
-        "dot_product.datapath.last_product": "One more or less in a sum of three squares is cut off. To "
-        "carry into what is kept, it must be 7 modulo 8, which none is, or 0 modulo 4, and then all are even."
+        "dot_product.datapath.last_product": "The fault changes a sum of three squares by 1 in the bits "
+        "that are cut off. It carries into the kept bits only if the sum is 7 modulo 8, which no sum is, or "
+        "0 modulo 4. A sum that is 0 modulo 4 has three even components."
     },
     still={"a counter counts more events than a run has": "count_repaired[12-31]"},
 )

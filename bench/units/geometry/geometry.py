@@ -119,7 +119,7 @@ RECORD = Record(
     },
     axis="",
     still={
-        "block RAMs have more words than triangles wait": (
+        "block RAMs have more words than there are waiting triangles": (
             "waiting_triangles_level[9] waiting_walks_level[3-6] waiting_attributes_level[5-6] "
             "waiting_walks_room[0] waiting_attributes_room[0]"
         ),

@@ -197,18 +197,17 @@ RECORD = Record(
     },
     waivers={
         "a_0": (
-            "It makes 256 steps of a negative cosine, which on a span to 45 degrees reaches less than 400."
+            "The fault turns a negative cosine into 256 steps. On a span to 45 degrees the cosine then "
+            "reaches less than 400 steps."
         ),
-        "difference": (
-            "Without the bit the difference carries past the bits that are cut off once in 2^15 spans."
-        ),
+        "difference": "Once in 2^15 spans the bit changes a carry past the bits that are cut off.",
         "partial_0": "T (2 - u) is not negative, and less than 2: the controlling bit is 0.",
-        "total_0": "It is a bit that is cut off. It carries into the kept bits once in 2^14 spans.",
+        "total_0": "The bit is cut off. It carries into the kept bits once in 2^14 spans.",
         "cut": "1 - N_l·N_r is less than 4, also of words that are no unit vectors.",
-        "$auto$ff.cc:*": "All beats begin on one turn, as the unit waits only on the turn of its results.",
+        "$auto$ff.cc:*": "All beats begin on the same turn, as the unit waits on its results' turn only.",
     },
     still={
-        "the exponent stays for a run, so that what follows from it does not fall": (
+        "the exponent is constant in a run, so no bit of a word made from it falls": (
             "datapath.threshold[0-16] thresholds.port__data[0-16]"
         ),
         "T (2 - u) is not negative, and less than 2": "partial_0[36-48]",

@@ -152,13 +152,13 @@ RECORD = Record(
     waivers={
         "lit": "No exponent's boundary is the largest code, of which all bits are 1.",
         "product": "The slope, n of 10 bits normalised to 17, ends in seven zeros, and so does its product.",
-        "argument": "It is for the saturation at 2, which is dark at every exponent.",
+        "argument": "The bit serves the saturation at 2. An argument of 2 is dark at every exponent.",
         "stages": (
             "The table is also read while the output is stalled. As the exponent stays, the word stays."
         ),
         "shifted": (
-            "It is for the saturation at 2, over the boundary of every exponent, so that its product is "
-            "not read."
+            "The bit serves the saturation at 2. This is over the boundary of every exponent, so the product "
+            "is not read."
         ),
     },
 )

@@ -35,7 +35,7 @@ def _parameters(rng, model, count):
 
 
 def _measure(rng, count, lobe):
-    """Terms over all octaves of 1 - N·H, against the model itself."""
+    """Terms over all octaves of 1 - N·H. The exact terms are the reflection model's, in float64."""
 
     def samples():
         for parameter, share in _parameters(rng, lobe.reflection, count):
@@ -69,7 +69,7 @@ def _operands(model, rng, count):
 
 
 def _places(model, rng, count):
-    """``count`` places: ends of every step of all parts, any places, and some past the end."""
+    """``count`` places: both ends of every step in all parts of the table, any, and past the end."""
     format, rows = model.operand_format, model.rows * model.steps
     steps = np.arange(rows) << model.fraction_format.width
     past = (rows << model.fraction_format.width) + np.r_[0, 1, 1 << rng.integers(0, 12, 6)]
@@ -78,7 +78,10 @@ def _places(model, rng, count):
 
 
 def _case(unit, rng, count, tables):
-    """Beats for written tables and one bank. A tenth of the beats is dark."""
+    """A run: writes of all tables, unless they are fixed, and beats that read one of the banks.
+
+    A tenth of the beats is dark.
+    """
     codes = _operands(unit.model, rng, count)
     beats = {"operand": codes, "dark": (rng.random(len(codes)) < 0.1).astype(np.uint8)}
     write = None
@@ -92,7 +95,10 @@ def _case(unit, rng, count, tables):
 
 
 def _highlights(unit, rng, count):
-    """Every step of the table, all octaves, and ends of the operand. A tenth of the beats is dark."""
+    """Operands at every step of the table, in all octaves and at the ends of their format.
+
+    A tenth of the beats is dark.
+    """
     p = unit.model
     first = _USUAL[p.reflection.PARAMETER]
     tables = [p.table(first if first is None else first / (1 + bank)) for bank in range(p.banks)]
@@ -100,7 +106,10 @@ def _highlights(unit, rng, count):
 
 
 def _tables(unit, rng, count):
-    """Tables of any curve, which differ in each run. One is replaced. Some values are lost or single."""
+    """Tables of any curve, other tables in each run. A later table replaces a table.
+
+    Some writes make no word.
+    """
     p = unit.model
     tables = []
     for _ in range(p.banks):
@@ -118,19 +127,19 @@ def _tables(unit, rng, count):
         return case
     lost = rng.integers(0, 1 << Lobe.VALUE_FORMAT.width, 700)
     parts = (
-        # A table that is written later replaces a table.
+        # The tables of the run replace this table.
         tables[0].writes(),
         case.write,
         # The unit drops all values past the end of a table, and all values for a bank that does not exist.
         {"value": np.r_[lost, p.banks, lost], "begins": np.arange(1401) == 700},
-        # Two values make a word, one none.
+        # A word needs two values. Each of these tables has a single value.
         {"value": np.r_[0, lost[:1], 0, lost[1:2]], "begins": [1, 0, 1, 0]},
     )
     return replace(case, write=together(parts))
 
 
 def _loaded(unit, case):
-    """Fixed tables, or tables loaded by writes, by bank."""
+    """The table of each bank: fixed, or loaded by the writes of the run."""
     if unit.tables is not None:
         return dict(enumerate(unit.tables))
     p = unit.model
@@ -212,12 +221,12 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("last", "active"),
-        "With one bank, a table that ends later only writes past the end of the memory.",
+        "There is one bank. So a table that ends too late writes only past the end of the memory.",
     )
     | {
-        "memory.follows": "Writes of a run come without gaps; a test of the unit has some.",
-        "memory.$signature__addr": "Nothing is written after the number of a bank that there is not.",
-        "table__word": "No bank is written while beats read it, so the register may move.",
+        "memory.follows": "Writes of a run come without gaps. A test of the unit has gaps.",
+        "memory.$signature__addr": "After the number of a missing bank the unit writes no word.",
+        "table__word": "No bank is written while beats read it, so the register may change on a write.",
     },
     still={"with one bank the last address is the same for every table": "memory.last[0-8]"},
 )

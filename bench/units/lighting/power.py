@@ -62,9 +62,9 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("s_*", "x_?_sum", "x_?_difference"),
-        "It is the lowest of 17 bits that are cut off in the end. It carries past them once in 2^17 terms.",
+        "The bit is the lowest of 17 bits that are cut off. It carries past them once in 2^17 terms.",
     )
-    | {"x_9": "It is for the saturation, and p + q - pq never does."},
+    | {"x_9": "The bit serves the saturation, but p + q - pq never saturates."},
     still={
         "the second bit of a square is 0": "x_{0-8}_product[1]",
         "twice a number is even": "x_{0-8}_sum[0]",

@@ -201,16 +201,14 @@ RECORD = Record(
         "a slope is n / 2, and n of 10 bits, normalised to 17, ends in seven zeros": (
             "datapath.slope.slope_word[0-16] datapath.slope.scale[0-6] datapath.product[0-6]"
         ),
-        "the exponent stays for a run, so that what follows from it does not fall": (
+        "the exponent is constant in a run, so no bit of a word made from it falls": (
             "slope_word[17-26] slope.scale[7-16] slope.shift[0-3] slope.{read,boundary}[0-16] "
             "boundaries.port__data[0-16]"
         ),
         "the second bit of a square is 0": "datapath.square[1]",
     },
     waivers={
-        "argument": (
-            "An argument of 1 or more is lit under an exponent of 1 only, for which the bit is cut off."
-        ),
+        "argument": ("An argument of 1 or more is lit only under an exponent of 1. Then the bit is cut off."),
         "slope_word": "The slope is n / 2. The 17 bits from its first bit on leave out the lowest bit.",
     },
 )

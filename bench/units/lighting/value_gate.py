@@ -175,11 +175,11 @@ RECORD = Record(
     axis="n u in the middle of the span",
     logarithmic=True,
     waivers={
-        "threshold": "Its first bit inverts it. No exponent sets this bit: its threshold would be 4 or more.",
-        "least_0": "The bulge has another sign for a single value, a power of two.",
+        "threshold": "No exponent sets the controlling bit: its threshold would be 4 or more.",
+        "least_0": "The fault changes the sign of the bulge for a single value only, a power of two.",
     },
     still={
-        "the exponent stays for a run, so that what follows from it does not fall": (
+        "the exponent is constant in a run, so no bit of a word made from it falls": (
             "threshold[0-16] thresholds.port__data[0-16]"
         ),
         "an exponent of 1 or more has a threshold under 4": "threshold[17] thresholds.port__data[17]",

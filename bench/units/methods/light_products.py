@@ -64,7 +64,7 @@ RECORD = Record(
     stimuli={"normals": Stimulus(_normals, 1000, repeats=2), "corners": Stimulus(_corners, 300, repeats=16)},
     axis="",
     still={
-        "L and H stay for a run, so that what follows from them does not fall": (
+        "L and H are constant in a run, so no bit of a word made from them falls": (
             "multiplier_?_b[0-17] multiplier_?[0-17]"
         ),
         "the second bit of a square is 0": "multiplier_{3-5}_product[1]",

@@ -44,6 +44,6 @@ RECORD = Record(
         "spare": "A straight line has no second difference: the bit is 0 already.",
         "payload": "A straight line has no second difference: the bit is 0 already.",
         "*_second_difference": "A straight line has no second difference: the bit is 0 already.",
-        "values": "It is for the saturation below -1, which no component reaches, as normals are not longer.",
+        "values": "The bit serves the saturation below -1. No component of a unit normal reaches it.",
     },
 )

@@ -37,10 +37,10 @@ RECORD = Record(
     status=status,
     stimuli=STIMULI,
     waivers={
-        "values": "It is for the saturation below -1, which no component reaches, as normals are not longer.",
-        "square": "It is for the saturation at 1. The largest word of the table is 2048/2049.",
+        "values": "The bit serves the saturation below -1. No component of a unit normal reaches it.",
+        "square": "The bit serves the saturation at 1. The largest word of the table is 2048/2049.",
         "first_order_0": "While the output is stalled, the register holds no word that is still read.",
-        "middle_2": "It counts at 2 and more. A middle normal is at most 1 long, plus a rounding.",
+        "middle_2": "The bit counts at 2 and more. A middle normal is at most 1 long, plus a rounding.",
     },
     still={
         "at most 8 spans are in the middle normal and 2 in GPQ; 3 of them are outside the inner FIFO": (

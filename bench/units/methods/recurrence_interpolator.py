@@ -57,8 +57,8 @@ RECORD = Record(
     },
     waivers=SETUP.waivers
     | {
-        "phase_entry": "While the output is stalled, all but the value in the register has been read.",
-        "recurrence_0.*": "It tells the last pixel of a span, which nothing reads.",
+        "phase_entry": "While the output is stalled, only the value in the register has not been read yet.",
+        "recurrence_0.*": "The signal tells the last pixel of a span. Nothing reads this signal.",
     },
     still={
         "a cosine has ten bits less than x": "top.{spare,payload}[0-9] top.{spare,payload}[368-377]",

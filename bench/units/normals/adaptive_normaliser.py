@@ -39,7 +39,7 @@ def straight_lines(left: np.ndarray, right: np.ndarray, levels: np.ndarray, t: n
     parts = 2.0**levels
     segment = np.minimum(np.floor(t * parts), parts - 1)
     before, after = (interpolate("slerp", left, right, (segment + k) / parts) for k in (0, 1))
-    # Points of the great circle have the length of its left end. So the last point is set to the right end.
+    # `interpolate` gives every point the length of the left end. So the last point is set to the right end.
     after = np.where((segment + 1 == parts)[:, np.newaxis], right, after)
     return before + (t * parts - segment)[:, np.newaxis] * (after - before)
 
@@ -69,13 +69,13 @@ def _expect(unit, case):
 
 
 def spans_of(ends, length):
-    """Input of spans with given lengths and ends, a pair of arrays."""
+    """Input of spans. ``ends`` are the arrays of the left and of the right normals."""
     left, right = ends
     return Case({"normal_left": left, "normal_right": right, "length": length})
 
 
 def _spans(unit, rng, count):
-    """Normals at angles of every size, and of arbitrary codes. Spans are short, and some have no pixel."""
+    """Short spans at angles of every size, and between arbitrary codes. Some spans have no pixel."""
     length = short_lengths(rng, count)
     return spans_of(any_pairs(rng, len(length)), length)
 
@@ -91,13 +91,16 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many spans, some long, and middles of spans whose u is at the border of its rounding."""
+    """Many spans, some of them long.
+
+    Further spans have five pixels, and a u, ``1 - N_l·N_r``, at the border of its rounding.
+    """
     few = count // 100
     length = np.r_[rng.integers(1, 70, count), rng.integers(1000, 4096, few)]
     angles = rng.uniform(0, 95, len(length))
     angles[::2] = 10.0 ** rng.uniform(-4, 1, len(angles[::2]))
     ends = code_pairs_at(rng, len(length), angles)
-    # The third of five pixels has the normal half-way.
+    # The third of five pixels has the middle normal.
     border = pairs_chosen(
         *code_pairs_at(rng, 1500, 90),
         lambda u: (u < ONE_SQUARED.codes) & (abs(u % (1 << 17) - (1 << 16)) < 4),
@@ -117,7 +120,7 @@ def _variants():
                 "spans to 90 degrees, 1 to 4095 pixels",
                 beat={"normal_left": AXIS, "normal_right": AXIS, "length": 64},
                 note="model: straight lines; the bisection's fit counts as arithmetic; "
-                "latency of equal normals",
+                "latency: for equal normals",
                 as_published=published,
                 long=exponent == 6,
             ),
@@ -142,21 +145,23 @@ RECORD = Record(
     },
     waivers={
         "fsm_state": (
-            "In the first state all bits of the state are 0, and so is the controlling bit of the next."
+            "In the first state all bits of the state are 0. The controlling bit of the next state is 0, too."
         ),
-        "write_index": "Ends are at most 16 of 32 segments apart. So the bit of 32 is 0 already.",
-        "inner_level": "The level falls from 1 on only, so that the controlling bit, the borrow, is not set.",
-        "angle": "It is for u of 1 or more, and from 45 degrees on the cosine is read in its place.",
+        "write_index": "A middle is at most 16 of 32 segments from its ends. So the bit for 32 is 0.",
+        "inner_level": "The FIFO's level falls from 1 or more, so the controlling bit, the borrow, is 0.",
+        "angle": "The bit is for u of 1 or more. From 45 degrees on the unit reads the cosine in its place.",
     },
     still={
         "ends that are bisected are at least two of 32 segments apart": "top.index[0]",
-        "ends are at most half of 32 segments apart, also when written last": "half[5] write_index[5]",
-        "the unit has 16 spans inside at most": "ready_spans[5-6]",
+        "a middle is at most 16 of 32 segments from its ends, and its index is under 32": (
+            "half[5] write_index[5]"
+        ),
+        "at most 16 spans are in the unit": "ready_spans[5-6]",
         "a reciprocal is normalised and not negative, so that its first bits are 01": (
             "reciprocal[16-17] reciprocals.table_port__data[16]"
         ),
         "the pixels of a segment take at most the steps in `available`, 14 bits": "advance[14-23]",
-        "a segment of 4096 steps is divided": "top.count[12]",
+        "a segment of 4096 steps is always divided": "top.count[12]",
         "a fraction is not negative": "phi[17]",
     },
 )

@@ -65,7 +65,7 @@ def _case(a, b):
 
 
 def _pairs(unit, rng, count):
-    """Pairs of normals at angles of every size, and of arbitrary codes."""
+    """Pairs of normals at angles of every size, and pairs of arbitrary codes."""
     return _case(*any_pairs(rng, count))
 
 

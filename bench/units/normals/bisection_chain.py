@@ -84,7 +84,7 @@ def _case(ends, level):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at angles of every size, and of arbitrary codes. Most chains are short."""
+    """Pairs of normals at angles of every size, and pairs of arbitrary codes. Most chains are short."""
     # A level takes 17 cycles.
     return _case(any_pairs(rng, count), 1 + (rng.zipf(2, count) - 1) % _LEVELS)
 
@@ -153,7 +153,7 @@ RECORD = Record(
             "l starts at 0, and a step gives at most l/2 + 1. So l is never negative, stays below 2, and "
             "never saturates."
         ),
-        "factor": "Operands are read on the cycle after they come; m, a product of factors, is not negative.",
+        "factor": "Operands are read on the cycle after they come. m, a product of factors, is not negative.",
     },
     still={
         "weights are not negative": "top.weight_{l,m}[21]",

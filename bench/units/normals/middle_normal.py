@@ -47,7 +47,7 @@ def _case(left, right):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at angles of every size, and of arbitrary codes."""
+    """Pairs of normals at angles of every size, and pairs of arbitrary codes."""
     return _case(*any_pairs(rng, count))
 
 
@@ -91,8 +91,8 @@ RECORD = Record(
         "last bits": Stimulus(_last_bits, 40_000, stalled=False),
     },
     waivers={
-        "slot": "Slot 4 becomes 6, which 5 follows, and only 0 and 5 are told from the others.",
-        "turn": "Slot 4 becomes 6, which 5 follows, and only 0 and 5 are told from the others.",
+        "slot": "The fault makes slot 6 of slot 4. Slot 5 still follows. Only slots 0 and 5 have effects.",
+        "turn": "The fault makes slot 6 of slot 4. Slot 5 still follows. Only slots 0 and 5 have effects.",
     },
     still={
         "the polynomial's products are at most 0.0127 and 0.0293": "rounded_2[13-16] rounded_1[14-16]",
