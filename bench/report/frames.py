@@ -32,6 +32,7 @@ from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import encode
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.errors import InputError
@@ -145,7 +146,8 @@ def frames(
 ) -> list[dict[str, Any]]:
     """Frames of a design: their errors, cycles and pictures.
 
-    Each error is between two images, over the pixels that show the surface:
+    Frames have codes of linear light, and so have their errors. Verdicts and perceived differences are of the
+    frames encoded as sRGB. Each error is between two images, over the pixels that show the surface:
 
     - ``model``: Phong shading with the design's model, against Phong shading with Blinn's model, both in
       float64. Phong shading interpolates normals over the triangle, and normalises them at every pixel, as on
@@ -280,9 +282,11 @@ def _judged(
     for kind, (shown, reference) in pairs.items():
         figures = error_figures(shown, reference * 255, exact.mask)
         values |= {f"{kind}_{key}": value for key, value in asdict(figures).items()}
-        difference = perceived(shown, reference * 255, exact.mask)
+        # A monitor takes codes of sRGB.
+        codes = [255 * encode(light) for light in (shown / 255, reference)]
+        difference = perceived(*codes, exact.mask)
         values |= {f"{kind}_{key}": value for key, value in asdict(difference).items()}
-        verdicts[kind] = identical_to_the_eye(figures.max_lsb, difference)
+        verdicts[kind] = identical_to_the_eye(error_figures(*codes, exact.mask).max_lsb, difference)
     return {
         "errors": {key: value if math.isfinite(value) else None for key, value in values.items()},
         "verdicts": verdicts,

@@ -237,7 +237,7 @@ def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Dra
         # Room for labels below the most exact designs.
         panel.set_ylim(bottom=max(min(of[kind][1] for of in drawn), _LEAST_LSB) / 4)
         _ticks(panel, in_ns)
-    axes[0].set_ylabel("largest error over all scenes, LSB of 8 bits")
+    axes[0].set_ylabel("largest error over all scenes, LSB of linear light")
     for panel, (kind, _) in zip(axes, kinds, strict=True):
         labels = [
             Label(

@@ -29,9 +29,12 @@ AXES = {
     "arithmetic": "Error against the same method and model in float64, caused by the widths of words.",
     "model": "Error of the reflection model against Blinn's, both exact in float64. Arithmetic does not "
     "change this error.",
-    "max_lsb": "The largest error over all pixels and channels. 1 LSB is a step of an 8-bit channel.",
-    "p999_lsb": "One value in a thousand has a larger error. 1 LSB is a step of an 8-bit channel.",
-    "rmse_lsb": "Root of the mean square over pixels and channels. 1 LSB is a step of an 8-bit channel.",
+    "max_lsb": "The largest error over all pixels and channels. 1 LSB is a step of an 8-bit channel of "
+    "linear light.",
+    "p999_lsb": "One value in a thousand has a larger error. 1 LSB is a step of an 8-bit channel of "
+    "linear light.",
+    "rmse_lsb": "Root of the mean square over pixels and channels. 1 LSB is a step of an 8-bit channel of "
+    "linear light.",
     "psnr_db": "Peak signal to noise ratio. More is better, so the axis is reversed.",
     "flip_p99": "FLIP, the difference that an eye sees, 0 to 1. One pixel in a hundred has more.",
     "flip_max": "FLIP, the difference that an eye sees, 0 to 1. The value of the worst pixel.",

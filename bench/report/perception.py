@@ -67,7 +67,7 @@ def _color() -> ModuleType:
 def perceived(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> Perceived:
     """FLIP and CIEDE2000 between two pictures.
 
-    Channels are read as sRGB. FLIP (Andersson and others 2020, LDR) is for a viewer who sees 67 pixels a
+    Channels are codes of sRGB. FLIP (Andersson and others 2020, LDR) is for a viewer who sees 67 pixels a
     degree, its default. A pixel's FLIP value depends on its neighbours, also on the background. CIEDE2000 is
     of each pixel alone, under D65 for the 2 degree observer. Only pixels of the mask count, because the
     background would make both figures too small.
@@ -117,7 +117,7 @@ def identical_to_the_eye(largest_lsb: float, difference: Perceived) -> bool:
     Parameters
     ----------
     largest_lsb : float
-        Largest error of a channel, as in `ErrorFigures.max_lsb`.
+        Largest error of a channel, as in `ErrorFigures.max_lsb`; in codes of sRGB.
     difference : Perceived
         Perceived differences.
     """

@@ -177,7 +177,8 @@ def _command(settings: Mapping[str, Any]) -> str:
     for name in ("method", "model", "exponent", "ambient", "diffuse", "specular"):
         words += [f"--{name}", str(settings[name])]
     words += ["--size", f"{settings['width']}x{settings['height']}"]
-    return shlex.join([*words, "--materials", "one", "--background", "0", "--json", "figures.json"])
+    words += ["--transfer", "linear", "--materials", "one", "--background", "0"]
+    return shlex.join([*words, "--json", "figures.json"])
 
 
 def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any]]:

@@ -93,7 +93,8 @@ def fronts_of(points: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
 def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     """Paragraphs on the points: the trade of each mesh and exponent, and explanations of the measures."""
     of_error = (
-        "Errors are in steps (LSB) of an 8-bit channel, over the pixels that show the surface:\n\n"
+        "Errors are in steps (LSB) of an 8-bit channel of linear light, over the pixels that show the "
+        "surface:\n\n"
         "- *Model* error: the reflection model against Blinn's, both in float64 with exact normals. "
         "Arithmetic does not change this error.\n"
         "- *Arithmetic* error: the frame against the same method and model in float64. A correctly rounded "
@@ -104,10 +105,10 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "model, it has the model (R·V)^n.\n\n"
         "Methods of the documents have points with their operand N.H, and with the more exact operand "
         "1 - N.H. If the published variant differs, it has points, too. FLIP and CIEDE2000 measure the "
-        "difference that an eye sees. A frame is *identical to the eye* if its largest error is at most "
-        f"{LARGEST_LSB:g} LSB. With a larger error two conditions must hold. FLIP is at most "
-        f"{FLIP_P99:g} in 99 % of the pixels, and at most {FLIP_MAX:g} in all. CIEDE2000 is at most "
-        f"{CIEDE2000_P99:g} in 99 % of the pixels, and at most {CIEDE2000_MAX:g} in all."
+        "difference that an eye sees, of frames encoded as sRGB. A frame is *identical to the eye* if its "
+        f"largest error is at most {LARGEST_LSB:g} LSB of sRGB. With a larger error two conditions must "
+        f"hold. FLIP is at most {FLIP_P99:g} in 99 % of the pixels, and at most {FLIP_MAX:g} in all. "
+        f"CIEDE2000 is at most {CIEDE2000_P99:g} in 99 % of the pixels, and at most {CIEDE2000_MAX:g} in all."
     )
     dates = {point["hardware"]["placed"] for point in points if point["hardware"].get("placed")}
     placed = "this report" in dates

@@ -140,7 +140,7 @@ def _drawing(
                 text = f"{angle:.3g}°, any n" if same else f"{angle:.3g}°, n = {exponent}"
                 right.text(angle, y - 0.42, text, fontsize=6.5, ha="center", va="center", color=style.color)
     left.axvline(GOOD, color="#59626c", linewidth=0.8, linestyle="--")
-    left.set(xscale="log", xlabel="largest error, LSB of 8 bits")
+    left.set(xscale="log", xlabel="largest error, LSB of linear light")
     left.set_title("worst case", fontsize=9, loc="left")
     right.set(xscale="log", xlabel="widest span that is served whole, degrees")
     right.set_title("end of the range", fontsize=9, loc="left")

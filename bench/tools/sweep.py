@@ -103,7 +103,7 @@ class Candidate:
             words += ["--lights", str(self.lights)] if self.lights != 1 else []
             words += ["--operand", self.operand] if self.operand else []
             words += ["--style", self.style] if self.style != "throughput" else []
-            return shlex.join(words)
+            return shlex.join([*words, "--transfer", self.design.transfer])
         given = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
         # JSON puts strings into double quotes. The shell's single quotes can then surround them.
         arguments = ", ".join(f"{name}={json.dumps(x)}" for name, (x, usual) in given.items() if x != usual)

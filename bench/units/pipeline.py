@@ -349,7 +349,6 @@ def _counters(unit, rng, count):
 
 # Variants.
 
-
 _FULL = preset("chord-local", "cosquad", lights=2, gate=True)
 _BOTH = ("renormalise, blinn", "quadratic, cosquad")
 """Variants of normals that get every stimulus: one with the default model's table, one of the documents."""
@@ -401,8 +400,7 @@ LONG_DESIGNS: dict[str, ShadingPipeline] = {
     "gate, exponent": replace(_FULL, build=Build(exponent=20)),
     "grey": preset("renormalise", None, grey=True),
     "srgb, compact": preset(style="compact", transfer="srgb"),
-    "srgb, grey, compact": preset(style="compact", grey=True, transfer="srgb"),
-    "srgb, without lights, grey, compact": preset(lights=0, grey=True, style="compact", transfer="srgb"),
+    "srgb, without lights, grey": preset(lights=0, grey=True, transfer="srgb"),
     "few bits": replace(_FULL, **_LESS),
 }
 """Further pipelines by name, for the long run."""
