@@ -1,9 +1,8 @@
-"""Texts of files in any encoding and with any line ends, and texts of numbers and colours."""
+"""Texts of files in any encoding and with any line ends, and texts of numbers."""
 
 import codecs
-import re
 
-__all__ = ["color_of_text", "is_wide", "numbers_of_text", "plain_text"]
+__all__ = ["is_wide", "numbers_of_text", "plain_text"]
 
 # UTF-32 first: the little-endian mark of UTF-16 is the first half of that of UTF-32.
 _MARKS = {
@@ -52,17 +51,3 @@ def numbers_of_text(text: str) -> list[float]:
         If a part is not a number.
     """
     return [float(part) for part in text.split(",")]
-
-
-def color_of_text(text: str) -> list[float]:
-    """Read the channels of ``#rrggbb``, 0 to 1 each, or of numbers with commas; one number is all three.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a colour.
-    """
-    if re.fullmatch("#[0-9a-fA-F]{6}", text):
-        return [int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    numbers = numbers_of_text(text)
-    return numbers * 3 if len(numbers) == 1 else numbers

@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from blysk.golden.reference.scene import LARGEST_SIDE
-from blysk.golden.text import color_of_text, numbers_of_text
+from blysk.golden.reference.transfer import color_of_text
+from blysk.golden.text import numbers_of_text
 from blysk.sim.errors import InputError, one_line
 
 __all__ = [
@@ -224,7 +225,10 @@ class Vector(Value):
 
 
 class Color(Value):
-    """A colour: ``#rrggbb``, three numbers, or one number for all channels. Its value is three numbers."""
+    """A colour: ``#rrggbb`` in sRGB, three numbers of linear light, or one number for all channels.
+
+    Its value is three numbers of linear light.
+    """
 
     name = "COLOR"
 

@@ -19,10 +19,12 @@ from blysk.sim.value_types import Choice, OutputFile, Whole
 __all__ = ["command"]
 
 _BUILD = {name: BUILD[name] for name in ("pipes", "top", "setups")}
+# The committed figures are of linear light.
+_DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
 
 
 @click.command()
-@options_of(DESIGN)
+@options_of(_DESIGN)
 @options_of(_BUILD)
 @click.option(
     "--family",
@@ -109,7 +111,7 @@ def command(
         blysk fpga --top render --style compact --target 115 --seeds 1
         blysk fpga --top render --style compact --by-unit
     """
-    chosen, build = given_options(context, DESIGN), given_options(context, _BUILD)
+    chosen, build = given_options(context, _DESIGN), given_options(context, _BUILD)
     given = [*chosen, *build, *given_options(context, ["lights", "every_method"])]
     if units and given:
         option = f"--{given[0].replace('_', '-')}"

@@ -62,17 +62,15 @@ def _floor(width: int, height: int, _: int) -> Scene:
 def _ring(width: int, height: int, _: int) -> Scene:
     camera = Camera((2.2, 3.2, 4.6), (0, 0, 0), projection="perspective", field_of_view=32)
     steel = Material((0.06,) * 3, (0.42, 0.44, 0.48), (0.7,) * 3, 120)
-    blue = tuple(code / 255 for code in (0x30, 0x4A, 0x70))
-    lights = [Light((-0.6, 0.9, 0.5), (0.9, 0.88, 0.84)), Light((0.9, 0.1, 0.6), blue)]
+    lights = [Light((-0.6, 0.9, 0.5), (0.9, 0.88, 0.84)), Light((0.9, 0.1, 0.6), "#304a70")]
     return Scene(ring(), camera, width, height, steel, lights)
 
 
 def _lamp(width: int, height: int, triangles: int) -> Scene:
     camera = Camera((3.5, 5.0, 7.5), (0.2, 1.4, 0), projection="perspective", field_of_view=34)
     clay = Material((0.04,) * 3, (0.5, 0.52, 0.55), (0.6,) * 3, 80)
-    night = tuple(code / 255 for code in (0x20, 0x34, 0x60))
     lamp = Light(color=(1.0, 0.9, 0.75), position=(-2.6, 3.4, 3.0))
-    lights = [lamp, Light((0.8, 0.2, -0.3), night)]
+    lights = [lamp, Light((0.8, 0.2, -0.3), "#203460")]
     return Scene(teapot(triangles), camera, width, height, clay, lights, viewer="near")
 
 

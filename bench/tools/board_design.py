@@ -53,6 +53,9 @@ _SHINIER = 4
 _RENDERER_BLOCKS = 19
 """Block RAMs, as placed, of the renderer's tables and buffers, of command lists and of motion."""
 
+_TRANSFER_BLOCKS = 2
+"""Block RAMs of the table of sRGB, with a port for each channel."""
+
 
 def gpu_of(
     board: Board, mesh: str, given: Mapping[str, Any], colours: str | None = None
@@ -91,7 +94,7 @@ def gpu_of(
     scenes = _presets(scene, settings["up"])
     red, green, blue = background_code(scene, design.transfer).tolist()
     buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=(red, green, blue))
-    _check_memory(board, mesh, scene, buffer)
+    _check_memory(board, mesh, scene, buffer, 0 if design.transfer == "linear" else _TRANSFER_BLOCKS)
     try:
         drawing = Drawing.of(
             scenes, design, lines=buffer.lines, axis=settings["up"], controls=Controls(materials=2, lights=2)
@@ -138,11 +141,11 @@ def _presets(scene: Scene, up: Any) -> list[Scene]:
     ]
 
 
-def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer) -> None:
-    """Refuse a mesh that does not fit into the block RAMs beside the bands."""
+def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer, tables: int) -> None:
+    """Refuse a mesh that does not fit into the block RAMs beside the bands and further tables."""
     colours = block_rams(2 * buffer.pixels, sum(buffer.colour_bits))
     depths = block_rams(buffer.pixels, 27)
-    left = board.block_rams - colours - depths - _RENDERER_BLOCKS
+    left = board.block_rams - colours - depths - _RENDERER_BLOCKS - tables
     screen_bits = 2 * GRID.bits + DEPTH.width + 3 * ATTRIBUTE.width + 1
     mesh, most = scene.mesh, MeshMemory.LARGEST - 1
     fits = len(mesh.faces) <= most and len(mesh.vertices) <= most

@@ -10,8 +10,10 @@ COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 
 _LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
 
-DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
-"""Defaults that differ from the defaults of a rendering."""
+DEFAULTS = {"triangles": 1000, "back_faces": "cull", "transfer": "linear"}
+"""Defaults that differ from the defaults of a rendering. The table of sRGB takes two block RAMs, and the
+bitstream for the ULX3S-25F leaves one free.
+"""
 
 _METHOD = (
     "Method of interpolation along a span.  [default: quotient; renormalise with a model without a table]"

@@ -154,13 +154,15 @@ def pipelines_of(
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
     """The core by options of design and build, with one method, or with every method that serves it.
 
+    By default its pixels are linear light.
+
     Raises
     ------
     OptionError
         If a value is not accepted, or the only method does not serve the core.
     """
     for method in METHODS if every else (given.get("method"),):
-        made = design(lights=lights, **{**given, "method": method})
+        made = design(lights=lights, **{"transfer": "linear", **given, "method": method})
         try:
             made = built(made, build or {})
         except OptionError as error:

@@ -42,6 +42,7 @@ from blysk.golden.reference.reflection import (
     PowerModel,
 )
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.transfer import color_of_text
 from blysk.sim.engines.engine import StopReason
 from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.wasm import build, format_of, ports_of
@@ -172,8 +173,8 @@ MESHES = {
 
 
 def design_of(method: str, model: str) -> ShadingPipeline:
-    """The pipeline of a module: one light, and a highlight gate if the method can have one."""
-    return preset(method, model, gate=METHODS[method].serves_gate)
+    """The pipeline of a module: one light, sRGB, and a highlight gate if the method can have one."""
+    return preset(method, model, gate=METHODS[method].serves_gate, transfer="srgb")
 
 
 @cache
@@ -186,7 +187,7 @@ def _cameras(mesh: str) -> list[Camera]:
 
 
 def _channels(color: str) -> tuple[float, ...]:
-    return tuple(int(color[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return tuple(color_of_text(color))
 
 
 def scene_of(settings: Mapping[str, Any]) -> Scene:
@@ -335,7 +336,7 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     found: list[str] = []
     streams: dict[str, list[int]] = {}
     for method in methods:
-        design = preset(method, accuracy.model_of(method))
+        design = preset(method, accuracy.model_of(method), transfer="srgb")
         streams[method] = []
         for exponent in BANDS:
             cut, spans = spans_of(mesh, view, exponent, design)
@@ -378,7 +379,7 @@ def module_of(method: str, model: str) -> dict[str, Any]:
     stages = (
         ("interpolator", "Interpolator: normals, or N·L and N·H", first - 1, 0),
         ("light", "Light: diffuse and specular term", 0, lit),
-        ("intensity", "Intensity: products and sums", lit, done - 1),
+        ("intensity", "Intensity: products, sums, codes of sRGB", lit, done - 1),
         ("output", "Pixel", done - 1, done),
     )
     return {

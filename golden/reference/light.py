@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.reference.geometry import normalise
-from blysk.golden.text import color_of_text, numbers_of_text
+from blysk.golden.reference.transfer import color_of_text
+from blysk.golden.text import numbers_of_text
 
 __all__ = ["Light", "Triple", "color_triple", "triple"]
 
@@ -85,8 +86,8 @@ class Light:
         Vector *to* the light, of any length but 0, stored as a unit vector. A text may hold the three
         numbers: ``"0,1,0"``.
     color : three floats, float or str
-        Intensity I_i, at least 0: of each channel, one number for all channels, or ``"#rrggbb"``. Stored as
-        three floats.
+        Intensity I_i, at least 0: of each channel, one number for all channels, or ``"#rrggbb"`` in
+        sRGB. Stored as three floats of linear light.
     position : three floats, optional
         Position of a point light, in the mesh's units, in place of ``direction``.
     attenuation : three floats

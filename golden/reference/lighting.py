@@ -61,8 +61,8 @@ class Material:
     Parameters
     ----------
     ambient, diffuse, specular : three floats, float or str, each
-        k_a, k_d, k_s, at least 0: of each channel, one number for all channels, or ``"#rrggbb"``. Stored as
-        three floats. Their sum may exceed 1: the intensity saturates.
+        k_a, k_d, k_s, at least 0: of each channel, one number for all channels, or ``"#rrggbb"`` in sRGB.
+        Stored as three floats of linear light. Their sum may exceed 1: the intensity saturates.
     exponent : int
         Exponent n of the highlight, 1 to 1000.
     roughness : float, optional

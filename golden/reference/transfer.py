@@ -1,9 +1,22 @@
 """Output transfer in float64: from linear light to the values that the codes of a picture stand for."""
 
+import re
+
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["LARGEST_SLOPE", "SPACES", "TRANSFERS", "decode", "encode", "encode_frame", "slope"]
+from blysk.golden.text import numbers_of_text
+
+__all__ = [
+    "LARGEST_SLOPE",
+    "SPACES",
+    "TRANSFERS",
+    "color_of_text",
+    "decode",
+    "encode",
+    "encode_frame",
+    "slope",
+]
 
 SPACES = {"srgb": "sRGB", "linear": "linear light"}
 """Output transfers, and the names of the spaces of their codes, for texts: the curve of sRGB, or light as it
@@ -136,3 +149,20 @@ def _is_linear(transfer: str) -> bool:
     if transfer not in TRANSFERS:
         raise ValueError(f"transfer must be one of {', '.join(TRANSFERS)}, not {transfer!r}")
     return transfer == "linear"
+
+
+def color_of_text(text: str) -> list[float]:
+    """Read a colour: ``#rrggbb``, or numbers with commas; one number is all three channels.
+
+    ``#rrggbb`` has codes of sRGB, which are decoded to linear light from 0 to 1. Numbers are linear light.
+
+    Raises
+    ------
+    ValueError
+        If the text is not a colour.
+    """
+    if re.fullmatch("#[0-9a-fA-F]{6}", text):
+        codes: list[float] = decode(np.array([int(text[k : k + 2], 16) for k in (1, 3, 5)]) / 255).tolist()
+        return codes
+    numbers = numbers_of_text(text)
+    return numbers * 3 if len(numbers) == 1 else numbers

@@ -1,17 +1,15 @@
 """Every option of scenes and designs: its type, default, help text and key in a scene file."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
-
-import click
 
 from blysk.golden.build import PIPES, PORTS, SETUPS, STYLES, TOPS, Style
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
-from blysk.golden.presets import METHODS, MODEL_LINES, PUBLISHED
+from blysk.golden.presets import METHODS, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.light import Triple
@@ -19,21 +17,19 @@ from blysk.golden.reference.lobes import TabulatedModel
 from blysk.golden.reference.scene import BACK_FACES, VIEWERS
 from blysk.golden.reference.transfer import TRANSFERS
 from blysk.sim.api.lights import Lights, LightsLike
+from blysk.sim.api.option_types import Direction, ReflectionOption, Roughness
 from blysk.sim.meshes.normals import DEFAULT_CREASE
 from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, MAX_TRIANGLES, MIN_TRIANGLES
-from blysk.sim.run_files import reads
 from blysk.sim.value_types import (
     Choice,
     Color,
     Few,
     Number,
-    PartError,
     Size,
     Truth,
     Value,
     Vector,
     Whole,
-    shown,
 )
 
 if TYPE_CHECKING:
@@ -75,7 +71,7 @@ COEFFICIENTS = ("ambient", "diffuse", "specular", "exponent", "roughness", "fres
 """Options of a material."""
 
 ColorLike = str | float | Triple
-"""A colour: ``"#rrggbb"``, one number, or three."""
+"""A colour: ``"#rrggbb"`` in sRGB, or one number or three of linear light."""
 
 Source = Union[str, os.PathLike[str], Mesh, Sequence[Any], "trimesh.Trimesh", "trimesh.Scene"]
 """``"teapot"``, the name of a mesh file or scene file, a `Mesh`, a mesh or scene of trimesh, or arrays.
@@ -114,82 +110,6 @@ class Option(NamedTuple):
     key: str = ""
 
 
-class ReflectionOption(Choice):
-    """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
-
-    def __init__(self) -> None:
-        super().__init__("reflection model", MODEL_LINES)
-        self.points = "give a .csv file of cosines N.H rising from 0 to 1 and values from 0 to 1"
-        self.remedy = f"{self.points}, or {self.remedy}"
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """Placeholder in the help text: the names, or a file."""
-        return f"[{'|'.join(self.names)}|FILE.csv]"
-
-    def check(self, value: Any) -> Any:
-        """The name; or the curve of a file."""
-        if isinstance(value, TabulatedModel):
-            return value
-        if not isinstance(value, str) or not value.lower().endswith(".csv"):
-            return super().check(value)
-        try:
-            return TabulatedModel.of_csv(os.fspath(reads(value)))
-        except OSError as error:
-            raise PartError("", f"{shown(value)} cannot be opened ({error.strerror})", self.points) from None
-        except ValueError as error:
-            raise PartError("", str(error), self.points) from None
-
-
-class Roughness(Number):
-    """A number greater than 0 and at most 1."""
-
-    def __init__(self) -> None:
-        super().__init__(0, 1)
-        self.remedy = "give a number greater than 0 and at most 1"
-
-    def check(self, value: Any) -> Any:
-        """A `float` in the range."""
-        value = super().check(value)
-        if not value:
-            raise ValueError("out of range")
-        return value
-
-
-class Direction(Vector):
-    """A direction, or a word for one.
-
-    Parameters
-    ----------
-    words : mapping of str
-        Value of each word: a vector, or the word itself if its vector depends on other options.
-    """
-
-    def __init__(self, words: Mapping[str, str | Triple]):
-        super().__init__("a direction", direction=True)
-        self.words = words
-        self.remedy = f"give X,Y,Z, a vector other than 0, or one of {', '.join(words)}"
-        self.metavar = f"X,Y,Z|{'|'.join(words)}"
-
-    @property
-    def in_python(self) -> str:
-        """Numbers, the text, or a word."""
-        return self.remedy.replace("X,Y,Z", 'three numbers or "X,Y,Z"', 1)
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """Placeholder in the help text: numbers, or a word."""
-        return self.metavar
-
-    def parse(self, text: str) -> Any:
-        """A word as it is, or numbers with commas between them."""
-        return text if text in self.words else super().parse(text)
-
-    def check(self, value: Any) -> Any:
-        """A tuple of `float`, or a word whose vector depends on other options."""
-        if isinstance(value, str) and value in self.words:
-            return self.words[value]
-        return super().check(value)
-
-
 LIGHTS = ("lights", "point_lights", "spot_lights")
 """Options of lights. A scene has the lights of the first option first, and so on."""
 
@@ -199,7 +119,13 @@ _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)
 
 SCENE: dict[str, Option] = {
     "size": Option(Size(), (640, 480), "Size of the picture.", "size"),
-    "background": Option(Color(), "#1a1c20", "Colour of the pixels that show no surface.", "background"),
+    "background": Option(
+        Color(),
+        "#1a1c20",
+        "Colour of the pixels that show no surface. In every option of a colour #rrggbb is sRGB, and numbers "
+        "are linear light.",
+        "background",
+    ),
     "ambient_light": Option(Color(8), 1.0, "Intensity I_a of the ambient light.", "ambient_light"),
     "back_faces": Option(
         Choice("treatment of back faces", BACK_FACES),
@@ -359,7 +285,7 @@ DESIGN: dict[str, Option] = {
     ),
     "transfer": Option(
         Choice("transfer", TRANSFERS),
-        "linear",
+        "srgb",
         "Codes of the pixels. srgb: encoded by the curve of sRGB, as monitors expect. linear: linear light.",
         "pipeline.transfer",
     ),

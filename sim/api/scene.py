@@ -35,8 +35,8 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     """A scene with the defaults of the command line.
 
     The mesh, the camera and the lights are scaled by the same power of two, so that no product of coordinates
-    overflows. The picture is the same to the bit. Colours are ``"#rrggbb"``, one number or three. Each option
-    also takes the text of the command line: ``size="640x480"``.
+    overflows. The picture is the same to the bit. Colours are ``"#rrggbb"`` in sRGB, or one number or three
+    of linear light. Each option also takes the text of the command line: ``size="640x480"``.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
     These are the keys. Only ``mesh.file`` is required::
 
         size = [640, 480]
-        background = "#1a1c20"              # or [r, g, b], or one number, each 0 to 1
+        background = "#1a1c20"              # sRGB; or [r, g, b] or one number, linear light, each 0 to 1
         ambient_light = [1, 1, 1]           # up to 8
         back_faces = "flip"                 # "show", "cull"
 
@@ -111,7 +111,7 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
         method = "quotient"
         model = "blinn"
         style = "throughput"                # "compact"
-        transfer = "linear"                 # "srgb": codes by the curve of sRGB
+        transfer = "srgb"                   # codes of the picture; "linear": linear light
         gate = false                        # the highlight gate, of other methods
         # operand = "cosine"                # "one_minus_cosine"; for methods that compute unit normals
         # setup_interval = 4                # for methods with this choice

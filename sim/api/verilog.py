@@ -22,6 +22,7 @@ from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
 from blysk.hdl.render import RendererUnit
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions
 from blysk.sim.api.design import built
+from blysk.sim.api.design import design as default_design
 from blysk.sim.api.options import BUILD, BuildOptions
 from blysk.sim.api.signature import with_options
 from blysk.sim.api.verilog_example import example_of
@@ -185,7 +186,7 @@ def verilog(
     Parameters
     ----------
     design : Design, optional
-        The pipeline, from `design`; by default the design with all defaults.
+        The pipeline, from `design`; by default ``design()``.
     name : str
         Name of the top module.
     **options
@@ -197,7 +198,7 @@ def verilog(
         If the name is not a Verilog identifier, the method takes values of a span but the core triangles, the
         design cannot have this number of pipelines, or the bus does not serve the core.
     """
-    return verilog_and_unit(built(ShadingPipeline() if design is None else design, options), name)[0]
+    return verilog_and_unit(built(default_design() if design is None else design, options), name)[0]
 
 
 def verilog_and_unit(

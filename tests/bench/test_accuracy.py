@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import blysk
-from blysk.bench.accuracy import measure
+from blysk.bench.accuracy import measure, scene_for
 from blysk.golden.frames.compare import compare
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.presets import preset
@@ -26,6 +26,23 @@ def test_measures_every_exponent():
         assert result.total_error.max_lsb > 5
 
 
+@pytest.mark.parametrize("exponent", [10, 1000])
+@pytest.mark.parametrize("ambient", [None, 0.02])
+def test_errors_of_srgb_are_under_an_lsb(ambient, exponent):
+    """Of the bench's grey material, and of the default material in dark ambient light; off the border."""
+    mesh = teapot(992)
+    scene = scene_for(mesh, exponent, 160, 120)
+    if ambient is not None:
+        scene = blysk.scene(
+            (mesh.vertices, mesh.faces, mesh.normals), size=(160, 120), ambient=ambient, exponent=exponent
+        )
+    design = blysk.design().for_materials(scene.materials)
+    assert design.transfer == "srgb"
+    found = compare(scene, design, model_frame(scene, design))
+    assert 0.48 < found.total_error.steady_lsb <= min(0.6, found.bound_lsb)
+    assert found.bound_lsb < 1.2
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("column", "options"),
@@ -41,13 +58,14 @@ def test_measures_every_exponent():
 def test_the_table_in_readme_is_what_its_command_prints(column, options):
     """Its errors, by the bit-accurate model of the frame that the command simulates."""
     text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    assert "`blysk render teapot --exponent 100 --method ... --model ...`" in text
+    command = "`blysk render teapot --transfer linear --exponent 100 --method ... --model ...`"
+    assert command in " ".join(text.split())
     rows = [
         row.split("|")[column].strip()
         for row in re.findall(r"^\| (?:largest error found|bound of it)[^|]*\|(.+)\|$", text, re.MULTILINE)
     ]
     scene = blysk.scene("teapot", exponent=100)
-    design = blysk.design(**options).for_materials(scene.materials)
+    design = blysk.design(transfer="linear", **options).for_materials(scene.materials)
     found = compare(scene, design, model_frame(scene, design))
     assert found.target == ("phong" if design.mirror else "blinn")
     error, bound = rows

@@ -14,6 +14,7 @@ from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.metrics import error_figures
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render, shade_spans, visible_mask
+from blysk.golden.reference.transfer import encode
 from blysk.sim.engines.beats import pack
 from blysk.sim.engines.probes import ObservedPipeline
 
@@ -47,7 +48,7 @@ def test_first_frame_is_that_of_the_native_engine(open_page):
     assert digest(picture_of(page)) == digest(image)
     assert figure(page, "cycles") == run.total_cycles
     assert page.locator("[data-figure=gated]").inner_text() == "no gate"
-    assert 0.3 < figure(page, "largest") < 0.6
+    assert 0.3 < figure(page, "largest") < 0.65
 
 
 def test_true_phong_follows_the_light(open_page):
@@ -63,7 +64,7 @@ def test_true_phong_follows_the_light(open_page):
         shown = digest(picture_of(page))
         assert shown == digest(by_model(state_of(page)))
         digests.add(shown)
-        assert figure(page, "largest") < 0.65
+        assert figure(page, "largest") < 0.75
     assert len(digests) == 5
     assert len(page.evaluate("() => [...document.querySelectorAll('script[src^=spans]')]")) == 1
 
@@ -239,20 +240,20 @@ def test_reference_is_that_of_golden(open_page, reference):
             raster = dataclasses.replace(raster, magnitude_left=ones, magnitude_right=ones)
         reflection = REFLECTION_MODELS[(model != "phong" and entry["model"]) or model]
         if entry["curve"] == "exact":
-            golden = render(scene, "phong", reflection, raster=raster).image
+            golden = encode(render(scene, "phong", reflection, raster=raster).image)
         else:
-            golden = shade_spans(scene, raster, design.interpolator.exact_normals, reflection)
+            golden = encode(shade_spans(scene, raster, design.interpolator.exact_normals, reflection))
         mask = visible_mask(scene, raster)
         figures = error_figures(picture_of(page), golden * 255, mask)
-        # The lengths of exact normals are sent to 19 bits of their logarithm.
-        assert figure(page, "largest") == pytest.approx(figures.max_lsb, abs=2e-4)
-        assert figure(page, "p999") == pytest.approx(figures.p999_lsb, abs=2e-4)
+        # The lengths of exact normals are sent to 19 bits of their logarithm; the curve is steep at black.
+        assert figure(page, "largest") == pytest.approx(figures.max_lsb, abs=2e-3)
+        assert figure(page, "p999") == pytest.approx(figures.p999_lsb, abs=2e-3)
         shown = picture_of(page, "golden").astype(float)
-        assert np.abs(shown - golden * 255)[mask].max() <= 0.5 + 2e-4
+        assert np.abs(shown - golden * 255)[mask].max() <= 0.5 + 2e-3
         errors = np.abs(picture_of(page) - golden * 255).max(axis=-1)
         colors = np.array(web.map_colors())
         # Equal steps to the largest error of the frame; one near the end of a step may be on either side.
-        steps = np.array([[errors + d] for d in (-1e-3, 1e-3)]) / figures.max_lsb * len(colors)
+        steps = np.array([[errors + d] for d in (-3e-3, 3e-3)]) / figures.max_lsb * len(colors)
         low, high = np.clip(np.ceil(steps[:, 0]).astype(int) - 1, 0, len(colors) - 1)
         shown = picture_of(page, "errors")
         either = (shown == colors[low]).all(axis=-1) | (shown == colors[high]).all(axis=-1)

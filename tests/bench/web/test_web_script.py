@@ -13,6 +13,7 @@ from blysk.golden.frames.prepare import constants_of
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import intensity
 from blysk.golden.reference.reflection import REFLECTION_MODELS
+from blysk.golden.reference.transfer import color_of_text, encode
 
 
 def by_script(call, **given):
@@ -66,7 +67,7 @@ def test_vectors_and_constants_of_quotient_are_those_of_python(model, monkeypatc
         for light in lights()
     ]
     settings = [
-        {**state, "color": [1, 128 / 255, 0.2], "light": [1, 1, 1], "exponent": 1 + k}
+        {**state, "color": color_of_text("#ff8033"), "light": [1, 1, 1], "exponent": 1 + k}
         for k, state in enumerate(states)
     ]
     scenes = [
@@ -104,7 +105,7 @@ def test_phong_in_float64_is_that_of_golden():
     rng = np.random.default_rng(6)
     normals = normalise(rng.normal(size=(400, 3)))
     states = [web_data.START | {"direction": list(direction), "exponent": 9} for direction in lights()]
-    color = [int(web_data.START["color"][k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    color = color_of_text(web_data.START["color"])
     scenes = [web_data.scene_of(state) for state in states]
     viewer = scenes[0].camera.viewer
     found = by_script(
@@ -123,5 +124,5 @@ def test_phong_in_float64_is_that_of_golden():
     for scene, (limited, whole) in zip(scenes, found, strict=True):
         given = scene.materials[0], scene.lights, scene.ambient_light, viewer, REFLECTION_MODELS["phong"]
         exact = intensity(normals, *given)
-        np.testing.assert_allclose(limited, np.clip(exact, 0, 1).ravel() * 255, atol=1e-9)
+        np.testing.assert_allclose(limited, 255 * encode(exact).ravel(), atol=1e-9)
         np.testing.assert_allclose(whole, exact.ravel(), atol=1e-12)

@@ -294,7 +294,7 @@ def test_sums_over_one_and_sixteen_lights():
 
 
 def test_texts_and_numbers_are_colours():
-    assert Light("0,0,2", "#ff8000") == Light((0, 0, 1), (1, 128 / 255, 0))
+    assert Light("0,0,2", "#ff8000").color == pytest.approx((1, 0.215861, 0), abs=1e-6)
     assert Light((0, 0, 1), 0.5) == Light((0, 0, 1), grey(0.5)) == Light((0, 0, 1), "0.5,0.5,0.5")
     lamp = Light(position="1,2,3", attenuation="1,0,2", spot="0,-1,0")
     assert lamp == Light(position=(1, 2, 3), attenuation=(1, 0, 2), spot=(0, -1, 0))

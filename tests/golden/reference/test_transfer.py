@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blysk.golden.reference.transfer import LARGEST_SLOPE, TRANSFERS, decode, encode, slope
+from blysk.golden.reference.transfer import LARGEST_SLOPE, TRANSFERS, color_of_text, decode, encode, slope
 
 
 def test_values_of_the_standard():
@@ -21,6 +21,17 @@ def test_decode_is_the_inverse():
     np.testing.assert_allclose(decode(encode(light)), light, atol=1e-7)
     assert np.round(255 * encode(decode(np.arange(256) / 255))).tolist() == list(range(256))
     assert np.all(np.diff(encode(light)) > 0)
+
+
+def test_texts_of_colours():
+    """Codes of sRGB are decoded, numbers are linear light."""
+    assert color_of_text("#ff8000") == pytest.approx([1, 0.215861, 0], abs=1e-6)
+    assert color_of_text("#FFFFFF") == [1, 1, 1]
+    assert color_of_text("0.5") == [0.5, 0.5, 0.5]
+    assert color_of_text("0.1,2,3") == [0.1, 2, 3]
+    for text in ("#ff80", "red", "#gggggg"):
+        with pytest.raises(ValueError, match="could not convert"):
+            color_of_text(text)
 
 
 def test_values_outside_are_limited():

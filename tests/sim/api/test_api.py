@@ -94,7 +94,7 @@ def test_a_scene_warns_of_what_is_not_read(tmp_path):
 def test_frame_is_that_of_the_model(frame):
     expected = model_frame(frame.scene, frame.design)
     np.testing.assert_array_equal(frame.image, expected.image)
-    assert frame.design == preset("quotient", "blinn")
+    assert frame.design == preset("quotient", "blinn", transfer="srgb")
     assert frame.error == compare(frame.scene, frame.design, expected).method_error
     assert (frame.spans, frame.pixels) == (expected.spans, expected.pixels)
     assert frame.cycles == frame.figures["cycles"] > frame.pixels
@@ -134,9 +134,9 @@ def test_design_and_verilog(capsys):
     options = {"lights": 2, "materials": 3, "gate": True, "style": "compact", "setup_interval": 5}
     design = blysk.design(method="quadratic", **options)
     build = Build(style="compact", setup_interval=5)
-    assert design == preset("quadratic", "blinn", **options)
+    assert design == preset("quadratic", "blinn", transfer="srgb", **options)
     assert design.build == build
-    assert blysk.design() == preset("quotient", "blinn") == preset() == blysk.Design()
+    assert blysk.design(transfer="linear") == preset("quotient", "blinn") == preset() == blysk.Design()
     assert main(["verilog", "--method", "linear", "--name", "core"]) == 0
     assert blysk.verilog(blysk.design(method="linear"), name="core") == capsys.readouterr().out
 

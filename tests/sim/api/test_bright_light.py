@@ -33,7 +33,7 @@ def test_errors_are_in_proportion(method, color):
             specular=1 - diffuse,
             exponent=exponent,
         )
-        design = blysk.design(method=method, lights=number)
+        design = blysk.design(method=method, lights=number, transfer="linear")
         errors = compare(scene, design, model_frame(scene, design))
         assert 0.4 < errors.arithmetic_error.max_lsb <= 0.5 + color / 16
         assert errors.bound_lsb == pytest.approx(0.5 + color / 16 + color / 4)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.presets import METHODS, MODELS
 from blysk.golden.reference.lighting import Light
+from blysk.golden.reference.transfer import color_of_text
 from blysk.sim.api.options import DESIGN, RENDERING, SCENE
 from blysk.sim.api.scene_file import MAX_BYTES, read_scene_file
 from blysk.sim.errors import InputError
@@ -37,7 +38,7 @@ def test_documented_example(write):
     assert file.path == "a.toml"
     assert file.values == {
         "size": (640, 480),
-        "background": (0x1A / 255, 0x1C / 255, 0x20 / 255),
+        "background": tuple(color_of_text("#1a1c20")),
         "ambient_light": (1.0, 1.0, 1.0),
         "back_faces": "flip",
         "mesh": "teapot",
@@ -57,7 +58,7 @@ def test_documented_example(write):
         "method": "quotient",
         "model": "blinn",
         "style": "throughput",
-        "transfer": "linear",
+        "transfer": "srgb",
         "gate": False,
     }
     assert file.keys["mesh"] == "mesh.file"
@@ -120,7 +121,7 @@ def test_values_are_those_of_their_text(write):
     two = "[[lights]]\ndirection = [1, 2, 3]\n[[lights]]\ndirection = [0, 0, 1]\ncolor = '#ff0080'\n"
     assert read_scene_file(write(two + MESH)).values["lights"] == (
         Light((1.0, 2.0, 3.0)),
-        Light((0.0, 0.0, 1.0), (1.0, 0.0, 128 / 255)),
+        Light((0.0, 0.0, 1.0), "#ff0080"),
     )
 
 

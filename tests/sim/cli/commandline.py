@@ -18,7 +18,7 @@ TINY = ["teapot", "--triangles", "100", "--size", "16x12"]
 DEFAULTS = {
     "material": Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50),
     "lights": [Light((-0.5, 0.8, 0.7))],
-    "background": (int("1a", 16) / 255, int("1c", 16) / 255, int("20", 16) / 255),
+    "background": "#1a1c20",
 }
 """Of a scene that nothing is said of."""
 

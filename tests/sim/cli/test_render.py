@@ -67,7 +67,7 @@ def test_picture_is_the_simulated_frame(rendered):
         height=48,
         **DEFAULTS,
     )
-    expected = FrameSimulator(preset()).render(scene).image
+    expected = FrameSimulator(preset(transfer="srgb")).render(scene).image
     folder, _ = rendered
     assert np.array_equal(picture(folder / "a.png"), expected)
     both = picture(folder / "both.png")
@@ -174,7 +174,7 @@ def test_normals_that_turn_a_mesh_black_are_told(capsys):
     )
     light = []
     for options in ([], ["--back-faces", "show"]):
-        assert main(["render", "a.ply", "--size", "32x24", *options]) == 0
+        assert main(["render", "a.ply", "--size", "32x24", "--transfer", "linear", *options]) == 0
         light.append(picture("a-blysk.png")[8:16, 12:20].mean())
     (line,) = re.findall(r"^noticed +(.*)$", capsys.readouterr().out.partition("seconds")[0], re.MULTILINE)
     assert line.startswith("triangles with normals against their winding: 80; --back-faces show takes")

@@ -126,8 +126,8 @@ const blysk = (() => {
       design: `${name}-${reflection}`,
       spans: view().streams[name][band],
       viewer: view().axes[2],
-      color: hexChannels(state.color),
-      light: hexChannels(state.light),
+      color: hexChannels(state.color).map(core.linear),
+      light: hexChannels(state.light).map(core.linear),
       reference: {
         curve: reference.curve ?? method.curve,
         chord: reference.curve ? false : method.chord,
@@ -522,7 +522,6 @@ const blysk = (() => {
     const terms = core.termsOf(settings);
     const slope = model.slopes?.[settings.exponent - 1];
     const found = new Map();
-    const limited = (value) => 255 * Math.min(Math.max(value, 0), 1);
     return (name, n) => {
       if (!found.has(n)) {
         const fragment = spans.first[from] + n;
@@ -541,7 +540,7 @@ const blysk = (() => {
           red_diffuse: 255 * diffuse * terms.diffuse[0],
           red_specular: 255 * specular * terms.specular[0],
           red: 255 * color[0],
-          ...{ r: limited(color[0]), g: limited(color[1]), b: limited(color[2]) },
+          ...{ r: core.encoded(color[0]), g: core.encoded(color[1]), b: core.encoded(color[2]) },
         });
       }
       return found.get(n)[name] ?? null;

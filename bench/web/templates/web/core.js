@@ -95,6 +95,13 @@ const blyskCore = () => {
     return best.map((code) => Math.min(Math.max(code, -one), one));
   }
 
+  // The curve of sRGB: LSB of the code of linear light; linear light of a code, 0 to 1. See `golden.reference.transfer`.
+  const encoded = (light) => {
+    if (light <= 0.0031308) return light <= 0 ? 0 : 255 * 12.92 * light;
+    return light >= 1 ? 255 : 255 * (1.055 * light ** (1 / 2.4) - 0.055);
+  };
+  const linear = (code) => (code <= 0.04045 ? code / 12.92 : ((code + 0.055) / 1.055) ** 2.4);
+
   const colorCode = (intensity, format) => Math.floor(intensity * 255 * 2 ** format.fraction + 0.5);
 
   // Intensities of the three terms, from what the sliders say.
@@ -360,7 +367,7 @@ const blyskCore = () => {
     return values;
   }
 
-  // Channels in LSB of the fragments that show, in the order of the spans; not rounded. What `shader` does, for all.
+  // Channels in LSB of sRGB of the fragments that show, in the order of the spans; not rounded. What `shader` does, for all.
   function reference(normals, settings, viewer, model, chord) {
     const values = new Float64Array(normals.length);
     const [lx, ly, lz] = normalised(settings.direction);
@@ -386,7 +393,7 @@ const blyskCore = () => {
       const front = cosine > 0 ? cosine : 0;
       for (let c = 0; c < 3; c++) {
         const color = ambient[c] + front * diffuse[c] + shine * specular[c];
-        values[at + c] = color < 0 ? 0 : color > 1 ? 255 : color * 255;
+        values[at + c] = encoded(color);
       }
     }
     return values;
@@ -512,6 +519,6 @@ const blyskCore = () => {
 
   return {
     ...{ put, get, decoded, unpacked, spansOf, normalised, halfwayVector, quantised, termsOf, constantsOf, writesOf },
-    ...{ lightFrame, vectorsOf, reflection, tableOf, curveOf, normalsOf, shader, reference, errorFigures, Simulation },
+    ...{ encoded, linear, lightFrame, vectorsOf, reflection, tableOf, curveOf, normalsOf, shader, reference, errorFigures, Simulation },
   };
 };
