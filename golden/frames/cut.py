@@ -9,6 +9,7 @@ from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks, lines_along, weights_along
 from blysk.golden.frames.missed import missed_spans
 from blysk.golden.frames.pieces import Pieces
+from blysk.golden.frames.surface import MOST_TEXELS, texel_places
 from blysk.golden.methods.frame_steps import SpanCutter
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.pipeline import ShadingPipeline
@@ -18,6 +19,7 @@ from blysk.golden.reference.scene import Scene
 
 __all__ = [
     "cut_by_angle",
+    "cut_by_attributes",
     "cut_by_ends",
     "cut_by_error",
     "cut_by_length",
@@ -26,13 +28,16 @@ __all__ = [
     "split_pairs",
 ]
 
+_LARGEST_RATIO = 128.0
+"""Ratio of depths up to which a colour is exact to a part of an LSB."""
+
 
 def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Raster, int]:
     """Spans cut for the method of a pipeline, and the number of given spans that were cut.
 
     The normal at a cut is the true normal of the surface, ``normalise((1-t) m_l N_l + t m_r N_r)`` along the
     given span. The rasteriser gives the lengths m. An odd pixel goes to the right half. The fragments and
-    their order do not change.
+    their order do not change. For a design with an albedo `cut_by_attributes` cuts first.
 
     Parameters
     ----------
@@ -48,9 +53,13 @@ def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Ra
     raster : Raster
         The same fragments in narrower spans, with the weights and lengths m of their ends.
     cut : int
-        Number of given spans that were cut.
+        Number of given spans that were cut. Parts from `cut_by_attributes` that are cut again count again.
     """
-    return design.interpolator.cut(cutter_of(scene, raster, design))
+    if design.albedo is None:
+        return design.interpolator.cut(cutter_of(scene, raster, design))
+    given, before = cut_by_attributes(scene, raster)
+    cut, count = design.interpolator.cut(cutter_of(scene, given, design))
+    return cut, before + count
 
 
 @dataclass(frozen=True)
@@ -115,6 +124,44 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
         left, right = (_normals(raster, origin, place) for place in (first, last))
         wide: np.ndarray = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
         return wide
+
+    return _halve(raster, is_wide)
+
+
+def cut_by_attributes(scene: Scene, raster: Raster) -> tuple[Raster, int]:
+    """Halve spans until the words of their attributes are exact enough, see `SpanAttributes`.
+
+    A span of several pixels crosses at most `MOST_TEXELS`, and its depths have a ratio of at most 128.
+
+    Parameters
+    ----------
+    scene : Scene
+        Mesh and materials.
+    raster : Raster
+        Spans.
+
+    Returns
+    -------
+    raster, cut
+        As of `cut_spans`.
+
+    Source: docs/theory/textures.md#cuts.
+    """
+    size = texel_places(scene, raster)[2]
+
+    def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+        steps = np.maximum(raster.length[origin] - 1, 1)
+        ends = [weights_along(raster, origin, place / steps) for place in (first, last)]
+        depths = [end.sum(axis=1, keepdims=True) for end in ends]
+        wide: np.ndarray = (np.maximum(*depths) > _LARGEST_RATIO * np.minimum(*depths))[:, 0]
+        if scene.textures:
+            corners = scene.mesh.coordinates[scene.mesh.faces[raster.triangle[origin]]]
+            corners = corners - corners[:, :1]
+            left, right = (
+                np.einsum("sn,snk->sk", end / depth, corners) for end, depth in zip(ends, depths, strict=True)
+            )
+            wide |= (np.abs(right - left) * size[origin] > MOST_TEXELS).any(axis=1)
+        return wide & (last > first)
 
     return _halve(raster, is_wide)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.frames.cut import cutter_of
+from blysk.golden.frames.cut import cut_spans, cutter_of
 from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.frames.surface import check_albedo, span_attributes, with_albedo
 from blysk.golden.frames.vector_axes import vector_axes
@@ -42,7 +42,7 @@ class PreparedFrame:
     cut_raster : Raster
         The same fragments in spans that are narrow enough for the method, in the order of their materials.
     spans_cut : int
-        Spans of ``raster`` that were cut.
+        Spans of ``raster`` that were cut, see `cut_spans`.
     spans : Spans
         Spans of ``cut_raster``, quantised: the pipeline's input.
     constants : list of FrameConstants
@@ -82,10 +82,9 @@ def prepare(scene: Scene, design: ShadingPipeline) -> PreparedFrame:
                 raise ValueError(f"light {index} fades, and the design has no factor for it: give factors")
     constants = constants_of(scene, design)
     raster = rasterise(scene)
-    cutter = cutter_of(scene, raster, design)
-    cut, count = design.interpolator.cut(cutter)
+    cut, count = cut_spans(scene, raster, design)
     cut = sort_by_material(cut, scene.mesh.material)
-    missed = design.interpolator.missed(cutter, cut)
+    missed = design.interpolator.missed(cutter_of(scene, raster, design), cut)
     return PreparedFrame(raster, cut, count, spans_for(scene, cut, design), constants, missed)
 
 

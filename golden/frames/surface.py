@@ -16,7 +16,18 @@ from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import Texture
 
-__all__ = ["albedo_of", "check_albedo", "design_for", "span_attributes", "with_albedo"]
+__all__ = [
+    "MOST_TEXELS",
+    "albedo_of",
+    "check_albedo",
+    "design_for",
+    "span_attributes",
+    "texel_places",
+    "with_albedo",
+]
+
+MOST_TEXELS = 62
+"""Texels that a span of several pixels crosses at most, along u and along v. Its range is then at most 5."""
 
 _WHITE = Texture(np.ones((1, 1, 3)), filter="nearest")
 """Texture of materials that have none."""
@@ -146,7 +157,7 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
     scene : Scene
         Mesh, materials and camera.
     cut : Raster
-        Spans, with their weights; with the levels of textures that have several.
+        Spans of `cut_by_attributes`, with their weights, and with the levels of textures that have several.
     albedo : Albedo
         The albedo path.
 
@@ -154,10 +165,16 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
     ------
     ValueError
         If spans have to be cut for `SpanAttributes.quantise`.
+
+    Notes
+    -----
+    Far outside an image that is clamped every place has the texel of the border. There a place may move.
     """
     mesh = scene.mesh
-    corners, material = mesh.faces[cut.triangle], mesh.material[cut.triangle]
-    level, periodic, size = _places(scene, cut, material)
+    corners = mesh.faces[cut.triangle]
+    level, periodic, size = texel_places(scene, cut)
+    # A span that is in the image at one end is not beyond these limits at the other.
+    limits = np.where(periodic, np.inf, MOST_TEXELS + 1)
     weights = cut.weights_left, cut.weights_right
     nearness = tuple(of.sum(axis=1) for of in weights)
     ends = []
@@ -169,7 +186,8 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
             parts.append(np.clip(np.einsum("sn,snk->sk", share, given), 0, 1))
         if albedo.texture is not None:
             given = mesh.coordinates[corners] if mesh.coordinates.size else np.zeros((len(corners), 3, 2))
-            parts.append(np.einsum("sn,snk->sk", share, given) * size)
+            places = np.einsum("sn,snk->sk", share, given) * size
+            parts.append(np.clip(places, -limits, size + limits))
         ends.append(np.concatenate(parts, axis=1))
     left, right = ends
     return SpanAttributes.quantise(
@@ -183,15 +201,16 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
     )
 
 
-def _places(scene: Scene, cut: Raster, material: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def texel_places(scene: Scene, raster: Raster) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Level of each span; whether u and v repeat, and the texels of the level, each of shape (spans, 2)."""
+    material = scene.mesh.material[raster.triangle]
     level = np.zeros(len(material), dtype=np.int64)
     periodic = np.ones((len(material), 2), dtype=bool)
     size = np.zeros((len(material), 2))
     for index, texture in scene.textures.items():
         own = material == index
         if texture.mipmapped:
-            level[own] = cut.level[own]
+            level[own] = raster.level[own]
         periodic[own] = [wrap != "clamp" for wrap in texture.wrap]
         sides = np.array([image.shape[1::-1] for image in texture.levels])
         size[own] = sides[level[own]]

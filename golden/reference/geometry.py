@@ -6,7 +6,10 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["Mesh", "any_component", "normalise", "sum_of_components"]
+__all__ = ["LARGEST_COORDINATE", "Mesh", "any_component", "normalise", "sum_of_components"]
+
+LARGEST_COORDINATE = 1 << 20
+"""Largest magnitude of a texture coordinate."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class Mesh:
     colors : float64 array, shape (V, 3), optional
         Colours of the vertices in linear light, 0 to 1. Empty: none, which is white.
     coordinates : float64 array, shape (V, 2), optional
-        Texture coordinates u and v of the vertices, finite, see `Texture`. Empty: none.
+        Texture coordinates u and v of the vertices, see `Texture`, within `LARGEST_COORDINATE`. Empty: none.
 
     Raises
     ------
@@ -81,8 +84,8 @@ class Mesh:
                 )
         if not ((self.colors >= 0) & (self.colors <= 1)).all():
             raise ValueError("colors must be 0 to 1")
-        if not np.isfinite(self.coordinates).all():
-            raise ValueError("coordinates must be finite")
+        if not (np.abs(self.coordinates) <= LARGEST_COORDINATE).all():
+            raise ValueError(f"coordinates must be numbers within {LARGEST_COORDINATE}")
 
 
 def normalise(vectors: ArrayLike) -> np.ndarray:

@@ -8,14 +8,16 @@ import pytest
 from blysk.golden.frames.albedo_bound import albedo_errors
 from blysk.golden.frames.border import border_mask
 from blysk.golden.frames.compare import compare
+from blysk.golden.frames.cut import cut_by_attributes
 from blysk.golden.frames.error_bound import encoded_bound, pixel_bound
 from blysk.golden.frames.frame import model_frame
 from blysk.golden.frames.prepare import prepare
-from blysk.golden.frames.surface import design_for
+from blysk.golden.frames.surface import MOST_TEXELS, design_for
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
+from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import BLINN
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import Texture
@@ -104,8 +106,33 @@ def test_bounds_by_tolerance_hold(method):
         assert 0.5 < found.method_error.steady_lsb <= found.bound_lsb < (1.2 if transfer == "linear" else 6)
 
 
+@pytest.mark.parametrize("wraps", [("clamp", "mirror"), ("repeat", "clamp")])
+def test_cuts(wraps):
+    """Far outside of an image, and over more texels a pixel than a word holds, frames keep their bounds."""
+    image = np.random.default_rng(5).random((512, 512, 3))
+    scene = scene_of("perspective", Texture(image, wraps, mipmapped=False), tiles=40.0)
+    design = design_for(preset("quotient", "blinn", lights=2), scene)
+    frame = model_frame(scene, design)
+    found = compare(scene, design, frame)
+    assert 0.5 < found.method_error.steady_lsb <= found.bound_lsb < 0.75
+    assert frame.prepared.spans_cut > 50
+    cut, count = cut_by_attributes(scene, frame.raster)
+    assert 50 < count <= len(frame.raster.length)
+    several = cut.length > 1
+    change = [
+        np.einsum("sn,snk->sk", of / of.sum(axis=1, keepdims=True), scene.mesh.coordinates[faces])
+        for faces in [scene.mesh.faces[cut.triangle]]
+        for of in (cut.weights_left, cut.weights_right)
+    ]
+    crossed = np.abs(change[1] - change[0]).max(axis=1) * 512
+    assert 31 < crossed[several].max() <= MOST_TEXELS + 1e-6
+    # No span is cut without need.
+    whole = scene_of("perspective", Texture(image), tiles=1.0)
+    assert cut_by_attributes(whole, rasterise(whole))[1] < 60
+
+
 def test_no_bound_where_none_is_known():
-    """Another method; and words that may miss the nearest of so many texels."""
+    """Another method; and words that may miss the nearest of too many texels, in spans that are not cut."""
     scene = scene_of("perspective", None)
     for method in ("linear", "quadratic"):
         design = design_for(preset(method, "blinn", lights=2), scene)
@@ -114,5 +141,6 @@ def test_no_bound_where_none_is_known():
     for kind, known in (("bilinear", True), ("nearest", False)):
         scene = scene_of("perspective", Texture(image, filter=kind, mipmapped=False), tiles=12.0)
         design = design_for(preset("quotient", "blinn", lights=2), scene)
-        bound = pixel_bound(scene, design, prepare(scene, design).cut_raster)
-        assert (bound is not None) == known
+        raster = rasterise(scene)
+        assert (pixel_bound(scene, design, raster) is not None) == known
+        assert pixel_bound(scene, design, cut_by_attributes(scene, raster)[0]) is not None

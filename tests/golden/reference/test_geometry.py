@@ -27,7 +27,7 @@ NO_MATERIAL = "material must be an index of 0 or more for each of the 1 faces, o
         ({"colors": np.full((3, 3), 1.5)}, "colors must be 0 to 1"),
         ({"colors": np.full((3, 3), np.nan)}, "colors must be 0 to 1"),
         ({"coordinates": np.zeros((3, 3))}, r"coordinates must have shape \(3, 2\), not \(3, 3\)"),
-        ({"coordinates": np.full((3, 2), np.inf)}, "coordinates must be finite"),
+        ({"coordinates": np.full((3, 2), np.inf)}, "coordinates must be numbers within 1048576"),
     ],
 )
 def test_bad_arrays_are_refused(given, message):
