@@ -170,6 +170,7 @@ def test_sorted_spans_are_a_permutation(materials, cut):
     rng = np.random.default_rng(17)
     left, right = map(normalise, pairs_at(rng, 3000, rng.uniform(0, 90, 3000)))
     raster = raster_of(rng, left, right, rng.integers(1, 30, 3000))
+    raster = replace(raster, level=rng.integers(0, 9, 3000).astype(np.int8))
     if cut:
         raster, _ = cut_by_angle(raster, MAX_SPAN_ANGLE)
     count = len(raster.length)
