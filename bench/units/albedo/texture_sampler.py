@@ -1,5 +1,6 @@
 """Record of the texture sampler."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,11 +19,12 @@ __all__ = ["RECORD"]
 _MEMORY = TexelMemory(104)
 """A texture of 16x16 texels, and a small texture."""
 
+_MODEL = TextureSampler(_MEMORY)
 
-def _measure(rng, count):
+
+def _measure(rng, count, model):
     """Any texels of an image of 16x16, at exact coordinates."""
-    model = TextureSampler(_MEMORY)
-    texture = Texture(rng.random((16, 16, 3)))
+    texture = Texture(rng.random((16, 16, 3)), filter="bilinear" if model.bilinear else "nearest")
     loaded = _MEMORY.load([texture])
     codes, level = any_places(rng, model.address, loaded.descriptors[0], count)
     place = codes * 2.0**-model.share_bits / np.maximum(16 >> level, 1)[:, np.newaxis]
@@ -49,15 +51,19 @@ def _places(unit, rng, count):
     return Case({"coordinates": codes, "level": level}, of_descriptor(descriptor), loaded.writes())
 
 
+def _variants():
+    models = {"": _MODEL, "interval 3": _MODEL, "nearest": replace(_MODEL, bilinear=False)}
+    for name, model in models.items():
+        unit = partial(TextureSamplerUnit, model, 3 if name == "interval 3" else 1)
+        measure = partial(_measure, model=model)
+        yield name, Variant(unit, measure, "any texels and places", long=bool(name))
+
+
 RECORD = Record(
     name="texture_sampler",
     title="Colours of a texture at places of a surface",
     source="docs/theory/textures.md#texture-unit",
-    variants={
-        "": Variant(partial(TextureSamplerUnit, TextureSampler(_MEMORY)), _measure, "any texels and places"),
-        "interval 3": Variant(partial(TextureSamplerUnit, TextureSampler(_MEMORY), 3), long=True),
-        "nearest": Variant(partial(TextureSamplerUnit, TextureSampler(_MEMORY, bilinear=False)), long=True),
-    },
+    variants=dict(_variants()),
     expect=_expect,
     stimuli={"places": Stimulus(_places, 400, repeats=10, pace=lambda unit: unit.initiation_interval)},
     axis="exact colour",
