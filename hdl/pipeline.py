@@ -104,12 +104,14 @@ class ShadingPipelineUnit(wiring.Component):
     - one for the colours;
     - one for the specular terms of each light;
     - two for the products of each light with a normal, if the method finds normals;
-    - one or two for the setup, as many as its longest interval needs.
+    - one or two for the setup, as many as its longest interval needs;
+    - with an albedo, a third of its multipliers in the other style.
 
     ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for the setup. A pixel takes the
     larger of two numbers of cycles:
 
-    - a cycle a channel for each of its diffuse and specular terms that is not 0, and for one term at least;
+    - a cycle a channel for each of its diffuse and specular terms that is not 0, and for one term at least,
+    or with an albedo for one more, see `Intensity.cycles`;
     - if a light is in front and the span not dark, a cycle for each product of the specular model (a power
       42).
 

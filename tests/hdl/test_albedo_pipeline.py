@@ -1,10 +1,12 @@
 # amaranth: UnusedElaboratable=no
 """Pipelines with an albedo: pixels of every variant, latency, and cycles as without an albedo."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from amaranth.back import rtlil
 from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
 
@@ -93,6 +95,13 @@ def test_texels_outside_are_refused_where_they_have_no_port():
         core_of(outside.built(bus="axi"))
     with pytest.raises(ValueError, match=r"^hardware geometry has no vertex colours and no textures; leave"):
         Renderer(design)
+
+
+def test_a_pipeline_without_albedo_has_nothing_of_it():
+    """No port, no unit, no word of a constant; the baselines hold its cells."""
+    text = rtlil.convert(ShadingPipelineUnit(preset("linear", "cosquad")), name="top", emit_src=False)
+    found = re.search(r"albedo|attributes|emission|texel|texture|tinted|colored|word_(8|9|1[0-5])\b", text)
+    assert found is None
 
 
 def cycles_of(unit, lengths):

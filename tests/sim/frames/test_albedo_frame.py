@@ -20,7 +20,6 @@ from blysk.golden.reference.texture import Texture
 from blysk.sim.errors import OptionError
 
 GLOSSY = Material((0.1,) * 3, (0.6,) * 3, (0.3,) * 3, 50)
-RNG = np.random.default_rng(3)
 
 
 def floor():
@@ -32,20 +31,25 @@ def floor():
         corners,
         np.array([(0, 2, 1), (1, 2, 3)]),
         normals,
-        colors=RNG.random((4, 3)),
+        colors=np.random.default_rng(3).random((4, 3)),
         coordinates=coordinates,
     )
 
 
-@pytest.mark.parametrize("engine", ["pysim", pytest.param("cxxrtl", marks=pytest.mark.long)])
-def test_colours_times_texels(engine):
-    """Perspective, a tinted material with levels: the pixels of the model, half an LSB from float64."""
+def scene_of(size):
+    """The floor in perspective, of a tinted material that emits light, with a texture of several levels."""
     mesh = floor()
-    texture = Texture(RNG.random((8, 8, 3)))
+    texture = Texture(np.random.default_rng(4).random((8, 8, 3)))
     camera = Camera.framing(mesh.vertices, (0.2, 0.3, 1), projection="perspective")
-    size = (24, 18) if engine == "pysim" else (320, 240)
     material = replace(GLOSSY, texture=texture, tinted=True, emission=(0.02, 0, 0.01))
-    scene = Scene(mesh, camera, *size, material, (Light((0.3, 1, 0.5)),))
+    return Scene(mesh, camera, *size, material, (Light((0.3, 1, 0.5)),))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("engine", "size"), [("pysim", (24, 18)), ("cxxrtl", (320, 240))])
+def test_colours_times_texels(engine, size):
+    """The pixels of the model, half an LSB from float64."""
+    scene = scene_of(size)
     frame = blysk.render(scene, engine=engine, transfer="linear")
     design = frame.design
     assert design.albedo == Albedo(texture=TextureSampler(), tints=True)
@@ -69,4 +73,4 @@ def test_render_of_a_mesh_with_colours():
 
 def test_hardware_geometry_refuses_colours():
     with pytest.raises(OptionError, match="hardware geometry draws no vertex colours and no textures"):
-        blysk.render(floor(), geometry="hardware", size=(40, 30), engine="pysim")
+        blysk.render(scene_of((40, 30)), geometry="hardware", engine="pysim")
