@@ -59,10 +59,7 @@ __all__ = [
 ]
 
 SLOW_SIZE = (160, 120)
-"""Width and height of the largest picture that pysim simulates in place of cxxrtl.
-
-Pictures with waveforms have this size by default.
-"""
+"""Largest width and height where pysim replaces cxxrtl, and default size of pictures with waveforms."""
 
 MAX_FRAMES = 9999
 """Largest number of frames of a turntable. Their file names have four digits."""
@@ -74,10 +71,8 @@ ColorLike = str | float | Triple
 """A colour: ``"#rrggbb"`` in sRGB, or one number or three of linear light."""
 
 Source = Union[str, os.PathLike[str], Mesh, Sequence[Any], "trimesh.Trimesh", "trimesh.Scene"]
-"""``"teapot"``, the name of a mesh file or scene file, a `Mesh`, a mesh or scene of trimesh, or arrays.
-
-The arrays are vertices, faces and, if known, normals.
-"""
+"""``"teapot"``, the name of a mesh file or scene file, a `Mesh`, a mesh or scene of trimesh, or arrays of
+vertices, faces and, if known, normals."""
 
 Engine = Literal["auto", "cxxrtl", "pysim"]
 """Names of engines. ``"auto"`` takes ``"cxxrtl"``, or ``"pysim"`` if no C++ compiler works."""
@@ -115,7 +110,6 @@ LIGHTS = ("lights", "point_lights", "spot_lights")
 
 VIEW_WORDS = ("front", "back", "left", "right", "top", "bottom")
 _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
 
 SCENE: dict[str, Option] = {
     "size": Option(Size(), (640, 480), "Size of the picture.", "size"),
@@ -185,8 +179,7 @@ SCENE: dict[str, Option] = {
     "viewer": Option(
         Choice("viewer", VIEWERS),
         "distant",
-        "distant: highlights are seen from one direction. near: highlights are seen from the camera. near "
-        "needs --method chord-local.",
+        "distant: highlights seen from one direction. near: from the camera; needs --method chord-local.",
         "camera.viewer",
     ),
     "lights": Option(
@@ -246,9 +239,8 @@ DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
         None,
-        "Method of interpolation along a span.  [default: quotient; with point lights or a near viewer: "
-        "chord-local; with --gate: quadratic; with --operand, with --setup-interval, or for a model "
-        "without a table: renormalise]",
+        "Method of interpolation along a span.  [default: quotient; near lights or viewer: chord-local; "
+        "--gate: quadratic; --operand, --setup-interval, or a model without a table: renormalise]",
         "pipeline.method",
     ),
     "model": Option(
@@ -332,8 +324,7 @@ BUILD: dict[str, Option] = {
     "setups": Option(
         Few(*SETUPS),
         1,
-        "Lanes of triangle setup in hardware geometry. Two lanes take twice as many small triangles in "
-        "the same time.",
+        "Lanes of triangle setup in hardware geometry. Two lanes take small triangles twice as fast.",
         "pipeline.setups",
     ),
     "coarse": Option(
