@@ -132,3 +132,15 @@ def test_framing_refusals():
         Camera.framing(np.full((2, 3), np.nan), (0, 0, 1))
     with pytest.raises(ValueError, match="points must be in front of a perspective camera"):
         Camera((0, 0, 1), (0, 0, 0), projection="perspective").project([0, 0, 2], 4, 4)
+
+
+@pytest.mark.parametrize("projection", ["orthographic", "perspective"])
+def test_a_camera_in_another_unit_shows_the_same_picture(projection):
+    camera = Camera((1, 2, 30), (0, 1, 0), projection=projection, height=9, field_of_view=40, near=0.5)
+    points = np.array([[0, 0, 0], [3, 1, -2], [-1, 4, 5.0]])
+    scaled = camera.scaled(-5)
+    pixels = camera.project(points, 80, 60)
+    assert np.array_equal(scaled.project(points / 32, 80, 60), pixels / (1, 1, 32))
+    assert scaled.near == 0.5 / 32
+    with pytest.raises(OverflowError):
+        camera.scaled(2000)
