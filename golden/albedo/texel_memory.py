@@ -269,7 +269,8 @@ class TexelMemory:
             f"{side}x{side} texels; take smaller images or a deeper memory"
         )
 
-    def read(self, loaded: LoadedTextures, address: np.ndarray) -> np.ndarray:
+    @staticmethod
+    def read(loaded: LoadedTextures, address: np.ndarray) -> np.ndarray:
         """Texels of the four banks.
 
         Parameters
@@ -284,10 +285,9 @@ class TexelMemory:
         int64 array, shape (places, 4, 3)
             Codes of channels. Words behind the last texture are 0.
         """
-        codes = np.zeros((1 << self.address_bits, BANKS, 3), dtype=np.int64)
-        codes[: len(loaded.codes)] = loaded.codes
-        found: np.ndarray = codes[address, np.arange(BANKS)]
-        return found
+        inside = address < len(loaded.codes)
+        found = loaded.codes[np.where(inside, address, 0), np.arange(BANKS)]
+        return np.where(inside[..., np.newaxis], found, 0)
 
 
 def _descriptor(texture: Texture, base: int) -> TextureDescriptor:
