@@ -10,7 +10,7 @@ import numpy as np
 
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.geometry import Mesh
+from blysk.golden.reference.geometry import LARGEST_COORDINATE, Mesh
 from blysk.golden.reference.light import Light
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.normals import crease_normals, face_directions, repaired_normals, transformed
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LoadedMesh", "assembled", "finished", "merged"]
 
-# Coordinates beyond which the steps of a float32 are as large as an image of 8 texels.
-_FARTHEST = 2.0**20
 # How far from 0 to 1 a colour may lie by rounding.
 _ROUNDED = 1e-6
 
@@ -163,10 +161,11 @@ def _coordinates(given: np.ndarray | None, faces: np.ndarray) -> np.ndarray | No
     if given is None:
         return None
     used = np.unique(faces)
-    if wrong := np.flatnonzero(~(np.abs(given[used]) <= _FARTHEST).all(axis=1)).tolist():
+    if wrong := np.flatnonzero(~(np.abs(given[used]) <= LARGEST_COORDINATE).all(axis=1)).tolist():
         text = " ".join(f"{number:g}" for number in given[used[wrong[0]]].tolist())
         raise Refused(
-            f"a vertex has the texture coordinates {text!r}, not numbers to {_FARTHEST:,.0f}", ONE_MATERIAL
+            f"a vertex has the texture coordinates {text!r}, not numbers to {LARGEST_COORDINATE:,.0f}",
+            ONE_MATERIAL,
         )
     result = np.zeros(given.shape)
     result[used] = given[used]
