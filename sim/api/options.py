@@ -239,7 +239,7 @@ DESIGN: dict[str, Option] = {
     "method": Option(
         Choice("method", METHODS | PUBLISHED),
         None,
-        "Method of interpolation along a span.  [default: quotient; near lights or viewer: chord-local; "
+        "Method of interpolation along a span.  [default: quotient; point lights, near viewer: chord-local; "
         "--gate: quadratic; --operand, --setup-interval, or a model without a table: renormalise]",
         "pipeline.method",
     ),
