@@ -196,9 +196,9 @@ class Netlist:
                     graph.connect(source, number, data)
 
     def _find_held(self) -> set[tuple[str, int]]:
-        """Operands of multiplexers that only keep a register's word.
+        """Operands that multiplexers choose only to keep a register's word.
 
-        Each is a cell and the number of the operand.
+        An operand is given by the name of its cell and by its number.
         """
         choices = {}
         for name, cell in self.cells.items():
@@ -251,9 +251,9 @@ class Netlist:
         )
 
     def _operands(self, name: str, place: int | None = None) -> Iterable[tuple[int, bool]]:
-        """Input bits of a cell, or of its output bit ``place``.
+        """Input bits of a cell. With ``place``: only the input bits that give output bit ``place``.
 
-        A flag of each bit tells whether it carries data.
+        Each bit has a flag, which is true if the bit carries data.
         """
         cell = self.cells[name]
         kind = cell["type"]
@@ -279,9 +279,9 @@ class Netlist:
                     yield bit, is_data
 
     def _sources(self, bit: int) -> dict[int, bool]:
-        """Boxes from which a net comes through cells without a box.
+        """Boxes whose words reach a net, directly or through cells that have no box.
 
-        A flag of each tells whether it carries data.
+        Each box has a flag, which is true if the box sends data to the net.
         """
         bit = self.replaced.get(bit, bit)
         found = self.cache.get(bit)
@@ -323,7 +323,10 @@ def _operand_words(cell) -> list[list]:
 
 
 def _without_duplicates(cells: dict) -> tuple[dict, dict[int, int]]:
-    """Cells without duplicates of the same word, and the nets that replace the dropped nets."""
+    """Cells without duplicates, and for each net of a dropped cell the net that replaces it.
+
+    A duplicate has the same kind, parameters and inputs as another cell.
+    """
     replaced: dict[int, int] = {}
     count = -1
     while count != len(cells):

@@ -163,7 +163,7 @@ def _shown(waves: Waves) -> list[int | None]:
     states = [
         (
             waves.levels["i.valid"][k],
-            # Nobody asks while nothing is offered.
+            # While no beat is offered, ready has no effect.
             waves.levels["i.valid"][k] and waves.levels["i.ready"][k],
             waves.levels["o.valid"][k],
             waves.levels["o.ready"][k],

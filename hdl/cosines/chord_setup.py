@@ -170,7 +170,7 @@ class ChordSetupUnit(PipelinedUnit):
         return results
 
     def _quadratic(self, i: int, function: str, slope_format: Format, flags: list[Word]):
-        """Words of P and G of f, u or a. The flags get a word that tells whether P or G is out of range."""
+        """Words of P and G of f, u or a. Adds to ``flags`` whether G, and whether P, is out of range."""
         g, p = self._graph, self.model
         name = f"{function}_{i}"
         values = g.input(
@@ -225,7 +225,7 @@ class ChordSetupUnit(PipelinedUnit):
 
 
 def shared_shifters(graph: Dataflow, model: ChordSetup) -> FunctionalUnit:
-    """Shifters of the differences, two uses a quadratic; see `difference_words`."""
+    """Shifters of the differences. A quadratic uses them twice; see `difference_words`."""
     format = model.shifted_format
 
     def shift(register, value, amount):

@@ -39,8 +39,8 @@ class RecurrenceSetupUnit(PipelinedUnit):
     formats and the error bound.
 
     A span has 14 products, and 32 more for each light. Let I be the initiation interval. The products share
-    ``ceil((14 + 32 lights) / I)`` multipliers of 18x18 bits. 14 of a light's products are the seven steps of
-    the recurrence for L and for H. The 18 shifts of a light share ``ceil(18 lights / I)`` shifters of 48
+    ``ceil((14 + 32 lights) / I)`` multipliers of 18x18 bits. The seven steps of the recurrence take 14 of a
+    light's products, for L and for H. The 18 shifts of a light share ``ceil(18 lights / I)`` shifters of 48
     bits. For one light:
 
     =================== === === === === ===
@@ -159,7 +159,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
     def _step_square(
         self, q: Word, q_shift: Word, square: Word, reciprocal_square: Word, square_shift: Word
     ) -> tuple[Word, Word]:
-        """Word of Q/8, which is at least 1/2, and the exponent of Q."""
+        """Word and exponent of Q: ``Q = 8 word 2^-exponent``. The word is 1/2 or more, or 0 if Q is 0."""
         g = self._graph
         product = g.multiply("psi_square_product", q, square)
         psi_square = g.register("psi_square_exact", lambda q, product: q + product, q, product)

@@ -14,7 +14,7 @@ __all__ = ["HalfwayVectorUnit"]
 class HalfwayVectorUnit(wiring.Component):
     """Half-way vectors by a sum and a normaliser. `HalfwayVector` is the bit-accurate model.
 
-    The latency, `latency`, is 18 cycles, the initiation interval 1, and there are six multipliers, as in
+    The latency (`latency`) is 18 cycles, and the initiation interval is 1. There are six multipliers, as in
     `VectorNormaliserUnit`.
 
     Parameters

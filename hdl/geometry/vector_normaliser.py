@@ -66,7 +66,7 @@ class VectorNormaliserUnit(PipelinedUnit):
         super().__init__(*vectors_shape(self.model), latency=self._dot.latency + 15)
 
     def datapath(self, m, operands):
-        """Shifted, squared, its factor from the table, scaled."""
+        """Shift the vector, square its components, read the factor from the table, and scale the vector."""
         dot = self._dot
         m.submodules.dot_product = dot
         words, lost = self._shift(m, operands)

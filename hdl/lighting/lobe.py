@@ -136,7 +136,7 @@ class LobeMemory(wiring.Component):
 
 
 class LobeUnit(PipelinedUnit):
-    """A lobe of 1 - N·H by its table. 0 for a dark beat and where N·H is not positive.
+    """A lobe of 1 - N·H by its table. The term is 0 for a dark beat and where N·H is not positive.
 
     `Lobe`, the bit-accurate model, has table, formats and error bounds.
 
@@ -212,7 +212,7 @@ class LobeUnit(PipelinedUnit):
         )
 
     def elaborate(self, platform):
-        """The pipeline and the memory beside it. The memory is also written while the pipeline stands."""
+        """The pipeline and the memory beside it. The memory is also written while the pipeline is stalled."""
         m = super().elaborate(platform)
         m.d.comb += self._read.enable.eq(self.advance)
         if self.shares_memory:

@@ -326,7 +326,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         p, product = self.model, multiplier.product
         multiplier.issue(2, FixedValue(COMPONENT, Cat(s.offset, Const(0, 18 - len(s.offset)))), s.reciprocal)
         whole_pixels = s.available >> s.levels
-        # 2^levels - 1 more, so that the shift rounds up.
+        # 2^levels - 1 is added, so that the shift rounds up.
         m.d.sync += [
             s.available.eq(s.steps - s.offset + (((1 << s.levels) - 1)[: p.depth + 1])),
             s.count.eq(Mux(whole_pixels < s.remaining, whole_pixels, s.remaining)),
@@ -437,7 +437,7 @@ class _Levels:
         self.step = Signal(3)
         # Half of the memory of ends.
         self.bank = Signal()
-        # Of the reciprocal of m - 1.
+        # Words of the reciprocal of m - 1.
         self.steps = Signal(bits)
         self.reciprocal = Signal(FixedShape(COMPONENT))
         self.shift = Signal(range(bits + 1))
@@ -458,7 +458,7 @@ class _Levels:
 
 
 class _Segments:
-    """Registers and wires of the part that prepares segments: results of the first part, own words."""
+    """Registers and wires of the part that prepares segments: copies from the first part, and its own."""
 
     def __init__(self, model: AdaptiveNormaliser):
         p, bits, depth = model, model.LENGTH_BITS, model.depth

@@ -14,7 +14,7 @@ __all__ = ["BandDepthUnit"]
 
 
 class BandDepthUnit(wiring.Component):
-    """The memory behind a `DepthMemory` port, anew for each band. `BandDepth` is the bit-accurate model.
+    """The depths of a band behind a `DepthMemory` port. `BandDepth` is the bit-accurate model.
 
     With ``begin`` the tag counts up, and `BandDepth.swept` words (all words after a reset) are swept, one a
     cycle. Meanwhile ``busy`` is high. Do not use the port then. The unit has no multipliers.
@@ -29,9 +29,9 @@ class BandDepthUnit(wiring.Component):
     Members
     -------
     memory : :py:`In(DepthMemory(x_bits, y_bits))`
-        Depths of the band. A place outside the band is clear, and writes there are lost.
+        Depths of the band. A place outside the band reads as cleared. Writes there have no effect.
     begin : :py:`In(1)`
-        A band begins. Only while ``busy`` is low.
+        A band begins, with all depths cleared. Set ``begin`` only while ``busy`` is low.
     busy : :py:`Out(1)`
         Words are swept.
 

@@ -54,7 +54,7 @@ class _Reader:
         return None
 
     def read(self, text: str) -> str:
-        """An expression in which parts with a known source are replaced by it."""
+        """An expression in which each part with a known source is replaced by this source."""
         return _READ.sub(self._replaced, text)
 
     def _replaced(self, match: re.Match) -> str:

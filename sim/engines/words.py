@@ -115,8 +115,8 @@ def _reset(line: str) -> str:
 def plain_words(text: str) -> str:
     """Rewrite the C++ of `write_cxxrtl`, statement by statement. An unknown statement stays as it is.
 
-    The driver's ``value`` and ``wire`` keep their bits in ``data``, words of 64 bits with 0 above the width.
-    The text includes CXXRTL's header only if it still needs CXXRTL's operations, on wide operands.
+    In `cxxrtl_driver.cc`, ``value`` and ``wire`` keep their bits in ``data``: words of 64 bits, with 0 above
+    the width. The result includes CXXRTL's header only if it still has CXXRTL's operations on wide operands.
 
     Parameters
     ----------

@@ -148,7 +148,7 @@ RECORD = Record(
             "In the first state all bits of the state are 0. The controlling bit of the next state is 0, too."
         ),
         "write_index": "A middle is at most 16 of 32 segments from its ends. So the bit for 32 is 0.",
-        "inner_level": "The FIFO's level falls from 1 or more, so the controlling bit, the borrow, is 0.",
+        "inner_level": "The FIFO's level falls only from 1 or more: the controlling bit, the borrow, is 0.",
         "angle": "The bit is for u of 1 or more. From 45 degrees on the unit reads the cosine in its place.",
     },
     still={
