@@ -136,11 +136,11 @@ def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, fi
 
     Choices are lists with commas between the values. The sweep has every combination of the choices. If a
     method does not have a choice, the choice is not varied for this method. Errors are in LSB of an 8-bit
-    channel. Cells, multipliers, register bits and memory bits are counted in the netlist, before technology
-    mapping. Cycles are an upper bound for a pixel, from the figures of the units for the scene's spans.
-    bisection has no bound for spans that it divides. Designs with a * are on the Pareto front of the sweep:
-    no design is better in both error and cost. Several lights stand evenly around the scene. The cache keeps
-    earlier results.
+    channel of linear light. Cells, multipliers, register bits and memory bits are counted in the netlist,
+    before technology mapping. Cycles are an upper bound for a pixel, from the figures of the units for the
+    scene's spans. bisection has no bound for spans that it divides. Designs with a * are on the Pareto front
+    of the sweep: no design is better in both error and cost. Several lights stand evenly around the scene.
+    The cache keeps earlier results.
 
     \b
     Example:

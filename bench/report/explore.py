@@ -109,7 +109,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         if those:
             text.append(
                 f"{which} takes {those[0].costs['cells']:,} cells. Its largest error here is "
-                f"{those[0].errors['method']['max_lsb']:.2f} LSB. Its command is "
+                f"{those[0].errors['method']['max_lsb']:.2f} LSB of linear light. Its command is "
                 f"`{those[0].candidate.command}`."
             )
     rows = [
@@ -291,7 +291,8 @@ def explore(
             "the scene has spans wider than they can shade"
         )
     best = cheapest(designs, error, largest, cost)
-    print(f"designs     {len(best)} of {len(designs)} have a {error} error of at most {largest:g} LSB here")
+    most = f"{largest:g} LSB of linear light"
+    print(f"designs     {len(best)} of {len(designs)} have a {error} error of at most {most} here")
     if not best:
         usable = [one.errors[error]["max_lsb"] for one in designs if not one.out_of_range_spans]
         least = f"the least is {min(usable):.2f} LSB" if usable else "all of them flag spans as too wide"
