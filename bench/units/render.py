@@ -115,7 +115,7 @@ RECORD = Record(
     },
     axis="",
     still={
-        "a counter counts more than a run has": "count_spans[9-31]",
+        "a counter has room for more than a run has": "count_spans[9-31]",
         "depths have room whenever the pipeline takes a span": "depths_room[0] depths_level[5]",
         "shading works on fewer spans than the largest number of waiting spans": "spans_level[9]",
         "a line of the picture has fewer than 64 pixels": "{spans_payload,read,word}[16-21]",

@@ -139,6 +139,6 @@ RECORD = Record(
         "without lights a colour is a constant of the run, written once": (
             "top.{spare,word}[32-55] held_back[24-47]"
         ),
-        "a counter counts more events than a run has": "count_frames[5-31] count_misfits[3-31]",
+        "a counter has room for more events than a run has": "count_frames[5-31] count_misfits[3-31]",
     },
 )

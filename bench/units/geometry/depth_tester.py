@@ -110,8 +110,8 @@ RECORD = Record(
     axis="",
     still={
         "every place that 4 and 3 bits name is in the picture": "read_outside[0]",
-        "the depth of a pixel is found a stage later": "pixel_0[31-54]",
-        "a counter counts more events than a run has": "count_{pixels,hidden}[10-31]",
+        "the unit finds the depth of a pixel a stage later": "pixel_0[31-54]",
+        "a counter has room for more events than a run has": "count_{pixels,hidden}[10-31]",
     },
     remembers=True,
 )

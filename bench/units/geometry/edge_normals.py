@@ -89,5 +89,5 @@ RECORD = Record(
         "that are cut off. It carries into the kept bits only if the sum is 7 modulo 8, which no sum is, or "
         "0 modulo 4. A sum that is 0 modulo 4 has three even components."
     },
-    still={"a counter counts more events than a run has": "count_repaired[12-31]"},
+    still={"a counter has room for more events than a run has": "count_repaired[12-31]"},
 )

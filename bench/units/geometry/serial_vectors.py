@@ -58,7 +58,7 @@ RECORD = Record(
     },
     axis="",
     still={
-        "a counter counts more than a run has": "count_cut[10-31]",
+        "a counter has room for more than a run has": "count_cut[10-31]",
         "the exponent has a register of its own": "result[108-111]",
     },
 )

@@ -159,7 +159,7 @@ RECORD = Record(
     },
     axis="",
     still={
-        "a counter counts more events than a run has": "count_empty[8-31] count_cut[9-31]",
+        "a counter has room for more events than a run has": "count_empty[8-31] count_cut[9-31]",
         "attributes are side by side, so each is the last": "found[456]",
     },
 )

@@ -123,6 +123,6 @@ RECORD = Record(
     },
     axis="",
     still={
-        "a counter counts more than a run has": "count_cut[10-31]",
+        "a counter has room for more than a run has": "count_cut[10-31]",
     },
 )

@@ -95,7 +95,7 @@ RECORD = Record(
     axis="",
     still={
         "the first digit looks back to nothing": "rest_{0,1}[0]",
-        "a counter counts more events than a run has": "count_empty[8-31] "
+        "a counter has room for more events than a run has": "count_empty[8-31] "
         "count_culled[7-31] count_zero_area[6-31]",
     },
 )
