@@ -81,12 +81,6 @@ class AttributesUnit(PipelinedUnit):
             initiation_interval=initiation_interval,
         )
 
-    @property
-    def multipliers(self) -> int:
-        """Number of multipliers."""
-        p, interval = self.model.spans, self.initiation_interval
-        return -(-(1 + p.attributes) // interval) if p.perspective else 0
-
     def datapath(self, m, operands):
         """The graph, read at the stage of its last word."""
         at = self._graph.build(m, self, operands)
