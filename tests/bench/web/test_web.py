@@ -105,7 +105,7 @@ def test_streams_of_a_view():
     np.testing.assert_allclose(np.maximum(*lengths), (1 << 22) - 1, atol=2)
     assert np.minimum(*lengths).min() < 0.999 * (1 << 22)
     for k, exponent in enumerate(web_data.BANDS):
-        design = preset("quadratic", "cosquad")
+        design = preset("quadratic", "cosquad", transfer="srgb")
         frame = prepare(web_data.scene_of(web_data.START | {"exponent": exponent}), design)
         _, spans = web_data.spans_of("teapot", 0, exponent, design)
         assert counts["quadratic"][k] == len(spans) == len(frame.spans)
