@@ -7,7 +7,7 @@ import numpy as np
 from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.number.fixed import Fixed
-from blysk.hdl.lighting.colored_intensity import intensity_unit
+from blysk.hdl.lighting.colored_intensity import ColoredIntensityUnit, CompactColoredIntensityUnit
 from blysk.hdl.lighting.intensity import CompactIntensityUnit, IntensityUnit
 
 __all__ = ["RECORD"]
@@ -146,7 +146,8 @@ def _variants():
         for name, p in _COLORED.items():
             measure = partial(_measure, model=p) if p == Intensity(has_albedo=True) else None
             domain = "all terms and colours" if measure else ""
-            make = partial(intensity_unit, p, compact=style == "compact")
+            kind = ColoredIntensityUnit if style == "throughput" else CompactColoredIntensityUnit
+            make = partial(kind, p)
             yield f"{name}, {style}", Variant(make, measure, domain, "LSB" if measure else "")
 
 
