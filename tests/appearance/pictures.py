@@ -97,14 +97,18 @@ def drawn(path, scene, sampler=None, shifts=((0, 0),), lit=False):
 
 def _plain(actor, sampler):
     """Take VTK's material from an actor, and keep its colour and texture; the texture, or None."""
+    from vtkmodules.vtkFiltersCore import vtkReverseSense
+
     surface = actor.GetProperty()
     texture = surface.GetTexture("albedoTex")
     surface.RemoveAllTextures()
     surface.SetInterpolationToPhong()
     surface.SetLighting(False)
     if actor.GetMatrix().Determinant() < 0:
-        surface.SetFrontfaceCulling(surface.GetBackfaceCulling())
-        surface.SetBackfaceCulling(False)
+        turned = vtkReverseSense()
+        turned.SetInputData(actor.GetMapper().GetInput())
+        turned.ReverseCellsOn()
+        actor.GetMapper().SetInputConnection(turned.GetOutputPort())
     # After the texture, which multiplies light.
     actor.GetShaderProperty().AddFragmentShaderReplacement("//VTK::DepthPeeling::Impl", True, ENCODE, False)
     if texture is not None:

@@ -146,10 +146,10 @@ def texture_coordinates(kind):
     return file, NEAREST
 
 
-def texture_settings(along, down, filter):
+def texture_settings(along, down, filter, width=4, height=8):
     """Coordinates from -1.2 to 2.3 with each wrap mode and filter: TextureSettingsTest."""
     sampler, file = {"wrapS": along, "wrapT": down, **filter}, File()
-    file.square(file.material(noise(4, 8), sampler), PLACES * 3.5 - 1.2)
+    file.square(file.material(noise(width, height), sampler), PLACES * 3.5 - 1.2)
     return file, sampler
 
 
@@ -163,10 +163,11 @@ def linear_interpolation():
     return file, sampler
 
 
-def negative_scale():
-    """Nodes that mirror, from in front and from behind, without back faces: NegativeScaleTest."""
+def negative_scale(two_sided):
+    """Nodes that mirror, from in front and from behind, with back faces or without: NegativeScaleTest."""
     file = File()
     material = file.material(noise(2, 2), NEAREST)
+    file.document["materials"][material]["doubleSided"] = two_sided
     scales = ([1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1], [1, 1, -1], [-1, 1, -1], [-1, -1, -1])
     for number, scale in enumerate(scales):
         place = [0.48 * (number % 4) - 0.7, 0.35 - 0.6 * (number // 4), 0]
@@ -245,10 +246,11 @@ def primitive_modes():
     return file, {"back_faces": "cull"}
 
 
-def plate(specular=None, **factors):
+def plate(specular=None, node=None, **factors):
     """A bent plate with normals and a texture, with light: MetalRoughSpheres.
 
-    In VTK a texture multiplies highlights, too, as ours of metals does. So another plate has none.
+    In VTK a texture multiplies highlights, too, as ours of metals does. So another plate has none. VTK gives
+    normals unit length only in pixels. So a node scales all axes equally.
     """
     file = File()
     u, v = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9), indexing="ij")
@@ -260,9 +262,9 @@ def plate(specular=None, **factors):
     a, b, c, d = at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]
     faces = np.stack([a, b, c, a, c, d], axis=-1)
     material = file.material(noise(), LINEAR, unlit=False, **factors)
-    file.part(material, attributes, faces)
+    file.part(material, attributes, faces, **(node or {}))
     look = {} if specular is None else {"specular": specular}
-    return file, {**LINEAR, "lights": (0.3, 0.4, 1), **look}
+    return file, {**LINEAR, "lights": (0.3, 0.4, 1), "back_faces": "cull", **look}
 
 
 def minified(step):
@@ -302,8 +304,10 @@ SAMPLES = {
             )
         )
     },
+    "a row of texels": (texture_settings, (MIRROR, MIRROR, LINEAR, 8, 1)),
     "linear interpolation": (linear_interpolation, ()),
-    "negative scale": (negative_scale, ()),
+    "negative scale": (negative_scale, (False,)),
+    "negative scale, two-sided": (negative_scale, (True,)),
     "texture offset": (texture_transform, {"offset": [0.3, -0.6]}),
     "texture rotation": (texture_transform, {"rotation": 0.5}),
     "texture scale": (texture_transform, {"scale": [1.5, -2.5]}),
@@ -319,5 +323,13 @@ SAMPLES = {
     "perspective": (perspective, ()),
     "metal": (plate, {"metallicFactor": 1, "roughnessFactor": 0.75, "baseColorFactor": [0.9, 0.8, 0.7, 1]}),
     "matte": (plate, {"specular": 0, "metallicFactor": 0}),
+    "matte, mirrored": (
+        plate,
+        {
+            "specular": 0,
+            "metallicFactor": 0,
+            "node": {"scale": [-0.9, 0.9, 0.9], "rotation": [0, 0.28, 0, 0.96]},
+        },
+    ),
 }
 """Of each sample the function that makes it, and what it is given."""

@@ -81,12 +81,13 @@ def test_codes_of_greys_come_out_as_they_are():
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "name", ["vertex colours, f4 x 3", "texture settings, 4", "texture transform", "factor times texture"]
+    "name",
+    ["vertex colours, f4 x 3", "texture settings, 4", "texture transform", "factor times texture", "metal"],
 )
 def test_the_pipeline_draws_the_same_picture(name):
     """The bit-accurate model, within 1 LSB of the exact frame, and so near VTK's picture."""
     pytest.importorskip("vtkmodules", reason="VTK is not installed")
     scene, mask, ours, theirs, sure = pictures(name)
-    image = model_frame(scene, design_for(blysk.design(), scene)).image
+    image = model_frame(scene, design_for(blysk.design(model="phong"), scene)).image
     assert np.abs(image - ours)[mask & sure].max() <= 1
     assert np.abs(image - theirs)[sure].max() <= 3
