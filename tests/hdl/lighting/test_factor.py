@@ -33,4 +33,4 @@ def test_compact_lights_without_a_factor_do_not_wait():
     unit = ShadingPipelineUnit(preset("chord-local", "lyon3", 2, factors=(1,), style="compact"))
     members = [set(light.i.payload.shape().members) for light in unit._shading.lights]
     assert ["factor" in names for names in members] == [False, True]
-    assert unit._shading.lights[1].latency == unit._lights[0].latency + 2
+    assert unit._shading.lights[1].latency == unit._shading.lights[0].latency + 2
