@@ -178,8 +178,8 @@ def test_times_and_parts_of_the_renormaliser():
 
 
 QUOTIENTS = {
-    (1, True): ([4, 2, 2, 1, 1], [15, 21, 20, 23, 24]),
-    (2, True): ([6, 3, 2, 2, 2], [15, 21, 21, 22, 20]),
+    (1, True): ([4, 2, 2, 1, 1], [16, 22, 21, 24, 25]),
+    (2, True): ([6, 3, 2, 2, 2], [16, 22, 22, 23, 21]),
     (1, False): ([2], [10]),
 }
 """Multipliers and latencies at intervals 1, 2, ... of numbers of lights, with highlights and without."""

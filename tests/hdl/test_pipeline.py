@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from amaranth.hdl import UnusedElaboratable
 
+from blysk.bench.units.cosines.chord_setup import any_values
 from blysk.bench.units.operands import pairs_at
 from blysk.bench.units.pipeline import RECORD, case_of
 from blysk.bench.units.pipeline_spans import any_constants, any_spans, operands_of
@@ -175,6 +176,8 @@ def test_gate_costs_no_cycle(method, interval):
     design = preset(method, "cosquad", setup_interval=interval)
     lengths = np.r_[rng.integers(1, 40, 200), np.full(150, 1), np.full(60, 5)]
     spans, constants = spans_in_range(rng, design, lengths, 20.0)
+    if design.interpolator.serves_local:
+        spans = replace(spans, values=any_values(rng, len(lengths), design.lights))
     without, found = (
         shade(ShadingPipelineUnit(replace(design, gate=gate)), spans, constants) for gate in (False, True)
     )

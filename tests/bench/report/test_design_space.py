@@ -306,7 +306,8 @@ def test_stated_cycles_are_a_bound_of_those_of_frames():
                 del unit
                 gc.collect()
             for name, scene in baselines._scenes().items():
-                length = prepare(scene, candidate.design).spans.length
+                prepared = prepare(scene, candidate.design)
+                length = prepared.spans.length
                 counts = [[k, int(count)] for k, count in enumerate(np.bincount(length)) if count]
                 frame = {"errors": {}, "out_of_range_spans": 0, "lengths": counts}
                 results = [figures | dict.fromkeys(COSTS.values(), 0), frame]
@@ -314,6 +315,6 @@ def test_stated_cycles_are_a_bound_of_those_of_frames():
                 if method == "bisection":
                     assert one.cycles_per_pixel is None
                     continue
-                besides = latency + len(FrameConstants.of(scene).writes()["data"])
+                besides = latency + prepared.writes
                 cycles = measured[f"frames: pipeline {method}, {model}, {style}"][f"{name}_cycles"]
                 assert length.sum() < cycles <= one.cycles_per_pixel * length.sum() + besides

@@ -133,6 +133,6 @@ def test_measure():
     """A frame of simulated hardware, and its errors for each exponent."""
     found = measure("quotient, compact", [64], [64, 48])
     (frame,) = found["frames"]
-    assert (found["multipliers"], found["geometry_multipliers"], frame["triangles"]) == (10, 5, 52)
+    assert (found["multipliers"], found["geometry_multipliers"], frame["triangles"]) == (7, 2, 52)
     assert frame["cycles"] > frame["pixels"] >= frame["spans"] > 0
     assert max(frame["errors"].values()) < 1
