@@ -30,7 +30,7 @@ _MOST = 65535
 
 def _pixels(unit, case):
     design = unit.model.design
-    return unit.model.compute(spans_of(case.beats), constants_written(design, case.write))
+    return unit.model.compute(spans_of(design, case.beats), constants_written(design, case.write))
 
 
 def _status(unit, case):
