@@ -148,6 +148,7 @@ figures: tuple[float, float, int, int] = frame.error.max_lsb, frame.error.psnr_d
 text: str = blysk.verilog(design, name="core")
 materials: tuple[blysk.Material, ...] = scene.materials
 mesh: blysk.Mesh = scene.mesh
+texture: blysk.Texture = blysk.Texture(np.ones((2, 2, 3)), filter="nearest")
 camera: blysk.Camera = scene.camera
 cost: int = design.cost().multipliers
 error_map: np.ndarray = other.error_map
