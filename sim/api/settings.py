@@ -161,11 +161,13 @@ def read_settings(
 def _method(source: Source | Scene, values: Mapping[str, Any]) -> str:
     """The method of settings that name none."""
     if isinstance(source, Scene):
-        local = source.local
+        local = source.lit.local
     else:
         lights = values.get("lights")
         near = values.get("viewer") == "near"
-        local = near or (isinstance(lights, tuple) and any(light.is_local for light in lights))
+        local = near or (
+            isinstance(lights, tuple) and any(light.is_on and light.is_local for light in lights)
+        )
     model, gate = values["model"], bool(values["gate"])
     return default_method(model, gate, values["operand"], values["setup_interval"], local)
 
