@@ -17,10 +17,9 @@ from blysk.sim.meshes.gltf_parts import (
     view_bytes,
     whole,
 )
-from blysk.sim.meshes.images import load_texture
+from blysk.sim.meshes.images import NOT_THERE, OUTSIDE, load_texture, read_texture
 from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, shown
-from blysk.sim.run_files import reads
 
 __all__ = ["GLOSSY", "GltfTextures", "color_texture", "texture_coordinates", "texture_set"]
 
@@ -207,19 +206,18 @@ class GltfTextures:
             target = self._target(uri)
             if target is None:
                 return None
-            reads(target)
-            data = target.read_bytes()
+            return read_texture(target, self._found, name or None, opaque=opaque, **options)
         name = name if isinstance(name, str) and name else f"number {number}"
         return load_texture(data, name, self._found, opaque=opaque, **options)
 
     def _target(self, uri: str) -> Path | None:
         """The file of an image; ``None``, and told, if it is not there."""
-        why = "outside its folder"
+        why = OUTSIDE
         try:
             target = inside(self._folder, uri, unquote(uri))
             if os.path.isfile(target):
                 return target
-            why = "which does not exist"
+            why = NOT_THERE
         except Refused:
             pass
         self._found.tell(f"the image {shown(unquote(uri))!r}, {why}")

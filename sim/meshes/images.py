@@ -4,6 +4,7 @@ import io
 import os
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
@@ -122,15 +123,15 @@ def find_image(name: str, folder: Path, beside: Path | None = None) -> tuple[Pat
     return None, reason
 
 
-def read_texture(path: Path, found: Found, wrap: tuple[str, str] = ("repeat", "repeat")) -> Texture:
-    """Texture of a file, as `load_texture`."""
+def read_texture(path: Path, found: Found, name: str | None = None, **options: Any) -> Texture:
+    """Texture of a file, as `load_texture` with its options. The name is by default that of the file."""
     reads(path)
     try:
         data = path.read_bytes()
     except OSError as error:
         reason = f"its image {shown(path.name)!r} cannot be opened ({error.strerror})"
         raise Refused(reason, _REMEDY) from error
-    return load_texture(data, path.name, found, wrap=wrap)
+    return load_texture(data, path.name if name is None else name, found, **options)
 
 
 def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
