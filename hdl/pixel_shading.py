@@ -156,7 +156,7 @@ class PixelShading:
             ]
             if p.albedo.tints:
                 m.d.comb += intensity.constants.tinted.eq(constants.tinted)
-        connect(m, intensity.o, self.encoded(m, colors))
+        connect(m, intensity.o, self._encoded(m, colors))
 
     def connect_tables(self, m: Module, write: data.View, written: Value) -> None:
         """Connect the tables of the lights, if there are any, and load them by writes of frame constants.
@@ -214,14 +214,14 @@ class PixelShading:
 
     def connect_constant(self, m: Module, ambient: data.View, colors: stream.Interface) -> None:
         """Give every pixel the ambient colour, of a pipeline without lights."""
-        p, encoded = self.model, self.encoded(m, colors)
+        p, encoded = self.model, self._encoded(m, colors)
         for channel, name in enumerate("rgb"):
             light = ambient[0 if p.grey else channel]
             level = light.round_half_up(p.intensity.fraction_bits).saturate(p.intensity.result_format)
             m.d.comb += encoded.payload[name].eq(level.as_value())
         m.d.comb += colors.valid.eq(1)
 
-    def encoded(self, m: Module, colors: stream.Interface) -> stream.Interface:
+    def _encoded(self, m: Module, colors: stream.Interface) -> stream.Interface:
         """Colours on their way to pixels, through the transfer unit if there is one."""
         transfer = self.transfer
         if transfer is None:
