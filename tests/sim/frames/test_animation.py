@@ -268,7 +268,7 @@ def test_nobody_at_the_address(animation, monkeypatch):
 @pytest.mark.long
 def test_an_error_on_a_cluster_is_that_of_the_frame(animation, scheduler):
     with (
-        pytest.raises(AttributeError, match="'NoneType' object has no attribute"),
+        pytest.raises(AttributeError, match="'NoneType' object has no attribute 'projection'"),
         dask_executor(animation, scheduler.scheduler_address) as executor,
     ):
         list(render_frames(executor, [None]))
