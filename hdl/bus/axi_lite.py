@@ -42,7 +42,7 @@ class AxiLite(wiring.Signature):
 class AxiLiteUnit(wiring.Component):
     """Adapter from AXI4-Lite to accesses, one at a time. If a read and a write wait, they take turns.
 
-    An address and a word each wait in a register. So every ready and every valid is a register, and no path
+    An address and a word wait in a register each. So every ready and every valid is a register, and no path
     leads from one to another. A refused access gets the answer SLVERR.
 
     Members
@@ -52,7 +52,7 @@ class AxiLiteUnit(wiring.Component):
     i : :py:`Out(stream.Signature(access_shape()))`
         Accesses.
     o : :py:`In(stream.Signature(answer_shape()))`
-        Their answers.
+        Answers to the accesses.
 
     Source: docs/theory/bus.md#registers.
     """
@@ -77,7 +77,8 @@ class AxiLiteUnit(wiring.Component):
             with m.If(valid & ready):
                 m.d.sync += [full.eq(1), *taken]
 
-        # Whether a read or a write has its turn, and whether an access is in progress.
+        # ``writes``: the access is a write. ``asked``: its answer is awaited. ``last``: the access before it
+        # was a write.
         writes, asked, last = Signal(name="writes"), Signal(name="asked"), Signal(name="last_writes")
         begins = Signal(name="begins")
         # A response that is not taken delays only accesses of its own kind.

@@ -153,8 +153,11 @@ def core_of(design: ShadingPipeline) -> wiring.Component:
     Raises
     ------
     ValueError
-        If the design does not fit triangles (see `Renderer`), or has fewer scanlines than pipelines. If
-        texels are outside of a core on a bus.
+        In one of these cases:
+
+        - the design does not fit triangles (see `Renderer`);
+        - it has fewer scanlines than pipelines;
+        - a core on a bus has its texels outside.
     """
     build = design.build
     if build.bus != "native" and design.texels_outside:

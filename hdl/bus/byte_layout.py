@@ -16,15 +16,15 @@ def layout_of(
 ) -> ByteLayout:
     """Layout of the bytes of a payload.
 
-    The name of a member of a nested structure has both names, with an underscore between them. In an array of
-    structures the index is the name of a structure.
+    A member of a nested structure has the structure's name and its own name, with an underscore between
+    them. In an array of structures the index is the name of a structure.
 
     Parameters
     ----------
     shape : ShapeLike
         Shape of the payload, a structure.
     without : sequence of str
-        Members with another place on the bus.
+        Members that are left out, because the bus carries them in another place.
     below : mapping of str to int, optional
         `Field.below` of fields by name.
     """

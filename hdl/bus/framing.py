@@ -16,7 +16,7 @@ from blysk.hdl.geometry.triangles import COUNTER_BITS, count_events
 __all__ = ["FramingUnit", "given_shape", "made_shape"]
 
 _SETTLES = 3
-"""Cycles after which the logic that watches the core has seen a beat."""
+"""Cycles until the logic that watches the core counts a beat that the core has taken."""
 
 
 def given_shape(layout: ByteLayout) -> data.StructLayout:
@@ -34,10 +34,10 @@ class FramingUnit(wiring.Component):
 
     A frame ends with a beat that has ``last``. No beat is accepted after it until the core is empty and the
     frame's last beat has been accepted at the output. So beats of two frames are never inside together, and
-    constants can change in between. One output beat is held back until the next beat comes or the frame ends,
-    because only then the last beat is known. This costs 2 cycles of latency, and no throughput. A frame
-    without output gives no beat; ``frames`` counts it. Depths begin anew with each frame. With 1 in the
-    constant ``keep`` the frame adds to the picture of the frame before it.
+    constants can change in between. Each output beat is held back until the next beat comes or the frame
+    ends. Only then the unit knows whether the beat is the last. This costs 2 cycles of latency, and no
+    throughput. A frame without output gives no beat; ``frames`` counts it. Depths begin anew with each frame,
+    unless the constant ``keep`` is 1. Then the frame adds to the picture of the frame before.
 
     Parameters
     ----------
@@ -55,9 +55,12 @@ class FramingUnit(wiring.Component):
     write, constants, memory
         Members of the core, if it has them. In place of ``picture`` the constants have ``keep``.
     status : :py:`Out(...)`
-        Counters of the core; ``frames``, the number of ended frames; ``misfits``, the number of beats with a
-        number that outgrew its field; and ``busy``. If a number outgrew its field, its low bits are taken.
-        For an index past the last material the last material is taken.
+        Counters of the core, and three more fields:
+
+        - ``frames``: number of ended frames;
+        - ``misfits``: number of beats with a number that outgrew its field. The low bits of the number are
+          taken. For an index past the last material the last material is taken;
+        - ``busy``: a frame is inside.
 
     Source: docs/theory/bus.md#streams; not in the documents.
     """

@@ -44,10 +44,11 @@ def front_members(bus: wiring.Signature) -> dict[str, wiring.Member]:
 class RegistersUnit(wiring.Component):
     """Registers behind a bus. `RegisterFile` is the bit-accurate model.
 
-    An access is answered 2 cycles after it was accepted. The next is accepted when the answer has been taken.
-    A refused access changes only the registers ``errors`` and ``refused``. Registers of the picture and frame
-    constants are written while ``busy`` is low, as whole words. Bits of ``errors`` are cleared at any time,
-    by the written bytes, all ones included. A read of a byte gets the whole word.
+    An access is answered 2 cycles after it was accepted. The next access is accepted when the answer has been
+    taken. A refused access changes only the registers ``errors`` and ``refused``. Registers of the picture
+    and frame constants are written as whole words, while ``busy`` is low. A written 1 clears its bit of
+    ``errors`` at any time, also in a write of single bytes. Ones above the bits of ``errors`` have no effect.
+    A read of a byte gets the whole word.
 
     Parameters
     ----------
@@ -59,13 +60,13 @@ class RegistersUnit(wiring.Component):
     i : :py:`In(stream.Signature(access_shape()))`
         Accesses.
     o : :py:`Out(stream.Signature(answer_shape()))`
-        Their answers.
+        Answers to the accesses.
     constants : :py:`In(...)`
         State of the core: ``busy``, and its counters by name.
     picture : :py:`Out(...)`
         Registers of the picture by name, if there are any.
     load : :py:`Out(...)`
-        A frame constant, written on the cycle on which ``valid`` is high.
+        A frame constant. It is written on the cycle on which ``valid`` is high.
 
     Source: docs/theory/bus.md#registers.
     """
@@ -121,7 +122,7 @@ class RegistersUnit(wiring.Component):
         return m
 
     def _decide(self, m: Module, access, held) -> tuple[Signal, Signal]:
-        """Causes for which the access in the register is refused, a bit for each, and the word to read."""
+        """Causes to refuse the access in the register, one bit for each, and the word that a read gets."""
         cause, word = Signal(len(ERRORS), name="cause"), Signal(WORD_BITS, name="word")
         found, fits = Signal(name="found"), Signal(name="fits")
         readable, writable, clears = (Signal(name=name) for name in ("readable", "writable", "clears"))

@@ -37,8 +37,8 @@ class WishboneUnit(wiring.Component):
 
     A request is taken on a cycle on which ``stall`` is low. From the next cycle to the cycle of ``ack`` or
     ``err`` ``stall`` is high. So a classic initiator, which keeps ``stb`` until its answer, asks once, and a
-    pipelined initiator waits. Both need no other wiring. A classic initiator leaves ``stall`` open. An
-    initiator that ends the cycle before its answer gets no answer, and a write may have been made. ``ack``,
+    pipelined initiator waits. Both need no other wiring. A classic initiator leaves ``stall`` open. If an
+    initiator ends the bus cycle before the answer, it gets no answer. Its write may have been made. ``ack``,
     ``err`` and ``stall`` are registers.
 
     Members
@@ -48,7 +48,7 @@ class WishboneUnit(wiring.Component):
     i : :py:`Out(stream.Signature(access_shape()))`
         Accesses.
     o : :py:`In(stream.Signature(answer_shape()))`
-        Their answers.
+        Answers to the accesses.
 
     Source: docs/theory/bus.md#registers.
     """
@@ -57,7 +57,7 @@ class WishboneUnit(wiring.Component):
         super().__init__(front_members(Wishbone()))
 
     def elaborate(self, platform):
-        """The request in a register; its answer in another."""
+        """The request in a register, and its answer in another register."""
         m = Module()
         bus, access, answer = self.bus, self.i, self.o
         busy, dropped = Signal(name="request_busy"), Signal(name="dropped")

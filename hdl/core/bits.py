@@ -1,4 +1,4 @@
-"""Functions of the bits of a word: its leading zeros, and the choice of a word by an index."""
+"""Count of a word's leading zeros, and choice of a word by an index."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,9 @@ def leading_zeros(code: Value) -> Value:
 
 
 def select(words: Sequence[Value], index: Value) -> Value:
-    """Word at an index, or the last word beyond the end. Halves are chosen, which maps to wide multiplexers.
+    """Word at an index. Halves of the words are chosen, which maps to wide multiplexers.
+
+    An index past the last word gives some word, not always the last word.
 
     Parameters
     ----------

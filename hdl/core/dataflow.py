@@ -1,4 +1,4 @@
-"""Data-flow graphs: words of a unit with their functions, built as registers of their schedule."""
+"""Data-flow graphs, which describe a unit's words by functions and make the hardware of the words."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -68,20 +68,21 @@ class FunctionalUnit:
 
 
 class Dataflow:
-    """The words of a `PipelinedUnit` and their functions of other words, before there is any hardware.
+    """Words of a `PipelinedUnit`, each a function of other words.
 
-    All words are described first, and each word after its operands. The first request for a word's stage, or
-    for the number of instances, calls `place`. This puts the words on cycles, and on shared functional units
-    such as multipliers. `build` makes the hardware. It copies a word that is read after its lifetime.
+    Describe all words first, and each word after its operands. The first request for a word's stage, or for
+    the number of instances, calls `place`. This puts the words on cycles, and on shared functional units such
+    as multipliers. `build` makes the hardware. It copies a word that is read after its lifetime.
 
     Parameters
     ----------
     interval : int
         Initiation interval of the unit, at least 1.
     spaced : bool
-        Whether beats may come any number of cycles apart, at least the interval. See `PipelinedUnit`.
+        Whether beats may come at any distance of at least ``interval`` cycles. If not, the distance is a
+        multiple of ``interval``. See `PipelinedUnit`.
     low_latency : bool
-        Whether a product takes a single register, two cycles in all.
+        Whether a product has one register behind its operand registers, and so takes two cycles in all.
     memories : bool
         Whether wide words with a long delay wait in memories of look-up tables. This needs an interval of 1.
 
@@ -129,9 +130,9 @@ class Dataflow:
         return word
 
     def input(self, name: str, read: Callable[[Any], Any], formula: str | None = None) -> Word:
-        """A word of the beat, ``read(operands)``.
+        """A word that is read from the beat: ``read(operands)``.
 
-        Formulas show ``formula``, else its symbol in `SYMBOLS`, else its name.
+        Formulas show ``formula``. If it is ``None``, they show the symbol in `SYMBOLS`, or else the name.
         """
         first = 0 if self.interval == 1 else 1
         word = Word(name, (), 0, self.interval, since=first, text=formula or SYMBOLS.get(name, name))
@@ -152,7 +153,7 @@ class Dataflow:
         since: int | Word = 0,
         formula: str | None = None,
     ) -> Word:
-        """A register with ``function`` of the words' values. It takes one cycle.
+        """A register that takes ``function`` of the words' values. It takes one cycle.
 
         Parameters
         ----------
@@ -194,7 +195,7 @@ class Dataflow:
         since: int | Word = 0,
         formula: str | None = None,
     ) -> Word:
-        """Result of a functional unit; its lifetime is one cycle.
+        """Result of a functional unit. The result's lifetime is one cycle.
 
         Parameters
         ----------
@@ -209,12 +210,12 @@ class Dataflow:
         result : callable
             Wiring from the result of the functional unit to the value of the word.
         latency : int or None
-            Registers from the operands to the value that ``result`` reads, if this is not the last register.
-            ``None``: all registers.
+            Registers from the operands to the value that ``result`` reads. ``None``: all registers of the
+            functional unit.
         since : int or Word
             Earliest stage of the word, as for `register`.
         formula : str or None
-            Formula in drawings; ``None``: its name.
+            Formula in drawings. ``None``: the name of the word.
         """
         latency = functional_unit.latency if latency is None else latency
         use = Word(name, tuple(words), 1 + latency, 1, functional_unit, since, text=formula)
@@ -239,7 +240,7 @@ class Dataflow:
     ) -> Word:
         """Exact product of two words on a shared multiplier.
 
-        Latency ``1 + MULTIPLIER_LATENCY`` cycles; 2 cycles in a graph of low latency.
+        It takes ``1 + MULTIPLIER_LATENCY`` cycles, or 2 cycles in a graph of low latency.
 
         Parameters
         ----------
@@ -325,7 +326,7 @@ class Dataflow:
         return self._add(word)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[..., Any]:
-        """Make the hardware. Returns a function that gives a word's value at a stage (`_Build.at`).
+        """Make the hardware. Return the function `_Build.at`, which gives a word's value at a stage.
 
         Parameters
         ----------
@@ -347,7 +348,8 @@ def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> A
     """Exact product, `MULTIPLIER_LATENCY` cycles: a register for each operand, and one for the product.
 
     An FPGA's multipliers lie in few places, far from the multiplexers of operands and the adders of products.
-    These registers can go into the multiplier block. So the wires to it and from it have a cycle each.
+    These registers can go into the multiplier block. So the wires to the block have a whole cycle, and so
+    have the wires from it.
 
     Parameters
     ----------
@@ -361,7 +363,7 @@ def registered_product(register: Callable[[Any, str], Any], a: Any, b: Any) -> A
 
 
 def checked_interval(interval: int | None, longest: int, default: int | None = None) -> int:
-    """An initiation interval from 1 to ``longest``. With ``longest`` one multiplier makes all products.
+    """Check an initiation interval: 1 to ``longest``. With ``longest`` one multiplier makes all products.
 
     ``None`` means ``default``, or ``longest`` without a default.
 
@@ -412,7 +414,7 @@ class _Build:
         return copies[first]
 
     def issue(self, functional_unit: FunctionalUnit, use: Word, operands: Sequence[Any]) -> Any:
-        """Issue operands to an instance of a functional unit. Returns its result, which all its uses read."""
+        """Issue operands to an instance of a functional unit. Returns the result that all its uses read."""
         placement = self.graph.schedule.placements[use]
         instance, when = placement.instance, self.when(placement.read)
         key = functional_unit, instance

@@ -13,7 +13,7 @@ __all__ = ["dot", "shared_sums"]
 
 
 def shared_sums(graph: Dataflow, product: Format) -> FunctionalUnit:
-    """Adders of the three products of a dot product, in the format ``product``.
+    """Shared adders for the three products of a dot product. Each product has the format ``product``.
 
     They take two cycles; see `dot`.
     """

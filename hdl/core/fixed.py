@@ -270,7 +270,7 @@ class FixedValue(ValueCastable):
         Raises
         ------
         ValueError
-            If ``format`` does not hold every number of this one's format.
+            If ``format`` does not hold every number of the value's own format.
         """
         if not format.holds(self.format):
             raise ValueError(f"{format} does not hold every number of {self.format}")

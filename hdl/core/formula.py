@@ -31,8 +31,8 @@ SYMBOLS = {
 """Symbols of a beat's fields in formulas. Other fields appear by their names."""
 
 LONGEST = 14
-"""Largest length of a formula that other formulas repeat. If it is longer, they show its word's name.
-"""
+"""Formulas of at most this many characters are repeated in other formulas. For a longer formula the other
+formulas show the word's name."""
 
 _SUM, _PRODUCT, _ATOM = range(3)
 
@@ -42,7 +42,8 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 class Formula(FixedValue):
     """Text in the place of a value, for the operations that a `FixedValue` has.
 
-    It is a `FixedValue`. So Python calls its operator first if the left operand is a `FixedValue`.
+    `Formula` is a subclass of `FixedValue`. So Python calls the operator of the formula first, even if the
+    left operand is a `FixedValue`.
 
     Parameters
     ----------
@@ -155,7 +156,7 @@ class Formula(FixedValue):
 
 
 def component(vector: Formula, index: int) -> Formula:
-    """Component of a vector, ``N_x`` or ``N_l,x``, or an element of a row, ``f_0``."""
+    """Component of a vector (``N_x`` or ``N_l,x``), or element of a row (``f_0``)."""
     text = vector.within(_ATOM)
     if text[:1].isupper() and index < 3:
         return Formula(f"{text}{',' if '_' in text else '_'}{'xyz'[index]}")
@@ -171,12 +172,12 @@ def formula_of(function: Callable[..., Any], operands: Iterable[Formula]) -> Any
 
 
 def _cast(value: Any) -> Formula:
-    """A formula, or the number of a constant.
+    """The formula itself, or the formula of a constant.
 
     Raises
     ------
     TypeError
-        If it is neither.
+        If the value is neither a formula nor a constant.
     """
     if isinstance(value, Formula):
         return value
@@ -184,7 +185,7 @@ def _cast(value: Any) -> Formula:
         return Formula(f"{value}")
     if isinstance(value, FixedValue):
         code = value.as_value()
-        # A constant that code reads as signed or unsigned.
+        # `as_signed` and `as_unsigned` wrap a constant in an operator.
         code = code.operands[0] if getattr(code, "operator", "") in ("s", "u") else code
         if isinstance(code, Const):
             number = int(value.format.wrap(np.array(code.value))) * value.format.step

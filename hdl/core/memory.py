@@ -1,4 +1,4 @@
-"""Memories that are read through the output register of an FPGA's memory blocks, and FIFOs of memories."""
+"""FIFOs and delays in memories, and reads through the output register of an FPGA's memory block."""
 
 from amaranth.hdl import Cat, Module, Mux, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
@@ -84,7 +84,7 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
     m.d.comb += [first.addr.eq(address), second.addr.eq(following)]
     with m.If(taken):
         m.d.sync += [address.eq(following), following.eq(following + 1)]
-    # The unit knows late whether a beat leaves, so both possible words are read before.
+    # ``taken`` comes late in a cycle, so both words that can be next are read before.
     m.d.sync += leaves.eq(Mux(taken, second.data, first.data))
     return of_shape(word, leaves)
 
@@ -99,8 +99,8 @@ def registered_read(
     """Word of a memory, two cycles after its address. Both registers have the same enable.
 
     A memory gives its word late in a cycle, and the register behind it gives the word early. FPGAs differ in
-    the word read on a cycle that writes to the same address. On this cycle the registers stand still. So no
-    logic is needed between the memory and the register.
+    the word that they read while the same address is written. On these cycles both registers keep their
+    words. So no logic is needed between the memory and the register.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def registered_read(
     address : Value
         Address of the word.
     wanted : Value
-        Whether the registers should move.
+        Whether the registers should take new words.
     write : WritePort or None
         Port that writes the memory. ``None``: a ROM.
 
@@ -120,7 +120,7 @@ def registered_read(
     word : Signal
         The word.
     moves : Value
-        Whether the registers move.
+        Whether the registers take new words.
     """
     port = memory.read_port(domain="comb")
     moves = wanted if write is None else wanted & ~(write.en & (write.addr == address))
@@ -132,17 +132,17 @@ def registered_read(
 
 
 def turn_of(m: Module, cycles: int) -> Signal:
-    """Address for `delayed`. Words with the same delay share it. It counts from 0 to ``cycles - 2``."""
+    """Address for `delayed`, which counts from 0 to ``cycles - 2``. Words with the same delay share it."""
     turn = Signal(range(cycles - 1), name=f"turn_{cycles}")
     m.d.sync += turn.eq(Mux(turn == cycles - 2, 0, turn + 1))
     return turn
 
 
 def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Signal:
-    """A word delayed by some cycles, by a memory of look-up tables and a register behind it.
+    """A word delayed by ``cycles``, in a memory of look-up tables and a register behind the memory.
 
-    Only cycles on which the module is enabled count. On each of them the memory is read at an address, and
-    then written there. After a reset, words from before the reset come first, in any order.
+    Only enabled cycles of the module count. On each enabled cycle the memory is read at an address, and then
+    written at the same address. After a reset, words from before the reset come first, in any order.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def connect_late_fifo(
 
     A register before the memory completes the source's handshake. Behind the memory are the registers of
     `registered_read`. The source's ready is a register that depends on the FIFO's level alone. `UNCOUNTED`
-    payloads of the depth are reserved for payloads that the level does not count yet. A payload takes
+    places of the depth are reserved for payloads that the level does not count yet. A payload takes
     `LATE_FIFO_LATENCY` cycles through the empty FIFO.
 
     Parameters and errors are those of `connect_fifo`. Two payloads more than the depth can wait behind the
@@ -205,10 +205,10 @@ def connect_late_fifo(
     payload = Signal(width, name=f"{name}_payload", reset_less=True)
     written, room = Signal(name=f"{name}_written"), Signal(name=f"{name}_room", init=1)
     level = Signal(range(depth + 1), name=f"{name}_level")
-    # ``came`` and ``gone`` are not counted by the level yet. ``one`` and ``more`` tell how many payloads wait
-    # in the memory.
+    # The level does not count ``came`` and ``gone`` yet. ``one``: one payload waits in the memory. ``more``:
+    # two or more payloads wait there.
     came, gone, one, more = (Signal(name=f"{name}_{word}") for word in ("came", "gone", "one", "more"))
-    # Whether the memory's word is valid, and whether the word behind it is valid.
+    # Whether the first register behind the memory holds a payload, and whether the second register holds one.
     read, there = Signal(name=f"{name}_read"), Signal(name=f"{name}_there")
     address, reads = Signal((depth - 1).bit_length(), name=f"{name}_address"), Signal(name=f"{name}_reads")
     m.submodules[name] = memory = Memory(shape=width, depth=1 << len(address), init=[])
@@ -219,7 +219,7 @@ def connect_late_fifo(
         source.ready.eq(room),
         port.data.eq(payload),
         port.en.eq(written),
-        # While a word waits, no word is written to its address.
+        # ``reads`` implies ``moves``, because the address of a waiting word is not written.
         reads.eq(wanted & some),
         Value.cast(sink.payload).eq(word),
         sink.valid.eq(there),
@@ -230,7 +230,7 @@ def connect_late_fifo(
         room.eq(level < depth - UNCOUNTED),
         Cat(came, gone).eq(Cat(written, reads)),
         level.eq(level + came - gone),
-        # The unit knows late whether the first payload is read.
+        # ``reads`` comes late in a cycle, so it selects between terms that are ready.
         some.eq(written | more | (one & ~reads)),
         port.addr.eq(port.addr + written),
     ]
@@ -302,7 +302,7 @@ def connect_headed_fifo(
     head : Value
         Bits of the source's payload, or bits made from it.
     depth : int
-        Words of the memory, a power of two from 4 on. All but one of them hold payloads.
+        Words of the memory: a power of two, at least 4. Up to ``depth - 1`` payloads wait there.
 
     Returns
     -------
@@ -340,8 +340,8 @@ def connect_headed_fifo(
     ]
     m.d.sync += [
         some.eq(fetches | (some & ~sink.ready)),
-        # Ready comes from registers alone, so one more payload may come. The pointers can count up to depth -
-        # 1 payloads.
+        # ``room`` is a register, so one more payload may come after the test. The pointers can count up to
+        # ``depth - 1`` payloads.
         room.eq((free - first)[:bits] < depth - 2),
     ]
     with m.If(comes):

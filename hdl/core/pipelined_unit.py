@@ -17,12 +17,11 @@ _UNGROUPED, _GROUP = 36, 12
 class PipelinedUnit(wiring.Component):
     """A unit with a fixed latency and initiation interval. One common enable moves its beats.
 
-    A beat is on the output ``latency`` cycles after it was accepted. If the output is stalled, the whole unit
-    is disabled and holds its payloads (`skid_buffer`). The unit is disabled from the cycle after the first
-    refused beat on. While a beat is inside, the next beat is accepted a whole multiple of
-    ``initiation_interval`` enabled cycles later. In a *spaced* unit the number of enabled cycles is any
-    number, at least ``initiation_interval``. ``i.ready`` and ``o.valid`` follow from the unit's registers
-    alone. Reset empties the unit.
+    A beat is on the output ``latency`` cycles after it was accepted. After a cycle on which the sink does not
+    take a beat, the whole unit is disabled and holds its payloads (`skid_buffer`). While a beat is inside,
+    the next beat is accepted a whole multiple of ``initiation_interval`` enabled cycles later. In a *spaced*
+    unit it is accepted any number of enabled cycles later, from ``initiation_interval`` on. ``i.ready`` and
+    ``o.valid`` follow from the unit's registers alone. Reset empties the unit.
 
     A subclass describes its registers in `datapath`, as if they were enabled on every cycle. Control comes
     from the *stage* of a beat: `at` tells whether a beat was accepted a number of enabled cycles ago.
@@ -39,7 +38,7 @@ class PipelinedUnit(wiring.Component):
     constants : ShapeLike or None
         Shape of the port ``constants``: values that are constant while beats are inside. ``None``: no port.
     spaced : bool
-        Whether the next beat may come any number of cycles later, at least ``initiation_interval``.
+        Whether the next beat may come any number of cycles later, from ``initiation_interval`` on.
     ports : mapping of str to Member, optional
         Further members, by name.
     skid : bool
@@ -95,19 +94,19 @@ class PipelinedUnit(wiring.Component):
         super().__init__(members | dict(ports or {}))
 
     def datapath(self, m: Module, operands):
-        """Describe the registers in ``m`` and return the payload of the output, ``latency`` registers on."""
+        """Describe the registers in ``m``. Return the payload of the output, ``latency`` registers later."""
         raise NotImplementedError
 
     def at(self, stage: int) -> Value:
-        """Whether a beat was taken in ``stage`` enabled cycles ago, 1 to ``latency``."""
+        """Whether a beat was accepted ``stage`` enabled cycles ago. ``stage`` is 1 to ``latency``."""
         return self._stages[stage - 1]
 
     @staticmethod
     def register(m: Module, value, name: str, *, when: Value | None = None):
         """A register that takes ``value`` on every enabled cycle. With ``when``, only while this is high.
 
-        It holds data and has no reset; `at` tells which data counts. A multiplier's own registers can take
-        its place.
+        It has no reset, because `at` tells whether its data belongs to a beat. A multiplier's own registers
+        can take its place.
         """
         register = Signal(value.shape(), name=name, reset_less=True)
         if when is None:
@@ -135,7 +134,7 @@ class PipelinedUnit(wiring.Component):
         inner = Module()
         operands = self.i.payload
         if self.initiation_interval > 1:
-            # An invalid operand has no stage.
+            # The register also takes operands that are not valid. No stage is set for them.
             operands = self.register(inner, operands, "operands", when=self.i.ready)
         result = self.datapath(inner, operands)
         m.submodules.datapath = EnableInserter(advance)(inner)
@@ -147,9 +146,9 @@ class PipelinedUnit(wiring.Component):
         return m
 
     def _wait(self, m: Module, advance: Value, accept: Value) -> Value:
-        """Whether a beat may come, ``initiation_interval`` enabled cycles after the last beat or later.
+        """Whether a beat may come, ``initiation_interval`` or more enabled cycles after the last beat.
 
-        A register, computed a cycle ahead.
+        This is a register, computed a cycle ahead.
         """
         ready = Signal(name="ready", init=1)
         left = Signal(range(self.initiation_interval), name="left")
@@ -162,9 +161,9 @@ class PipelinedUnit(wiring.Component):
         return ready
 
     def _turn(self, m: Module, advance: Value, accept: Value) -> Value:
-        """Whether a beat may come. Shared parts serve beats of several stages in fixed slots.
+        """Whether a beat may come. Shared parts serve the beats of several stages in fixed slots.
 
-        A register, computed a cycle ahead.
+        This is a register, computed a cycle ahead.
         """
         ready, turn = Signal(name="ready", init=1), Signal(range(self.initiation_interval))
         # Whether a beat will be inside on the next cycle even if no beat comes on this cycle.

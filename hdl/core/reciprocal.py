@@ -1,4 +1,4 @@
-"""Reciprocals of the steps of a span, and their squares, as words of a data flow."""
+"""Reciprocals of a span's number of steps, and their squares, as words of a data flow."""
 
 from amaranth.hdl import Cat, Const, Mux, Value
 
@@ -51,10 +51,11 @@ def reciprocal_words(
     length_bits: int = LENGTH_BITS,
     since: int = 0,
 ) -> tuple[Word, Word]:
-    """``dt = 1/(m - 1) = 2 reciprocal 2^-shift``, by the address and shift of `reciprocal_address`.
+    """Reciprocal of a span's steps: ``dt = 1/(m - 1) = 2 reciprocal 2^-shift``; m is the span's length.
 
-    The words take five cycles: m - 1, its leading one, the address, the table and its register. With fewer
-    bits of the length the table has ``2^(length_bits - 1)`` words.
+    Address and shift are those of `reciprocal_address`. The words take five cycles: m - 1, its leading one,
+    the address, the table and its register. With fewer bits of the length the table has
+    ``2^(length_bits - 1)`` words.
 
     Parameters
     ----------
@@ -72,13 +73,13 @@ def reciprocal_words(
     Returns
     -------
     reciprocal, shift : Word
-        In the table's format; 0 to ``length_bits``.
+        The reciprocal in the table's format, and the shift, 0 to ``length_bits``.
     """
     table = reciprocal_table() if table is None else table
     top = length_bits - 1
 
     def leading(steps):
-        # A span of one pixel has no leading one.
+        # If the span has one pixel, m - 1 is 0 and has no leading one.
         position, below_top = Const(0, range(length_bits)), Const(top, range(length_bits))
         for bit in range(length_bits):
             position = Mux(steps[bit], Const(bit, range(length_bits)), position)
@@ -102,7 +103,7 @@ def reciprocal_words(
 
 
 def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Word]:
-    """``dt^2 = 4 square 2^-square_shift``, as `step_words` rounds it. It takes two cycles.
+    """Square of a reciprocal: ``dt^2 = 4 square 2^-square_shift``, as `step_words` rounds it. Two cycles.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def square_words(graph: Dataflow, product: Word, shift: Word) -> tuple[Word, Wor
     Returns
     -------
     square, square_shift : Word
-        ``UQ(0, 17)``; 0 to 25.
+        The square in ``UQ(0, 17)``, and its shift, 0 to 25.
     """
     exact = UQ(0, 34)
 

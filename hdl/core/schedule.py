@@ -5,7 +5,8 @@ words nor Amaranth. `blysk.hdl.core.dataflow` describes the operations and makes
 
 The scheduler guarantees, for every schedule:
 
-- An operation reads its operands when all of them are there, and not before its ``since``.
+- An operation reads its operands on a cycle on which all of them are there. Its result is not before its
+  ``since``.
 - Two uses of an instance of a functional unit never meet, in any two beats that the interval allows.
 - A functional unit has as few instances as the interval allows, ``ceil(uses / interval)``. In a spaced
   schedule of operations that depend on each other, the search finds the number.
@@ -98,14 +99,14 @@ class Schedule:
 
 
 def place(operations: Sequence[Operation], interval: int, spaced: bool = False) -> Schedule:
-    """Place each operation at the earliest stage with its operands and a free slot.
+    """Place each operation at the earliest stage that has its operands and a free slot.
 
     Beats come a whole multiple of the interval apart, so an instance has as many slots as the interval has
-    cycles. In a *spaced* schedule beats come any number of cycles apart, at least the interval. The uses of
-    an instance then lie within as many stages as the interval has cycles.
+    cycles. In a *spaced* schedule beats come any number of cycles apart, from the interval on. The uses of an
+    instance then lie within as many stages as the interval has cycles.
 
-    Then operations with hardware of their own move to the latest stage that needs no copy of their operands.
-    They can move if other operations read the same operands later.
+    Then operations with hardware of their own move to the latest stage that needs no further copy of an
+    operand. An operand is there for its lifetime, and until the last other operation has read it.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ def place(operations: Sequence[Operation], interval: int, spaced: bool = False) 
     interval : int
         Initiation interval, at least 1.
     spaced : bool
-        Whether beats may come any number of cycles apart, at least the interval.
+        Whether beats may come any number of cycles apart, from the interval on.
 
     Returns
     -------
@@ -175,14 +176,14 @@ def _greedy(operations: Sequence[Operation], interval: int, spaced: bool) -> Sch
 
 
 def _size(schedule: Schedule) -> tuple[int, int]:
-    """Instances first, then cycles."""
+    """Size of a schedule for comparisons: first the number of instances, then the length."""
     return sum(schedule.counts.values()), schedule.length
 
 
 def _shared(
     operations: Sequence[Operation], interval: int, resources: Sequence[Hashable]
 ) -> Iterator[Schedule]:
-    """Spaced schedules with few instances. There are none if there are too many ways to search.
+    """Spaced schedules with few instances. If there are too many ways to search, there are no schedules.
 
     The uses of a functional unit, sorted by their earliest stage, are divided into runs of neighbours. Each
     run has an instance. The first uses of a run wait until all its uses lie within the interval.
@@ -275,7 +276,7 @@ def _delayed(
         fixed = operation.resource is not None or not operation.latency or operation in bound
         if fixed or not readers[operation] or not operation.operands:
             continue
-        # Wiring is where its operand is.
+        # Wiring has the stage of its operand. So operations beside wiring do not move.
         if any(not o.latency and o.operands for o in (*readers[operation], *operation.operands)):
             continue
         latest = min(placements[o].read for o in readers[operation]) - operation.latency

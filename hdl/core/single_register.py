@@ -1,4 +1,4 @@
-"""Streams behind one register: half the registers of a slice, but half the rate or a combinational ready."""
+"""Streams through one register in place of two. Either the rate is half, or ready is combinational."""
 
 from amaranth.hdl import Module, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
@@ -40,10 +40,10 @@ def connect_register(m: Module, name: str, source: stream.Interface, sink: strea
 
 
 def hold_output(m: Module, output: stream.Interface, valid: ValueLike, payload: ValueLike) -> Value:
-    """Drive a stream from a register that keeps its payload until it is taken. Returns whether it may change.
+    """Drive a stream from a register that keeps its payload until the sink takes the payload.
 
-    This is `skid_buffer` without the spare register. So logic behind it sees the sink's ready on the same
-    cycle. The parameters and errors are those of `skid_buffer`.
+    Returns whether the register may change. This is `skid_buffer` without the spare register. So the result
+    depends on the sink's ready of the same cycle. The parameters and errors are those of `skid_buffer`.
     """
     m.d.comb += [output.valid.eq(valid), copy(output.payload, payload, "payload")]
     return ~Value.cast(valid) | output.ready

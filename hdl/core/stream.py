@@ -258,7 +258,7 @@ def count_down(m: Module, valid: Value, length: Value, advance: Value) -> tuple[
     valid : Value
         Whether there is a next span.
     length : Value
-        Its pixels, 0 or more.
+        Number of the span's pixels, 0 or more.
     advance : Value
         Whether the counter moves.
 

@@ -25,7 +25,7 @@ def require_same_shape(a: ShapeLike, b: ShapeLike, path: str = "payload") -> Non
     Raises
     ------
     TypeError
-        If the shapes differ, naming the field.
+        If the shapes differ. The message names the field.
     """
     if isinstance(a, data.StructLayout) and isinstance(b, data.StructLayout):
         if list(a.members) != list(b.members):
@@ -82,12 +82,12 @@ def copy_fields(target, source, names: Iterable[str] | None = None) -> list:
     Returns
     -------
     list of Assign
-        An assignment a field.
+        One assignment for each field.
 
     Raises
     ------
     TypeError
-        If the shapes of a field differ, naming the field.
+        If the shapes of a field differ. The message names the field.
     """
     if names is None:
         names = target.shape().members if isinstance(target, data.View) else target
@@ -131,7 +131,7 @@ def of_shape(like, bits: Value):
     Returns
     -------
     ValueLike
-        The bits in the shape of ``like``. If this is a plain shape, the bits unchanged.
+        The bits in the shape of ``like``. For a plain shape they are unchanged.
     """
     shape = like.shape()
     return shape(bits) if isinstance(shape, ShapeCastable) else bits

@@ -22,9 +22,9 @@ class Word(Operation):
     graph : Dataflow
         Graph of the word.
     make : callable
-        Makes its hardware.
+        Makes the word's hardware.
     text : str or None
-        Its formula, if the function does not give it.
+        Formula of the word, if its function does not give the formula.
     trace : callable
         Takes the symbols of the operands. Returns the word's formula, or ``None``, and the formulas of the
         operands of its functional unit.
@@ -74,5 +74,5 @@ class Word(Operation):
 
 
 def traced(function: Callable[..., Any]) -> Callable[..., tuple[Any, Sequence[Any]]]:
-    """Trace of a word that a function makes from its operands."""
+    """``trace`` of a word that ``function`` makes from its operands."""
     return lambda *symbols: (formula_of(function, symbols), ())

@@ -1,1 +1,1 @@
-"""From a component to Verilog, and to the count of its parts."""
+"""Verilog of a component, and the count of its parts."""

@@ -20,8 +20,8 @@ class Cost:
     cells : int
         Operators, multiplexers, registers and memories of any width.
     multipliers : dict of (int, int) to int
-        Number of multipliers by the widths of their operands, the wider first, without multipliers by a
-        constant.
+        Number of multipliers for each pair of operand widths, the wider width first. Multipliers by a
+        constant are left out.
     constant_multipliers : int
         Number of multipliers by a constant.
     register_bits : int
@@ -44,7 +44,7 @@ class Cost:
 
     @property
     def totals(self) -> dict[str, int]:
-        """``cells``, ``multipliers``, ``register_bits`` and ``memory_bits``, a number each."""
+        """Four numbers by name: ``cells``, ``multipliers``, ``register_bits`` and ``memory_bits``."""
         return {
             "cells": self.cells,
             "multipliers": self.multiplier_count,

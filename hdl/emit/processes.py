@@ -1,4 +1,4 @@
-"""Programs that end with this process, however it ends."""
+"""Programs that are killed when this process ends."""
 
 import atexit
 import contextlib
@@ -27,9 +27,9 @@ for number in running:
 
 
 class _Guard:
-    """A small process that reads from a pipe what runs, and kills this when the pipe is closed.
+    """A small process that reads from a pipe which process groups run. It kills them when the pipe closes.
 
-    The system closes this end even if SIGKILL ends this process.
+    If this process ends, the system closes the pipe, even after SIGKILL.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class _Guard:
         self._owner = 0
 
     def begin(self) -> None:
-        """Start the guard unless it runs, before a program that may be killed at once with its parent."""
+        """Start the guard, unless it runs. Call this before the guarded program starts."""
         with self._lock:
             if self._process is None or self._owner != os.getpid():
                 self._start()
@@ -58,7 +58,7 @@ class _Guard:
                 self._tell(b"-%d\n" % number)
 
     def stop(self) -> None:
-        """End the guard, which kills what still runs."""
+        """End the guard. It kills the process groups that still run."""
         with self._lock:
             if self._process is not None and self._owner == os.getpid():
                 with contextlib.suppress(OSError):
@@ -95,7 +95,7 @@ _guard = _Guard()
 
 
 class Process(_Popen):
-    """A program in a process group of its own, which is killed when this process ends, even by SIGKILL.
+    """A program in a process group of its own. The group is killed when this process ends, even by SIGKILL.
 
     `kill` kills the group, with all processes that the program started. On systems other than POSIX this is
     ``subprocess.Popen``.
@@ -149,7 +149,7 @@ def run_program(
     check: bool = False,
     **options: Any,
 ) -> subprocess.CompletedProcess:
-    """``subprocess.run`` by a `Process`. The program ends with this process, and reads nothing by default.
+    """Run a program as ``subprocess.run`` does, in a `Process`. By default its standard input is empty.
 
     Parameters
     ----------

