@@ -73,12 +73,12 @@ def frame_constants_shape(
 
 
 class FrameConstantsUnit(wiring.Component):
-    """Registers for the constants of a frame, one word a write.
+    """Registers for the constants of a frame. A write changes one word.
 
-    A write is accepted on a cycle on which ``hold`` is low. Words have 18 bits; of a shorter constant the low
-    bits count. A write to any other address is accepted, too, and changes nothing. Reset clears every
-    constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are accepted and shade by the same
-    formula, outside the stated error.
+    A write is accepted on a cycle on which ``hold`` is low. Words have 18 bits. A shorter constant takes the
+    low bits of its word. A write to an address without a constant is accepted, and changes nothing. Reset
+    clears every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are accepted. They shade
+    by the same formula, outside the stated error.
 
     ======================== ==========================================================
     address                  constant
@@ -101,8 +101,8 @@ class FrameConstantsUnit(wiring.Component):
 
     A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
     the colours are in memories, one for each word. They are written for the material whose index was last
-    written to address 4. They are read for ``material``, 1 cycle after ``material`` changes, and 3 after a
-    write. All 18 bits of an index count. Writes for an index past the last material are lost, and so is a
+    written to address 4. They are read for ``material``: 1 cycle after ``material`` changes, and 3 cycles
+    after a write. All 18 bits of an index count. Writes for an index past the last material are lost. So is a
     bank past the last bank. A unit of one material has no index, and address 4 changes nothing. Reset does
     not clear memories.
 
@@ -129,9 +129,9 @@ class FrameConstantsUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Writes.
     hold : :py:`In(1)`
-        Whether no write is accepted.
+        While it is high, no write is accepted.
     material : :py:`In(range(materials))`
-        Only with several materials: index of the material of the given constants.
+        Index of the material whose constants are read. Only with several materials.
     constants : :py:`Out(frame_constants_shape(lights, threshold, banks, albedo))`
         The constants.
 
@@ -165,7 +165,7 @@ class FrameConstantsUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """A register or memory for each word; registers for the data and for the address, half decoded."""
+        """A register or memory for each word, and registers for the data and the half decoded address."""
         m = Module()
         m.d.comb += self.write.ready.eq(~self.hold)
         words, of_material = {}, set()
@@ -198,7 +198,7 @@ class FrameConstantsUnit(wiring.Component):
         if self.banks > 1:
             there_is_the_bank = Signal(name="there_is_the_bank")
             m.d.sync += there_is_the_bank.eq(self.write.payload.data < self.banks)
-        # The upper address selects a light or the frame, the lower one a word of it.
+        # The upper bits of the address select a light or the frame. The lower bits select a word of it.
         address, decoded = self.write.payload.address, {}
         for kind, digits, part in (
             ("light", {word // LIGHT_STRIDE for word in words}, address[LIGHT_STRIDE.bit_length() - 1 :]),
@@ -232,7 +232,7 @@ class FrameConstantsUnit(wiring.Component):
         return m
 
     def _albedo_words(self) -> dict[int, Value]:
-        """Words of the constants of an albedo, by their address."""
+        """Words of the constants of an albedo, by address."""
         constants = self.constants
         words = {EMISSION_ADDRESS + k: Value.cast(color) for k, color in enumerate(constants.emission)}
         if self.albedo.tints:

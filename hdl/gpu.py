@@ -20,7 +20,7 @@ STATUS = (*DRAWN, "late_bands", "frames_shown")
 
 
 class GpuUnit(wiring.Component):
-    """Draws a mesh and shows it, by a `DrawUnit` and a `DisplayUnit`. `Gpu` is the bit-accurate model.
+    """Draws a mesh by a `DrawUnit`, and shows it by a `DisplayUnit`. `Gpu` is the bit-accurate model.
 
     There are three clocks, see `DisplayUnit`. Pixels are drawn as fast as they come, and shown a band later.
 
@@ -32,9 +32,9 @@ class GpuUnit(wiring.Component):
     Members
     -------
     buttons : :py:`In(4)`
-        See `ControlsUnit`. From any clock.
+        Buttons, from any clock; see `ControlsUnit`.
     pairs : :py:`Out(data.ArrayLayout(2, 4))`
-        Domain ``serial``, see `DisplayUnit`.
+        Pairs of bits for the lanes, in the domain ``serial``; see `DisplayUnit`.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
 

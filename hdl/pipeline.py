@@ -25,11 +25,17 @@ __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 
 
 def span_shape(model: ShadingPipeline) -> data.StructLayout:
-    """Shape of a raster span: first pixel, pixels, and the operands of the method.
+    """Shape of a raster span: first pixel, number of pixels, and the operands of the method.
 
-    The operands are unit normals at the first and last pixel centre, the ends of the true line, values of
-    each light, or vectors N/W with their steps. Without lights there are no operands. With several materials
-    there is ``material``, and with an albedo there are ``attributes``.
+    The method decides about the operands. They are one of these:
+
+    - unit normals at the first and last pixel centre;
+    - the ends of the true line;
+    - values of each light;
+    - vectors N/W with their steps.
+
+    Without lights there are no operands. With several materials there is ``material``, and with an albedo
+    there are ``attributes``.
 
     Parameters
     ----------
@@ -61,7 +67,7 @@ def status_shape() -> data.StructLayout:
     """Shape of the pipeline's counters since reset, which stop at their largest value.
 
     - ``out_of_range_spans``: spans with a larger angle than the method serves. Their pixels have no error
-    bound. They are counted some cycles after the span is accepted.
+    bound. A span is counted some cycles after it was accepted.
     - ``empty_spans``: spans of length 0.
     - ``overrun``: whether a span went past the largest x. After it x goes on from 0.
     """
@@ -79,18 +85,18 @@ class ShadingPipelineUnit(wiring.Component):
 
     An interpolator takes spans to the operands of their pixels. A light unit for each light takes operands to
     terms, and the intensity unit takes terms to colours. For the transfer ``"srgb"`` a transfer unit encodes
-    them. The setup of the next spans overlaps the pixels of this span. A FIFO carries the coordinates of the
-    spans past all of these. `ShadingPipeline` is the bit-accurate model.
+    the colours. The setup of the next spans overlaps the pixels of this span. A FIFO carries the coordinates
+    of the spans past all these units. `ShadingPipeline` is the bit-accurate model.
 
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
     each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles, and in the
     throughput style at least ``cycles_per_pixel length``. A short span that follows a long span takes the
-    fewest, because up to two prepared spans wait before the accumulator. (``bisection`` takes longer for
-    several segments.) A span of length 0 is accepted like any other and gives no pixel.
+    fewest cycles, because up to two prepared spans wait before the accumulator. (``bisection`` takes longer
+    for several segments.) A span of length 0 is accepted like any other and gives no pixel.
 
     With a gate a highlight gate processes each span in parallel with the interpolator, and decides for each
-    light. If the span has no highlight, the specular unit of the light keeps its state, or in the compact
-    style is bypassed. The gate accepts spans as often as the setup does. A decision precedes the first pixel
+    light. If the span has no highlight, the specular unit of the light keeps its state. In the compact style
+    it is bypassed. The gate accepts spans as often as the setup does. A decision precedes the first pixel
     of its span, or the pixel waits for the decision. So a method with a shorter setup than the gate, such as
     ``linear``, may take a cycle more for short spans.
 
@@ -105,21 +111,21 @@ class ShadingPipelineUnit(wiring.Component):
     - one for the specular terms of each light;
     - two for the products of each light with a normal, if the method finds normals;
     - one or two for the setup, as many as its longest interval needs;
-    - with an albedo, a third of its multipliers in the other style.
+    - with an albedo, a third of the albedo's multipliers in the throughput style.
 
     ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for the setup. A pixel takes the
     larger of two numbers of cycles:
 
-    - a cycle a channel for each of its diffuse and specular terms that is not 0, and for one term at least,
-    or with an albedo for one more, see `Intensity.cycles`;
-    - if a light is in front and the span not dark, a cycle for each product of the specular model (a power
-      42).
+    - ``channels max(1, T)``, or ``channels (1 + T)`` with an albedo, where T is the number of its diffuse and
+      specular terms that are not 0 (see `Intensity.cycles`);
+    - one cycle for each product of the specular model (42 for a power), if a light is in front of the surface
+      and the span is not dark.
 
     So pixels without a highlight take fewer cycles. The pixels are the same to the bit. ``cycles_per_pixel``
     and ``latency`` are then those of a pixel with every term.
 
     A write is accepted when no span is inside, and no span is accepted while a write waits. So the constants
-    never change while spans are inside. ``i.ready`` falls on the cycle on which ``write.valid`` rises, and
+    never change while spans are inside. ``i.ready`` falls on the cycle on which ``write.valid`` rises. It
     rises 2 cycles after the last write was accepted. For the same reason a span of another material than the
     span before it waits until no span is inside. It is accepted 5 cycles after the last pixel has left. Its
     first pixel comes ``latency + 5`` cycles after this last pixel, in place of 1 cycle without the change.
@@ -187,12 +193,12 @@ class ShadingPipelineUnit(wiring.Component):
     def _make_albedo(self) -> None:
         """The albedo path, and the times that follow from it."""
         p, shading = self.model, self._shading
-        # A pixel takes a cycle a channel at least, in the compact style.
+        # In the compact style a pixel takes at least one cycle for each channel.
         interval = 3 if p.build.compact else 1
         self._albedo = AlbedoUnit(p.albedo, p.length_bits, interval)
         behind = shading.latency - shading.light_latency + self._assembler.latency
         before = self.latency - behind if p.lights else 0
-        # All pixels that may come before their terms.
+        # Room for all pixels whose albedo may come before their terms.
         self._waiting_albedos = -(-before // interval) + UNCOUNTED + 2
         path = SLICE_LATENCY + self._albedo.latency + LATE_FIFO_LATENCY
         self.latency = max(before, path) + behind
@@ -204,7 +210,7 @@ class ShadingPipelineUnit(wiring.Component):
         compact, setup_interval, product_interval = p.build.compact, p.build.setup_interval, 1
         method = unit_of(p.interpolator)
         if compact:
-            # A pixel takes a cycle a channel at least.
+            # A pixel takes at least one cycle for each channel.
             product_interval = p.intensity.channels
             if setup_interval is None:
                 setup_interval = max(method.setup_intervals(p.interpolator), default=None)
@@ -237,7 +243,7 @@ class ShadingPipelineUnit(wiring.Component):
 
     @property
     def _waiting_spans(self) -> int:
-        """Depth of the FIFOs parallel to interpolator and lights: all spans that may be inside these."""
+        """Depth of the FIFOs parallel to interpolator and lights: the most spans that may be inside these."""
         return max(-(-self.latency // self._shortest_interval) + UNCOUNTED, 17)
 
     @property
@@ -275,7 +281,7 @@ class ShadingPipelineUnit(wiring.Component):
         return m
 
     def _carry_coordinates(self, m: Module) -> tuple[Value, Value]:
-        """FIFO of the coordinates of spans, from the input to the assembler; valid and ready of its input."""
+        """Carry the coordinates of spans to the assembler in a FIFO. Returns valid and ready of its input."""
         p, assembler = self.model, self._assembler
         layout = coordinates_shape(p.x_bits, p.y_bits, p.length_bits)
         source = stream.Signature(layout).create(path=("source",))
@@ -286,7 +292,7 @@ class ShadingPipelineUnit(wiring.Component):
     def _carry_albedo(
         self, m: Module, frame: FrameConstantsUnit
     ) -> tuple[stream.Interface, tuple[Value, Value]]:
-        """Albedo of the pixels, which wait for their terms; and valid and ready of the path's input."""
+        """Make the albedo of the pixels, which waits for their terms. Returns it and the handshake."""
         m.submodules.albedo = unit = self._albedo
         source = unit.i.signature.flip().create(path=("attributes",))
         attributes = self.i.payload.attributes
@@ -307,7 +313,7 @@ class ShadingPipelineUnit(wiring.Component):
         return albedo, (source.valid, source.ready)
 
     def _load_texels(self, m: Module, texels: stream.Interface) -> None:
-        """Write texels behind a register of the writes that load them."""
+        """Load texels, a cycle after their writes were taken."""
         of_texels = Signal(name="of_texels")
         write = self.write.payload
         m.d.sync += [
@@ -318,10 +324,11 @@ class ShadingPipelineUnit(wiring.Component):
         m.d.comb += texels.valid.eq(self._written & of_texels)
 
     def _admit(self, m: Module, frame: FrameConstantsUnit, sinks: list[tuple[Value, Value]]) -> Value:
-        """Accept spans and writes; whether a span of a pixel or more is accepted on this cycle.
+        """Accept spans and writes. Returns whether a span of 1 pixel or more is accepted on this cycle.
 
-        A span is accepted if every sink is ready, and then by all of them on the same cycle; writes, while no
-        span is inside. An interpolator that takes the words of a span in turns `has_begun` it before.
+        A span is accepted if every sink is ready, by all sinks on the same cycle. A write is accepted while
+        no span is inside. Some interpolators take the words of a span in turns. They have begun the span
+        before it is accepted (`has_begun`).
 
         Parameters
         ----------
@@ -340,7 +347,7 @@ class ShadingPipelineUnit(wiring.Component):
         begun = None if self._interpolator is None else self._interpolator.has_begun
         if begun is not None:
             hold, write_waits = hold | begun, write_waits & ~begun
-            # The payload stays: no path leads from the length then.
+            # A span that has begun has pixels. So no path leads from the length then.
             has_pixels |= begun
         m.d.comb += [
             nonempty.eq(self.i.valid & has_pixels),
@@ -355,7 +362,7 @@ class ShadingPipelineUnit(wiring.Component):
         connect(m, wiring.flipped(self.write), frame.write)
         # A constant has its value two cycles after its write.
         m.d.sync += written.eq(self.write.valid & self.write.ready)
-        # Without the spans of the last cycle, so that no path leads from the ports into the sum.
+        # ``inside`` lags a cycle behind, so that no path leads from the ports into the sum.
         inside = Signal(range(self.spans_inside + 1))
         came, went = Signal(name="came"), Signal(name="went")
         finished = self.o.valid & self.o.ready & self.o.payload.last
@@ -368,7 +375,7 @@ class ShadingPipelineUnit(wiring.Component):
             idle.eq(~admit & (idle | (finished & is_one))),
         ]
         if (p := self.model).materials > 1:
-            # Constants follow the index one cycle later, the slope of the exponent some more.
+            # Constants follow the index one cycle later, and the slope of the exponent some cycles later.
             material, waited = existing_material(self.i.payload.material, p.materials), Signal(2)
             with m.If(self.i.valid & (material != frame.material)):
                 m.d.sync += waited.eq(0)
@@ -376,7 +383,7 @@ class ShadingPipelineUnit(wiring.Component):
                     m.d.sync += frame.material.eq(material)
             with m.Elif(~waited.all()):
                 m.d.sync += waited.eq(waited + 1)
-            # Independent of a payload that is not valid: its bits may be unknown.
+            # Ready does not depend on a payload that is not valid, because its bits may be unknown.
             same = (material == frame.material) & waited.all()
             m.d.comb += settled.eq(~self.i.valid | same)
         else:
@@ -384,7 +391,7 @@ class ShadingPipelineUnit(wiring.Component):
         return admit
 
     def _count(self, m: Module, admit: Value) -> None:
-        """Counters of `status_shape`."""
+        """Drive the counters of `status_shape`."""
         span, status = self.i.payload, self.status
         for counter, event in (
             (status.out_of_range_spans, self._interpolator.out_of_range if self._interpolator else 0),
@@ -399,7 +406,7 @@ class ShadingPipelineUnit(wiring.Component):
     def _shade(
         self, m: Module, frame: FrameConstantsUnit, albedo: stream.Interface | None
     ) -> list[tuple[Value, Value]]:
-        """Units from spans to colours; valid and ready of those that take spans."""
+        """Connect the units from spans to colours. Returns valid and ready of the units that take spans."""
         p, span = self.model, self.i.payload
         m.submodules.interpolator = interpolator = self._interpolator
         m.submodules.intensity = self._shading.intensity
@@ -421,7 +428,7 @@ class ShadingPipelineUnit(wiring.Component):
         return sinks
 
     def _decide(self, m: Module, frame: FrameConstantsUnit, sinks: list) -> tuple[stream.Interface, Value]:
-        """Operands of the pixels, and the highlight gate's decision for each light; two more ``sinks``."""
+        """Operands of the pixels, and the highlight gate's decision for each light. Appends to ``sinks``."""
         p, span = self.model, self.i.payload
         m.submodules.highlight_gate = gate = self._gate
         width = p.length_bits
@@ -441,7 +448,7 @@ class ShadingPipelineUnit(wiring.Component):
             decisions.w_data.eq(gate.o.payload),
             decisions.w_en.eq(gate.o.valid),
             gate.o.ready.eq(decisions.w_rdy),
-            # A pixel waits for the decision of its span; the length is there before that.
+            # A pixel waits for the decision of its span. The length is there earlier.
             copy(operands.payload, source.payload),
             operands.valid.eq(source.valid & decisions.r_rdy),
             source.ready.eq(operands.ready & decisions.r_rdy),

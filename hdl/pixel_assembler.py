@@ -59,7 +59,7 @@ class PixelAssemblerUnit(wiring.Component):
     """Cycles from coordinates to their first pixel, if the colour waits."""
 
     SPANS_INSIDE = 4
-    """Largest number of spans inside: coordinates of two, and two waiting pixels."""
+    """Largest number of spans inside: coordinates of two spans, and two waiting pixels of other spans."""
 
     def __init__(self, x_bits: int = 12, y_bits: int = 12, length_bits: int = 12):
         super().__init__(

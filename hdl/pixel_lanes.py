@@ -25,7 +25,7 @@ def lanes_shape(pipes: int, x_bits: int = 12, y_bits: int = 12) -> data.StructLa
 
 
 class PixelLanesUnit(wiring.Component):
-    """Joins several streams of pixels into beats of at most a pixel a lane.
+    """Joins several streams of pixels into wide beats, with at most one pixel for each lane.
 
     A pixel leaves 1 cycle after it was accepted. Without stalls every lane accepts a pixel on every cycle,
     and no lane waits for another. The payload of a lane without a pixel has no meaning. The unit has no

@@ -29,11 +29,11 @@ class PixelMergerUnit(wiring.Component):
     Members
     -------
     turns : :py:`In(stream.Signature(range(pipes)))`
-        The input of each span, of 1 pixel or more, in the order of the output.
+        Index of the input for each span, in the order of the output. A span has 1 pixel or more.
     i : :py:`In(stream.Signature(pixel_shape(x_bits, y_bits))).array(pipes)`
         Pixels.
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
-        Pixels of all.
+        Pixels of all inputs.
 
     Source: docs/theory/units.md#pipeline.
     """

@@ -32,7 +32,8 @@ WAITING_SPANS = 512
 Block RAMs hold 512 words. A memory of 32 words in look-up tables takes more logic than the block RAMs' ports.
 If the spans of a mesh have about as many pixels as there are pipelines, the span port has no cycle to spare.
 Each cycle on which a full FIFO stops it is then lost. An example is the teapot of 10,712 triangles at
-640x480. Four pipelines give 3.3 times the pixels of one pipeline with 32 words, and 3.6 times with 512.
+640x480. With 32 words four pipelines give 3.3 times the pixels of one pipeline in a cycle. With 512 words
+they give 3.6 times the pixels.
 """
 
 
@@ -60,19 +61,18 @@ _BEHIND = 2
 class PixelPipelinesUnit(wiring.Component):
     """Shading pipelines of one design. Pipeline k takes the spans of scanlines y with ``y mod pipes = k``.
 
-    Each has a stream of pixels of its own, with its own back-pressure. So a pixel of each pipeline may leave
-    on a cycle. `PixelPipelines` is the bit-accurate model. A scanline belongs to one pipeline, so its pixels
-    keep the order of its spans. Between scanlines no order holds.
+    Each pipeline has its own stream of pixels, with its own back-pressure. So on a cycle each pipeline may
+    give a pixel. `PixelPipelines` is the bit-accurate model. A scanline belongs to one pipeline, so its
+    pixels keep the order of its spans. Between scanlines no order holds.
 
-    One span is accepted a cycle, into the FIFO before its pipeline. A full FIFO stops the port. So the pixels
-    a cycle are at most the mean number of pixels of a span. They are fewer where many spans in a row go to
-    one pipeline. Spans triangle by triangle go from scanline to scanline, and keep all pipelines busy. A
-    frame sorted by scanlines keeps only one pipeline busy if a scanline has more spans than a FIFO holds.
+    On each cycle one span is accepted, into the FIFO before its pipeline. A full FIFO stops the port. So the
+    pixels in a cycle are at most the mean number of pixels of a span. They are fewer if many spans in a row
+    go to one pipeline. Spans triangle by triangle go from scanline to scanline, and keep all pipelines busy.
+    A frame sorted by scanlines keeps only one pipeline busy if a scanline has more spans than a FIFO holds.
 
-    A write goes to all pipelines. It is accepted when no span is inside, in a FIFO or a pipeline, and no span
-    is accepted while a write waits. The first pixel leaves an idle unit `latency` cycles after its span was
-    accepted. Every pipeline has its own frame constants, and at a change of the material waits only for its
-    own spans.
+    A write goes to all pipelines. It is accepted when no span is in a FIFO or a pipeline. No span is accepted
+    while a write waits. The first pixel leaves an idle unit `latency` cycles after its span was accepted.
+    Every pipeline has its own frame constants. At a change of the material it waits only for its own spans.
 
     Counters of ``status`` are the sums of the pipelines' counters. Like these they stop at their largest
     value. They come a cycle later for each doubling of the pipelines.
@@ -144,17 +144,17 @@ class PixelPipelinesUnit(wiring.Component):
             idle.append(empty & pipeline.write.ready)
             room.append(given.ready | (pipe != k))
         m.d.comb += [
-            # Independent of a payload that is not valid: its bits may be unknown.
+            # Ready does not depend on a payload that is not valid, because its bits may be unknown.
             span.ready.eq(~write.valid & (~span.valid | reduce(and_, room))),
             write.ready.eq(drained),
         ]
-        # While a write waits no span comes: a drained pipeline stays drained.
+        # While a write waits, no span comes. So a drained pipeline stays drained.
         m.d.sync += drained.eq(write.valid & reduce(and_, idle))
         self._count(m)
         return m
 
     def _count(self, m: Module) -> None:
-        """Sums of the pipelines' counters, a register for each pair of them."""
+        """Sum the pipelines' counters in pairs, with a register for each sum."""
         each = [pipeline.status for pipeline in self.pipelines]
         for name in self.status.shape().members:
             counts = [status[name] for status in each]
@@ -179,9 +179,9 @@ class _JoinedPipelines(wiring.Component):
     model, waiting
         Those of `PixelPipelinesUnit`.
     joins : type
-        That unit, which takes the number of pipelines and the bits of x and of y.
+        Unit that joins the pixels. It takes the number of pipelines and the bits of x and of y.
     shape : callable
-        Payload of the stream; takes the same.
+        Function that makes the shape of the stream's payload from the same three numbers.
     """
 
     def __init__(self, model, waiting: int, joins: type, shape: Callable[[int, int, int], ShapeLike]):
@@ -189,7 +189,7 @@ class _JoinedPipelines(wiring.Component):
         self.model = p = self.pipelines.model
         size = p.pipes, p.design.x_bits, p.design.y_bits
         self._join = joins(*size)
-        # With a merger no cycle more: a turn is in its FIFO before the first pixel of its span comes.
+        # The FIFO of turns costs no cycle: a turn is there before the first pixel of its span comes.
         self.latency = self.pipelines.latency + self._join.latency
         members = dict(self.pipelines.signature.members)
         super().__init__(members | {"o": Out(stream.Signature(shape(*size)))})
@@ -198,7 +198,7 @@ class _JoinedPipelines(wiring.Component):
 class WidePipelinesUnit(_JoinedPipelines):
     """`PixelPipelinesUnit` with one wide stream of pixels, a lane for each pipeline, for simulation.
 
-    A pipeline waits for no other. The first pixel leaves an idle unit `latency` cycles after its span was
+    No pipeline waits for another. The first pixel leaves an idle unit `latency` cycles after its span was
     accepted.
 
     Parameters
@@ -233,10 +233,10 @@ class WidePipelinesUnit(_JoinedPipelines):
 
 
 class MergedPipelinesUnit(_JoinedPipelines):
-    """`PixelPipelinesUnit` with one stream of pixels, in the order of the spans, as of one pipeline.
+    """`PixelPipelinesUnit` with one stream of pixels in the order of the spans, as one pipeline gives it.
 
-    It gives at most a pixel a cycle. So several pipelines gain speed only if each takes several cycles a
-    pixel, as in the compact style.
+    The unit gives at most a pixel a cycle. So several pipelines gain speed only if each takes several cycles
+    for a pixel, as in the compact style.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class PixelShading:
     Attributes
     ----------
     lights : list
-        Light units, or diffuse units without specular light.
+        Light units. Without specular light they are diffuse units.
     slope, tables : Component or None
         Slopes or tables that the lights share.
     intensity : Component or None
@@ -41,7 +41,7 @@ class PixelShading:
     light_latency, latency : int
         Latency from the operands to the terms, and to the colours.
     cycles_per_pixel : int
-        Cycles of a pixel with every term.
+        Cycles that a pixel with every term takes.
     """
 
     def __init__(self, model: ShadingPipeline):
@@ -62,7 +62,7 @@ class PixelShading:
         self.cycles_per_pixel = max((unit.initiation_interval for unit in paced), default=1)
 
     def _light_units(self) -> list:
-        """Light units, or diffuse units without specular light; and the slopes or tables that they share."""
+        """Make the light units (diffuse units without specular light), and their shared slopes or tables."""
         p = self.model
         compact, exponent = p.build.compact, p.build.exponent
         diffuse = Diffuse(p.interpolator.COSINE_FORMAT)
@@ -73,9 +73,9 @@ class PixelShading:
             self.slope = kind.slope_unit(p.specular)
         if kind.memory:
             self.tables = kind.memory(p.specular, p.lights)
-        # In lockstep all lights take as long as a light that fades.
+        # Lights in lockstep need equal latencies. So if one light fades, every light has a factor unit.
         waiting = range(p.lights) if p.factors and not compact else p.factors
-        # In the compact style a colour takes a cycle a channel at least.
+        # In the compact style a colour takes at least one cycle for each channel.
         interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
         return [
             LightUnit(
@@ -110,9 +110,10 @@ class PixelShading:
         operands : stream.Interface or None
             Operands of pixels; ``None`` without lights.
         gated : Value or None
-            Decision of a gate for each light; ``None``: the operands contain the decision, if any.
+            Decision of a gate for each light. ``None``: the operands contain the decision, if there is a
+            gate.
         albedo : stream.Interface or None
-            Albedo of pixels; ``None``: they have none.
+            Albedo of pixels. ``None``: pixels have no albedo.
         colors : stream.Interface
             Colours of pixels.
         """
@@ -189,8 +190,8 @@ class PixelShading:
     ) -> None:
         """Handshakes from the operands through all lights to the intensity unit, where the albedo joins.
 
-        Equal units with the same input and the same ready of the output are in the same state on every cycle:
-        the handshake of the first is that of all. Where lights skip beats, all accept a beat on the same
+        In lockstep equal units with the same handshakes are in the same state on every cycle. So the
+        handshake of the first unit serves all. If lights skip beats, either all lights accept a beat on a
         cycle, or none does.
         """
         intensity = self.intensity
@@ -213,7 +214,7 @@ class PixelShading:
         m.d.comb += intensity.i.valid.eq(reduce(and_, terms))
 
     def connect_constant(self, m: Module, ambient: data.View, colors: stream.Interface) -> None:
-        """Give every pixel the ambient colour, of a pipeline without lights."""
+        """Give every pixel of a pipeline without lights the ambient colour."""
         p, encoded = self.model, self._encoded(m, colors)
         for channel, name in enumerate("rgb"):
             light = ambient[0 if p.grey else channel]
@@ -222,7 +223,7 @@ class PixelShading:
         m.d.comb += colors.valid.eq(1)
 
     def _encoded(self, m: Module, colors: stream.Interface) -> stream.Interface:
-        """Colours on their way to pixels, through the transfer unit if there is one."""
+        """Stream that takes the colours: the input of the transfer unit, or ``colors`` without this unit."""
         transfer = self.transfer
         if transfer is None:
             return colors
@@ -230,7 +231,7 @@ class PixelShading:
         if self.intensity is not None:
             connect(m, transfer.o, colors)
         else:
-            # Constant colours never wait. They are encoded before the first span after a write reaches them.
+            # Constant colours never wait. After a write they are encoded before the next span needs them.
             m.d.comb += [
                 copy(colors.payload, transfer.o.payload),
                 transfer.i.valid.eq(1),

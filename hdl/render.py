@@ -63,7 +63,7 @@ PORT_DESCRIPTIONS = {
 """Ports without a ``size``, for the table in Verilog."""
 
 _DEEP = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
-"""Words of a span that the depth test takes, and shading does not."""
+"""Words of a span for the depth test. Shading does not take them."""
 
 _COMPONENTS = 3
 """Components of a vector of geometry."""
@@ -77,14 +77,14 @@ spans, the setup goes on.
 
 
 class RendererUnit(wiring.Component):
-    """Triangles to the pixels to write. `Renderer` is the bit-accurate model.
+    """Turns triangles into the pixels to write. `Renderer` is the bit-accurate model.
 
     The unit has `GeometryUnit`, `ShadingPipelineUnit` and `DepthTesterUnit` in a row. Spans wait between the
     first two in a FIFO. (In the compact style without vectors and coarse test one span waits in a register.)
-    Their depths pass the pipeline in another FIFO. With a coarse depth test a span also waits in the FIFO for
-    the test's answer. Then it leaves, or is dropped in one cycle. The units work at the same time. If none
-    waits for long, a frame takes as many cycles as the slowest unit alone. The design's `Build` has the
-    styles, the lanes of triangle setup and the coarse test.
+    The depths of the spans pass the pipeline in another FIFO. With a coarse depth test a span also waits in
+    the FIFO for the test's answer. Then the span leaves, or is dropped in one cycle. The units work at the
+    same time. If no unit waits for long, a frame takes as many cycles as the slowest unit alone. The design's
+    `Build` has the styles, the lanes of triangle setup and the coarse test.
 
     Frame constants are written while no span is inside. Spans of another material than the span before wait
     until the pipeline is empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
@@ -99,8 +99,8 @@ class RendererUnit(wiring.Component):
     size : (int, int) or None
         As for `DepthTesterUnit`.
     clears : bool
-        Whether the memory of depths is cleared for each picture, see `DepthTesterUnit`. Else the unit is
-        right for one picture only, unless the memory outside is cleared between pictures.
+        Whether the memory of depths is cleared for each picture, see `DepthTesterUnit`. If not, the unit
+        draws one picture only, unless the memory outside is cleared between pictures.
 
     Members
     -------
@@ -116,12 +116,12 @@ class RendererUnit(wiring.Component):
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
-        Depths so far. Only without a ``size``.
+        Memory of the depths. Only without a ``size``.
 
     Attributes
     ----------
     idle : Signal
-        No triangle, span or pixel is inside. High from a cycle after the last has left.
+        High while no triangle, span or pixel is inside. It rises a cycle after the last has left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -182,7 +182,7 @@ class RendererUnit(wiring.Component):
         ]
         known, drops = self._judge(m, source, room, made.ready, ready)
         if geometry.compact and not geometry.vectors and self.coarse is None:
-            # Memories of 16 words for two spans would cost as much as they save.
+            # A FIFO's memories of 16 words would cost as much as they save.
             connect_register(m, "waiting_span", made, ready)
         else:
             connect_late_fifo(m, "spans", made, ready, WAITING_SPANS)
@@ -236,7 +236,7 @@ class RendererUnit(wiring.Component):
         return m
 
     def _adapters(self) -> None:
-        """Units for the components of vectors that geometry does not have, and the shape before them."""
+        """Make the units for the components of vectors that geometry does not have."""
         span, rows, design = self.pipeline.i.payload.shape(), self.model.rows, self.model.design
         compact, lights = design.build.compact_geometry, design.lights
         self._lights = self._mirror = None
@@ -251,7 +251,7 @@ class RendererUnit(wiring.Component):
             self._mirror = MirrorAdapterUnit(compact, with_components(shape, _COMPONENTS + rows))
 
     def _components(self, m: Module, span: stream.Interface) -> stream.Interface:
-        """Spans with the components that further lights and highlights of R·V take of their vectors."""
+        """Spans with all components of their vectors, also for further lights and highlights of R·V."""
         units = []
         if self._lights is not None:
             m.submodules.lights = self._lights
@@ -288,16 +288,18 @@ class RendererUnit(wiring.Component):
     def _judge(
         self, m: Module, span: stream.Interface, room: Signal, taken: Value, head: stream.Interface
     ) -> tuple[Value, Value]:
-        """For the first span that waits: whether its depth test has an answer, and whether it is hidden.
+        """Whether the coarse depth test has answered for the first span that waits, and whether it is hidden.
 
-        The coarse depth test, if there is one, gets the spans of geometry, too, while it has ``room``.
+        The coarse depth test also gets the spans of geometry, while it has ``room``. Without the test every
+        span counts as answered and visible.
         """
         if self.coarse is None:
             m.d.comb += room.eq(1)
             return Const(1), Const(0)
         m.submodules.coarse = coarse = self.coarse
         place = coarse.i.payload
-        # A number that changes with the first span of a picture. A picture without spans may change it back.
+        # ``number`` changes with the first span of a picture. After pictures without spans ``picture`` may be
+        # the same as before.
         number, before, turned = (Signal(name=name) for name in ("number", "picture_before", "turned"))
         turns = turned | (self.constants.picture != before)
         m.d.sync += [before.eq(self.constants.picture), turned.eq(turns)]
@@ -306,7 +308,7 @@ class RendererUnit(wiring.Component):
         answers = stream.Signature(1).create(path=("answers",))
         connect_late_fifo(m, "answers", coarse.o, answers, WAITING_SPANS)
         m.d.comb += [
-            # A design may have fewer bits of a place than geometry.
+            # A design may have fewer bits of coordinates than geometry.
             *(place[name].eq(span.payload[name]) for name in ("x", "y", "length")),
             *copy_fields(place, span.payload, ("depth", "depth_step")),
             place.picture.eq(number ^ turns),
@@ -321,12 +323,12 @@ class RendererUnit(wiring.Component):
 
 
 def _flat(payload: data.View) -> dict[str, Value]:
-    """Words of a span and of its depths."""
+    """Fields by name, of a payload with a span's words and its depths side by side."""
     return {name: payload[name] for name in payload.shape().members}
 
 
 def _nested(payload: data.View) -> dict[str, Value]:
-    """Fields by name, of a payload that has the fields of its span in a member ``span``."""
+    """Fields by name, of a payload with a span's words in a member ``span``, and its depths."""
     return _flat(payload.span) | {name: payload[name] for name in _DEEP}
 
 
