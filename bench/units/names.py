@@ -1,4 +1,4 @@
-"""Names of the units that have a record. The records are not imported, because this takes a second.
+"""Names of the units that have a record. The records are not imported, because an import takes a second.
 
 The name of a unit is the name of its record's file. A file without a record holds parts that records share.
 """
@@ -14,7 +14,7 @@ from blysk.golden.methods.installed import installed_methods
 __all__ = ["ROOMS", "UNITS"]
 
 ROOMS = ("geometry", "normals", "cosines", "methods", "albedo", "lighting", "video", "bus", "")
-"""Rooms in the order in which data pass them. The last is for records outside a room."""
+"""Rooms in the order in which data pass through them. The last name is for records outside a room."""
 
 _RECORD = re.compile(r"^RECORD = ", re.MULTILINE)
 
@@ -36,5 +36,7 @@ def _found() -> dict[str, str]:
 
 
 UNITS: dict[str, str] = _found()
-"""The module of each record by the unit's name: by room, within a room by name, then `installed_methods`.
+"""The module of each record by the unit's name.
+
+The units are in the order of `ROOMS`, and by name within a room. `installed_methods` follow.
 """

@@ -440,7 +440,7 @@ def _variants():
     designs += [("renormalise", "exp"), ("renormalise", "blinn_product")]
     for method, model in designs:
         design = preset(method, model)
-        note = "; the bisection's fit counts as arithmetic" * (method == "bisection")
+        note = "; the bisection's fit counts as arithmetic error" * (method == "bisection")
         yield (
             f"{method}, {model}",
             Variant(

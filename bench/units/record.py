@@ -38,16 +38,19 @@ Beats = np.ndarray | Mapping[str, Any]
 """Beats of a stream: a structured array, or (nested) mappings of field names to arrays of codes."""
 
 PAUSE, PAUSED = 61, 40
-"""Cycles from a beat to the next, and number of beats, in the run with pauses at the end of each stimulus."""
+"""Cycles from an input beat to the next, and number of input beats, in the run with pauses.
+
+This run is the last run of a stimulus.
+"""
 
 STALLS = ((0.0, 0.0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9))
-"""Shares of the cycles with a stalled input and with a stalled output, a pair for each run."""
+"""Share of cycles with a stalled input, and share of cycles with a stalled output, for each run."""
 
 OFFERED, TAKEN = 2.0, 0.6
 """Rates of offered and of taken beats in the run whose stalls end, relative to the run without stalls.
 
-The sink holds up a unit at its full rate, but not at half its rate. So a unit that falls into half its rate
-stays there.
+The sink takes 0.6 of the full rate. So it stalls a unit at full rate, and no unit at half of its rate. A unit
+that has fallen to half of its rate stays there, and a test sees it after the stalls.
 """
 
 
@@ -65,7 +68,7 @@ class Sample:
         The unit's approximate formula in float64. ``None`` if its tables cannot be separated from its
         arithmetic.
     at : array, broadcast to the same shape, optional
-        The operand on the axis of a drawing of errors. The record's ``axis`` names it.
+        The operand on the axis of a drawing of errors. The record's ``axis`` names this operand.
     """
 
     found: np.ndarray
@@ -87,7 +90,7 @@ class Sample:
 
     @property
     def extremes(self) -> "Sample":
-        """The results with the errors of `errors`, three or fewer."""
+        """The samples that have the errors of `errors`: at most three."""
         pairs = [(self.found, self.exact)]
         if self.formula is not None:
             pairs += [(self.formula, self.exact), (self.found, self.formula)]
@@ -97,7 +100,7 @@ class Sample:
 
     @classmethod
     def joined(cls, samples: "Iterator[Sample]") -> "Sample":
-        """Several samples joined into one sample. Their shapes may differ."""
+        """Several samples, of any shapes, joined into one flat sample."""
         samples = [
             s if s.at is None else replace(s, at=np.broadcast_to(s.at, np.shape(s.found))) for s in samples
         ]
@@ -113,8 +116,8 @@ class Sample:
 class Decisions(Sample):
     """Decisions and expected decisions, 1 for yes and 0 for no. An error is a share of all decisions.
 
-    The formula is yes if ``found`` or ``exact`` is yes. So a model error is a yes without need, and an
-    arithmetic error a wrong no.
+    ``formula`` is yes if ``found`` or ``exact`` is yes. So the model error is the share of needless yes, and
+    the arithmetic error is the share of wrong no.
     """
 
     @classmethod
@@ -129,37 +132,37 @@ class Decisions(Sample):
 
     @property
     def extremes(self) -> "Decisions":
-        """All of them."""
+        """All decisions, without their operands."""
         return replace(self, at=None)
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A structure of a unit, with the ways to make it and to measure its errors.
+    """A variant of a unit: how to make its component, and how to measure its errors.
 
     Parameters
     ----------
     unit : callable
         Makes the component. Its ``model`` is the bit-accurate model.
     measure : callable, optional
-        Function from a random generator and a number of samples to a `Sample`. For units of whole spans a
-        sample is a pixel. ``None``: the variant is in no table of errors.
+        Function from a random generator and a number of samples to a `Sample`. In units that take whole
+        spans, a sample is a pixel. ``None``: the variant is in no table of errors.
     domain : str
-        Operands over which errors are measured.
+        Operands for which errors are measured.
     scale : str
         Unit of the errors: ``rad``, ``turn``, ``LSB``, ``rate`` (a share of the decisions) or empty. If it is
         empty, 1 is a full term or the length of a vector.
     exhaustive : bool
         Whether every operand of the domain is measured, for any number of samples.
     beat : dict
-        Fields of the input beats of the simulation that finds the times, if the unit does not state them.
-        Other fields are 0.
+        Fields of the input beats of a simulation. The simulation finds latency and interval if the unit does
+        not state them. Other fields are 0.
     note : str
         Further remark.
     source : str
-        Document and figure, if they differ from the record's.
+        Document and figure, if they differ from those of the record.
     as_published : bool
-        Whether constants or form are as a document prints them.
+        Whether the constants or the form are those that a document prints.
     long : bool
         Whether its RTL is simulated in the long run only.
     """
@@ -222,16 +225,15 @@ class Stimulus:
         Function from the component, a random generator and a number of beats or pixels to a `Case`. The first
         paragraph of its docstring describes the covered inputs in a sentence or two.
     count : int
-        Beats or pixels of a test.
+        Number of beats or pixels in a test.
     stalled : bool
-        Whether the stimulus is sent with the stalls of `STALLS`, too. Else it is sent only without stalls.
+        Whether the stimulus is sent with all stalls of `STALLS`. Else it is sent only without stalls.
     pace : callable, optional
-        Function from the component to the cycles from an output beat to the next without stalls, as the
-        unit's documentation has them for this input. ``None`` if they depend on the data. Tests then check
-        only the documented rate of a `PipelinedUnit`. After stalls they check the rate of the same beats from
-        reset.
+        Function from the component to the documented cycles from an output beat to the next, for this input
+        without stalls. ``None`` if they depend on the data. After stalls, tests compare the cycles
+        with the run without stalls and with this pace. A `PipelinedUnit` needs none: it has an interval.
     long : bool
-        Whether it belongs to the long run.
+        Whether the stimulus belongs to the long run.
     repeats : int
         Number of times that the stimulus is made, each time with another seed.
     variants : tuple of str
@@ -268,7 +270,7 @@ class UnitRun:
     stalls : dict
         Arguments ``input_stalls`` and ``output_stalls`` of `simulate`. Empty: no stalls.
     settles : bool
-        Whether a test that knows the times without stalls ends the stalls half-way, with `settled`.
+        Whether a test ends the stalls half-way, with `settled`. It needs the times without stalls.
     """
 
     case: Case
@@ -283,24 +285,24 @@ class UnitRun:
         return length_of(self.expected)
 
     def settled(self, cycles: np.ndarray, input_cycles: np.ndarray) -> tuple["UnitRun", int]:
-        """The run with stalls at the unit's own rate on both sides for half of the beats, then with none.
+        """The run with stalls on both sides for the first half of the beats, and without stalls after it.
 
         Parameters
         ----------
         cycles, input_cycles : arrays
-            Clocks of the output beats and of the input beats in the run without stalls.
+            Clock of each output beat, and of each input beat, in the run without stalls.
 
         Returns
         -------
         run : UnitRun
-            The run, see `OFFERED` and `TAKEN`.
+            The run. `OFFERED` and `TAKEN` give the rates during the stalls.
         end : int
             Clock from which there are no stalls.
         """
         rng, start = np.random.default_rng([2026, len(cycles)]), int(input_cycles[0])
         span = int(max(cycles.max(initial=0), input_cycles[-1])) + 1 - start
         end = start + round(span / 2 / TAKEN)
-        # The stalls last until every run that keeps its rate has ended.
+        # Patterns of stalls repeat. A run that keeps its rate ends before the repetition.
         free = np.zeros(end + 2 * span + 1000, dtype=bool)
         offered = min(OFFERED * len(input_cycles) / span, 0.9)
         taken = TAKEN * min(len(cycles) / span, 1)
@@ -320,31 +322,32 @@ class Record:
     name : str
         Name of its files in `golden` and `hdl`.
     title : str
-        The unit's result, in some words.
+        The unit's result, in a few words.
     source : str
         Document and figure.
     variants : dict
-        Structures by name. The first is the default. Mutants and toggle coverage use it.
+        Variants by name. The first variant is the default. Mutants and toggle coverage use the default.
     expect : callable
         Function from the component and a `Case` to the output beats by the bit-accurate model.
     stimuli : dict
-        Stimuli by name. The first serves for any number of beats, in other simulators too.
+        Stimuli by name. The first stimulus takes any number of beats. Other simulators use it, too.
     status : callable, optional
         Function from the component and a `Case` to the expected members of the port ``status`` after a run,
-        by name. For a component without this port: the number of cycles on which each of the ports
-        ``out_of_range`` and ``wide`` is high.
+        by name. A component without this port has the ports ``out_of_range`` and ``wide``. The function then
+        gives the number of cycles on which each of these ports is high.
     axis : str
         Quantity on the axis of a drawing of errors. Empty: no drawing.
     logarithmic : bool
         Whether this axis is logarithmic.
     waivers : dict
-        By name of a signal of the default variant: the reason why a fault there may survive, or the test that
-        finds it. Some faults invert a bit only where another bit of the same word, the *controlling bit*, has
-        a certain value.
+        Reasons by name of a signal of the default variant. A reason says why a fault of this signal may
+        survive, or which test finds the fault. A fault may set a bit to 0 or 1, or invert it. Some faults
+        invert a bit only while another bit of the same word, the *controlling bit*, has a certain value.
     still : dict
-        Register bits of the default variant that cannot toggle: signals with their bits, by reason.
+        Register bits of the default variant that cannot toggle. The key is the reason. The value lists
+        signals with their bits.
     remembers : bool
-        Whether the unit has a memory of earlier beats, which a reset does not clear.
+        Whether the unit has a memory of earlier beats that a reset does not clear.
     """
 
     name: str
@@ -384,16 +387,16 @@ class Record:
         }
 
     def example(self, variant: str, unit: Component, results: int = 3) -> UnitRun:
-        """A short run of a variant's first stimulus, which shows the unit's times.
+        """A short run of a variant's first stimulus. It shows the unit's latency and interval.
 
         Parameters
         ----------
         variant : str
-            Its name.
+            Name of the variant.
         unit : Component
-            Component of that variant.
+            Component of this variant.
         results : int
-            Least number of output beats, if `PAUSED` input beats give as many.
+            Least number of output beats. A run has at most `PAUSED` input beats, so it may give fewer.
         """
         make = next(iter(self.stimuli_of(variant).values())).make
         case = make(unit, np.random.default_rng(2026), 200)
@@ -405,16 +408,16 @@ class Record:
         return UnitRun(few, expected, None, {})
 
     def runs(self, unit: Component, stimulus: str, seed: int = 2026) -> Iterator[UnitRun]:
-        """The runs of a stimulus: without stalls, with stalls, and with pauses. They are always the same.
+        """The runs of a stimulus: without stalls, with stalls, and with pauses.
 
-        The second run settles, see `UnitRun`.
+        The same seed gives the same runs. The second run settles, see `UnitRun`.
 
         Parameters
         ----------
         unit : Component
             Component of one of the variants.
         stimulus : str
-            Its name.
+            Name of the stimulus.
         seed : int
             Seed of the random generator.
         """
@@ -455,14 +458,14 @@ def length_of(beats: Beats) -> int:
 
 
 def together(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Beats of several mappings with the same fields, in a row."""
+    """Beats of several mappings with the same fields, one mapping after the other."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def once(compute: Callable[[Component, Case], Any]) -> Callable[[Component, Case], Any]:
-    """A function of a unit and a case, which keeps its last result while the case exists.
+    """A function of a unit and a case that keeps its last result while the case exists.
 
-    Output and status of a case are often needed one after the other, and come from the same model.
+    A test needs output and status of a case one after the other. Both come from the same call of the model.
     """
     kept: dict[str, Any] = {}
 

@@ -2,12 +2,12 @@
 
 These components have no record:
 
-- the frame constants, the pixel assembler and the pixel merger, because their ports are not a stream ``i`` to
-  a stream ``o``. The records of the pipelines cover them as parts of the pipelines;
+- the frame constants, the pixel assembler and the pixel merger. A record needs an input stream ``i`` and an
+  output stream ``o``. The records of the pipelines cover these components as parts of the pipelines;
 - the accumulator of ``chord-local``. The record of the interpolator covers it as a part of the interpolator;
-- the pixel lanes, because their beats depend on the cycles. They have tests of their own;
+- the pixel lanes. Their beats depend on the cycles, so they have tests of their own;
 - units with other ports: band depths, controls, the draw unit, and units of the display that have two clocks
-  or never wait. They have tests of their own, too.
+  or never wait. They have tests of their own.
 """
 
 from importlib import import_module

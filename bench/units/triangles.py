@@ -1,4 +1,4 @@
-"""Operands for units of geometry: triangles of all kinds, and results of the units before a unit."""
+"""Operands for units of geometry: triangles of all kinds, and the results of each unit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -42,7 +42,7 @@ WHOLE = FrameSettings(-2048, -2048, 2047, 2047)
 
 
 def frame_of(constants: Mapping) -> FrameSettings:
-    """Frame that the constants of a run describe."""
+    """Frame settings from the constants of a run."""
     return FrameSettings(**dict(constants) | {"back_faces": BACK_FACES[constants["back_faces"]]})
 
 
@@ -57,7 +57,7 @@ def triangles_with(**members: np.ndarray) -> Triangles:
 def sorted_of(beats: Mapping) -> SortedTriangles:
     """Sorted triangles from beats. Members that the beats do not have are 0."""
     members = {name: beats[name] for name in ("x", "y", "material") if name in beats}
-    # Columns of edges are no corners.
+    # Beats with heights are beats of edges. Their x is not a corner's column.
     members = {name: value for name, value in members.items() if name != "x" or "height" not in beats}
     triangles = triangles_with(**members)
     words = {
@@ -74,7 +74,7 @@ def edges_of(beats: Mapping) -> Edges:
 
 
 def plane_corners(stages: "Stages") -> dict[str, np.ndarray]:
-    """Input beats of the plane setup."""
+    """Input beats of the plane setup, from the results of the units before it."""
     edges, y = stages.edges, stages.drawn.triangles.y
     heights = {"long_height": edges.height[:, 0], "knee": y[:, 1] - y[:, 0]}
     walk = {name: getattr(edges, name) for name in ("fraction", "down", "along")}
@@ -108,7 +108,7 @@ def scales_of(beats: Mapping) -> PlaneScales:
 
 @dataclass(frozen=True)
 class Stages:
-    """Results of the models of all units for triangles, one model after the other.
+    """Results of the models of all geometry units for some triangles. Each is computed when it is needed.
 
     Parameters
     ----------
@@ -177,9 +177,9 @@ def corners(rng: np.random.Generator, count: int, grid: Grid = GRID, size: float
     Parameters
     ----------
     rng : Generator
-        Of the random numbers.
+        Generator of the random numbers.
     count : int
-        Triangles.
+        Number of triangles.
     grid : Grid
         Fraction bits of the coordinates.
     size : float
@@ -189,20 +189,20 @@ def corners(rng: np.random.Generator, count: int, grid: Grid = GRID, size: float
     middle = rng.integers(-20 * step, 20 * step, (count, 1, 2))
     points = middle + rng.integers(-reach, reach + 1, (count, 3, 2))
     kind = rng.integers(0, 12, count)
-    # On pixel centres, and on borders of pixels.
+    # Corners on pixel centres and on borders of pixels.
     half = kind == 1
     points[half] = points[half] // grid.half * grid.half
-    # Needles: the third corner next to the line through the others.
+    # Needles: the third corner is next to the line through the other two.
     thin = kind == 2
     share = rng.integers(0, 9, (count, 1))
     points[thin, 2] = (
         points[:, 0] + (points[:, 1] - points[:, 0]) * share // 8 + rng.integers(-1, 2, (count, 2))
     )[thin]
-    # Horizontal and vertical edges, no area, one point.
+    # Triangles with a horizontal edge, with a vertical edge, and with two corners at the same point.
     points[kind == 3, 1, 1] = points[kind == 3, 0, 1]
     points[kind == 4, 2, 0] = points[kind == 4, 0, 0]
     points[kind == 5, 2] = points[kind == 5, 1]
-    # Tiny triangles, and triangles that reach to the ends of the guard band.
+    # Tiny triangles, triangles as large as the guard band, and triangles with corners at its ends.
     tiny = kind == 6
     points[tiny] = (middle + rng.integers(-step, step + 1, (count, 3, 2)))[tiny]
     low, high = grid.coordinate.min_code, grid.coordinate.max_code
@@ -221,7 +221,7 @@ def random_triangles(
     Parameters
     ----------
     rng, count, grid, size
-        As for `corners`.
+        As in `corners`.
     spread : float
         Standard deviation of the normals' components about a common normal.
     """
@@ -246,10 +246,10 @@ def random_triangles(
 
 
 def ended(triangles: Triangles, grid: Grid = GRID) -> Triangles:
-    """Triangles. Two of them are changed to cover a small picture, so that their output ends a run.
+    """Change two triangles to cover a small picture, so that a run ends with their pixels.
 
-    The last triangle is in front of all triangles. The last triangle of the run with pauses is in front of
-    most.
+    The first is the last triangle of the run with pauses. It is in front of most triangles. The second is
+    the last triangle. It is in front of all triangles. Returns the triangles.
     """
     far = 100 * grid.steps
     for index, depth in ((PAUSED - 1, 1 << 21), (-1, 0)):
@@ -259,7 +259,7 @@ def ended(triangles: Triangles, grid: Grid = GRID) -> Triangles:
 
 
 def small_frame(rng: np.random.Generator, back_faces: str = "flip", limit: int = 267) -> FrameSettings:
-    """A picture of a few pixels, or of many, somewhere in the grid."""
+    """A picture of 1 to 47 columns and scanlines around pixel (0, 0)."""
     left, top = rng.integers(-24, 0, 2)
     right, bottom = rng.integers(1, 24, 2)
     return FrameSettings(int(left), int(top), int(right), int(bottom), back_faces, limit)

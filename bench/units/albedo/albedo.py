@@ -20,19 +20,19 @@ from blysk.sim.frames.frame import attribute_beats
 __all__ = ["RECORD", "any_attributes", "attributes_in"]
 
 _MEMORY = TexelMemory(104)
-"""A texture of 16x16 texels, and a small texture."""
+"""A memory that has room for a texture of 16x16 texels and a small texture."""
 
 _BOTH = Albedo(texture=TextureSampler(_MEMORY))
 _TEXELS = Albedo(colors=False, texture=TextureSampler(_MEMORY), perspective=False)
 
 
 def any_attributes(rng: np.random.Generator, model: Albedo, length: np.ndarray) -> SpanAttributes:
-    """Attributes of spans of given lengths, of 1 pixel where a span has none."""
+    """Attributes of spans of given lengths. An empty span gets the attributes of a span of 1 pixel."""
     return quantised_spans(rng, model.spans, np.maximum(length, 1))[0]
 
 
 def attributes_in(model: Albedo, beats: np.ndarray) -> SpanAttributes:
-    """Attributes of spans in beats."""
+    """Attributes of the spans that beats describe."""
     lines = []
     for member in ("start", "step"):
         words = beats[member]
@@ -68,7 +68,7 @@ def _expect(unit, case):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, some empty, with any colours, and places over any texture and its levels."""
+    """Spans of every length, some empty, with any colours. Places are anywhere on any level of a texture."""
     p, length = unit.model, short_lengths(rng, count)
     beats = attribute_beats(unit.i.payload.shape(), any_attributes(rng, p, length))
     beats["length"] = length

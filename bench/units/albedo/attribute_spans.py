@@ -17,24 +17,24 @@ __all__ = ["RECORD", "attribute_word_beats", "quantised_spans"]
 def quantised_spans(
     rng: np.random.Generator, model: AttributeSpans, length: np.ndarray
 ) -> tuple[SpanAttributes, tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Spans of attributes, with what they stand for.
+    """Quantised attributes of spans, and the values before they were quantised.
 
-    Depths have ratios to 1:16 by logarithm, and texture coordinates cross up to 512 texels. Some colours are
-    0 or 1 at an end.
+    The logarithm of the ratio of the depths at both ends is uniform, to a ratio of 16. Spans cross up to 512
+    texels. In every fourth span the colours at the ends are 0 or 1.
 
     Parameters
     ----------
     rng : Generator
-        Of the random numbers.
+        Generator of the random numbers.
     model : AttributeSpans
-        The attributes.
+        The attributes that the spans have.
     length : int array, shape (spans,)
-        Pixels.
+        Pixels of each span.
 
     Returns
     -------
     spans : SpanAttributes
-        The spans.
+        Quantised attributes.
     ends : pair of float64 arrays, shape (spans, attributes)
         Attributes at both ends: colours, and texture coordinates in texels.
     weights : float64 array, shape (2, spans)
@@ -59,7 +59,7 @@ def quantised_spans(
 
 
 def attribute_word_beats(unit, words: AttributeWords) -> np.ndarray:
-    """Words of pixels as beats of a unit's stream: output of spans, or input of quotients."""
+    """Words of pixels as output beats of an `AttributeSpansUnit`, or as input beats of another unit."""
     stream = unit.o if isinstance(unit, AttributeSpansUnit) else unit.i
     beats = np.zeros(words.numerators.shape[0], dtype_of(stream.payload.shape()))
     names = beats.dtype.names
@@ -106,7 +106,7 @@ def _expect(unit, case):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, most short. Depths have ratios to 1:16, and coordinates cross to 512 texels."""
+    """Spans of every length, most of them short. They cross up to 512 texels, with ratios of depths to 16."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     return Case(_beats(unit, quantised_spans(rng, unit.model, length)[0], length))
 
@@ -124,10 +124,10 @@ def _words(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of steps count. Half of them have any steps."""
+    """Spans of 3000 to 4095 pixels, where the last bits of steps count. Half of the spans have any steps."""
     length = np.maximum(rng.integers(3000, 4096, 8) % (1 << unit.length_bits), 1)
     beats = _beats(unit, quantised_spans(rng, unit.model, length)[0], length)
-    # Flat lines have the largest exponent. With odd steps all bits of an accumulator are used.
+    # Lines with a small step have the largest exponent. Odd steps use all bits of an accumulator.
     lines = beats[::2]
     lines["exponent"] = [15, 15, 14, 0]
     for name in lines["step"].dtype.names:
@@ -169,7 +169,7 @@ RECORD = Record(
             partial(_measure, model=_BOTH),
             "depths to 1:16, 1 to 4095 pixels",
             beat={"length": 64},
-            note="U, in steps of 2^-23",
+            note="words of the attributes, in steps of 2^-23",
         ),
         "colours": Variant(partial(AttributeSpansUnit, AttributeSpans()), long=True),
         "coordinates": Variant(

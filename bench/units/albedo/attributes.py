@@ -19,9 +19,11 @@ __all__ = ["RECORD", "any_words"]
 def any_words(
     rng: np.random.Generator, model: AttributeSpans, count: int
 ) -> tuple[AttributeWords, np.ndarray]:
-    """Words of pixels with 1/W from 2^-15 to 1 by logarithm, half of them over 1/2, and their attributes.
+    """Words of pixels, and the attributes that they stand for.
 
-    Every fourth attribute is an end of its range, or 0. There U is off by up to 3 steps, as in spans.
+    1/W is 2^-15 to 1, and over 1/2 in half of the pixels. Its logarithm is uniform in both halves. In every
+    fourth pixel the attributes are 0 or an end of their range. Their words are then off by up to 3 steps, as
+    in spans.
 
     Returns
     -------
@@ -49,7 +51,7 @@ def any_words(
 
 
 def _words_of(model, beats) -> AttributeWords:
-    """Words of pixels in beats."""
+    """Words of the pixels that beats describe."""
     parts = [beats[name] for name in ("colors", "coordinates") if name in beats.dtype.names]
     numerators = Fixed(model.WORD_FORMAT, np.column_stack(parts))
     weight = Fixed(model.WORD_FORMAT, beats["weight"]) if model.perspective else None
@@ -70,12 +72,12 @@ def _expect(unit, case):
 
 
 def _pixels(unit, rng, count):
-    """Pixels with 1/W from 2^-15 to 1, half of them over 1/2, and attributes of every size."""
+    """Pixels with 1/W from 2^-15 to 1 and attributes of every size. In half of the pixels 1/W is over 1/2."""
     return Case(attribute_word_beats(unit, any_words(rng, unit.model.spans, count)[0]))
 
 
 def _words(unit, rng, count):
-    """Any words: 1/W of every size and sign, numerators over 1/W, and any base and range."""
+    """Any words: 1/W of every size and sign, numerators larger than 1/W, and any base and range."""
     p = unit.model.spans
     numerators, weight = (any_codes(rng, p.WORD_FORMAT, count, k) for k in (p.attributes, 1))
     of_span = any_codes(rng, p.BASE_FORMAT, count, 2), rng.integers(0, 16, count), rng.integers(0, 16, count)
@@ -84,7 +86,7 @@ def _words(unit, rng, count):
 
 
 def _measure(rng, count, model):
-    """Attributes against the quotient of the words; those of coordinates are in parts of ``2^range``."""
+    """Attributes against the quotient of the words. Errors of coordinates are in parts of ``2^range``."""
     words, exact = any_words(rng, model.spans, count)
     found, true = [], []
     if model.spans.colors:

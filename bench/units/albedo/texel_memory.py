@@ -28,7 +28,10 @@ def _expect(unit, case):
 
 
 def _requests(unit, rng, count):
-    """Any addresses of a memory that is loaded whole, and then in two places again, once with half a word."""
+    """Any addresses, after writes of the whole memory, and then of two places again.
+
+    The writes of one of these places end with half a word.
+    """
     depth = unit.model.depth
     values = [rng.integers(0, 1 << 18, 2 * BANKS * depth)]
     indices = [0, *rng.integers(0, depth // 2, 2).tolist()]
@@ -50,7 +53,7 @@ RECORD = Record(
     stimuli={"requests": Stimulus(_requests, 300)},
     axis="",
     waivers={
-        "nothing": "Writes of a run come without gaps. A test of the unit has gaps.",
-        "read*": "Nothing is written while requests are inside.",
+        "nothing": "In a run writes come without gaps. A test of the unit has writes with gaps.",
+        "read*": "Nothing is written while requests are inside, so the fault changes no answer.",
     },
 )

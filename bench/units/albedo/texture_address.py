@@ -28,24 +28,27 @@ def _case(unit, rng, count, descriptor):
 
 
 def _places(unit, rng, count):
-    """Places over three images each way, their borders, and any; one descriptor of any size a run."""
+    """Places up to three images away, centres and borders of texels, and any places.
+
+    A run has one descriptor of any size.
+    """
     return _case(unit, rng, count, any_descriptor(rng, unit.model.memory))
 
 
 def _small(unit, rng, count):
-    """The same of images of one to four texels a side."""
+    """Places on images of one to four texels a side."""
     return _case(unit, rng, count, any_descriptor(rng, unit.model.memory, 2))
 
 
 def _strips(unit, rng, count):
-    """The same of images of 1024 texels by one to four, and four to one by 1024."""
+    """Places on images of 1024 texels on one side, and one to four texels on the other side."""
     sides = rng.permutation([10, rng.integers(3)]).tolist()
     descriptor = any_descriptor(rng, unit.model.memory, 2)
     return _case(unit, rng, count, replace(descriptor, width=sides[0], height=sides[1]))
 
 
 def _alone(unit, rng, count):
-    """The same of images of a single level that fills the memory."""
+    """Places on images of a single level that fills the memory."""
     sides = min(unit.model.memory.address_bits + 2, 20)
     width = int(rng.integers(max(sides - 10, 1), min(sides, 11)))
     descriptor = any_descriptor(rng, unit.model.memory, 2)
@@ -73,5 +76,5 @@ RECORD = Record(
         "alone": Stimulus(_alone, 300, stalled=False, repeats=12),
     },
     axis="",
-    still={"it follows from the constants of a run": "behind[0-10]"},
+    still={"the address behind level 0 depends only on the constants of a run": "behind[0-10]"},
 )

@@ -17,7 +17,7 @@ _TEXEL = UQ(TexelMemory.CHANNEL_BITS, 0)
 
 
 def _weights(model, rng, count):
-    """Codes of weights; a quarter are 0 or 1."""
+    """Codes of weights. A quarter of the weights are 0 or 1."""
     one = 1 << model.share_bits * model.bilinear
     weight = rng.integers(0, one + 1, (count, 2))
     return np.where(rng.random(weight.shape) < 0.25, one * rng.integers(0, 2, weight.shape), weight)
@@ -41,7 +41,7 @@ def _expect(unit, case):
 
 
 def _texels(unit, rng, count):
-    """Any texels, of which some are equal, 0 or 1, and any weights, 0 and 1 among them."""
+    """Any texels and weights. Some texels are equal, 0 or 1, and some weights are 0 or 1."""
     texels = any_codes(rng, _TEXEL, count, 4, 3)
     texels[::4] = rng.choice([0, _TEXEL.max_code], texels[::4].shape)
     texels[1::8] = texels[1::8, :1]

@@ -17,7 +17,7 @@ from blysk.hdl.albedo.texture_sampler import TextureSamplerUnit
 __all__ = ["RECORD"]
 
 _MEMORY = TexelMemory(104)
-"""A texture of 16x16 texels, and a small texture."""
+"""A memory that has room for a texture of 16x16 texels and a small texture."""
 
 _MODEL = TextureSampler(_MEMORY)
 
@@ -41,7 +41,10 @@ def _expect(unit, case):
 
 
 def _places(unit, rng, count):
-    """Places over three images each way, their borders, and any; two textures of any size a run."""
+    """Places up to three images away, centres and borders of texels, and any places.
+
+    A run loads two textures of any size, and reads one of them.
+    """
     textures = [any_texture(rng, largest) for largest in (4, 1)]
     loaded = unit.model.memory.load(textures)
     which = int(rng.random() < 0.2)
@@ -67,5 +70,9 @@ RECORD = Record(
     expect=_expect,
     stimuli={"places": Stimulus(_places, 400, repeats=10, pace=lambda unit: unit.initiation_interval)},
     axis="exact colour",
-    still={"the memory inside waits before the FIFO is full": "weights_level[2] weights_room[0]"},
+    still={
+        "the memory inside takes three cycles, so the FIFO of weights is never full": (
+            "weights_level[2] weights_room[0]"
+        )
+    },
 )

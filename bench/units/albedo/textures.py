@@ -9,7 +9,7 @@ __all__ = ["any_descriptor", "any_places", "any_texture", "of_descriptor"]
 
 
 def any_descriptor(rng: np.random.Generator, memory: TexelMemory, largest: int = 10) -> TextureDescriptor:
-    """A descriptor of any wraps, base, and sides to 2^largest, of which all levels fit a memory."""
+    """A descriptor with any wraps, any base, and sides up to 2^largest. All of its levels fit the memory."""
     most = memory.address_bits - 1
     while True:
         sides = rng.integers(0, largest + 1, 2)
@@ -22,13 +22,13 @@ def any_descriptor(rng: np.random.Generator, memory: TexelMemory, largest: int =
 
 
 def of_descriptor(descriptor: TextureDescriptor) -> dict[str, object]:
-    """The constants of a unit."""
+    """A descriptor as constants of a unit."""
     names = ("width", "height", "wrap", "nearest", "base")
     return {name: getattr(descriptor, name) for name in names}
 
 
 def any_texture(rng: np.random.Generator, largest: int) -> Texture:
-    """A texture of any wraps and filter, of sides to 2^largest; its texels are any, 0 and 1."""
+    """A texture with any wraps and filter, and sides up to 2^largest. Some texels are 0 or 1."""
     width, height = 1 << rng.integers(0, largest + 1, 2)
     texels = rng.random((height, width, 3)) ** rng.choice([1, 6])
     texels[rng.random((height, width)) < 0.3] = rng.integers(0, 2, 3)
@@ -37,10 +37,10 @@ def any_texture(rng: np.random.Generator, largest: int) -> Texture:
 
 
 def any_places(rng: np.random.Generator, model, descriptor, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of coordinates, and levels to the last.
+    """Codes of coordinates of places, and a level of the texture for each place.
 
-    Places are over three images each way. A fifth are at the centre or border of a texel, or next to them. A
-    tenth are anywhere in the format.
+    Most places are up to three images away in both directions. A fifth are at the centre or border of a
+    texel, or next to it. A tenth are anywhere in the format.
     """
     format = model.coordinate_format
     last = max(descriptor.width, descriptor.height)

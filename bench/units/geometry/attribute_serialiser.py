@@ -27,7 +27,7 @@ def _near(unit, rng, count):
 
 
 def _far(unit, rng, count):
-    """Normals of any direction, some with components near 0 and with extreme codes."""
+    """Normals of any direction. Some have components near 0 or with extreme codes."""
     case = _case(rng, count, 2.0)
     low, high = -(1 << 23) + 1, (1 << 23) - 1
     words = [low, high, 0, -1, 1, 4095, 4096, -4096, -4097]
@@ -49,5 +49,5 @@ RECORD = Record(
     expect=_expect,
     stimuli={"near": Stimulus(_near, 500), "far": Stimulus(_far, 500)},
     axis="",
-    still={"the signs of the first corner are turned to positive": "total_0[13]"},
+    still={"total_0 sums magnitudes of the first corner's components, so its sign is 0": "total_0[13]"},
 )

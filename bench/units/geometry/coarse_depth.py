@@ -13,7 +13,7 @@ __all__ = ["RECORD"]
 
 
 def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
-    """Overlapping spans of a small picture. The depths of the ends are under ``most``, or the largest."""
+    """Overlapping spans of a small picture. Their depths are less than ``most``, or the largest depth."""
     given = unit.model
     longest = min(longest, given.width)
     length = rng.integers(1, longest + 1, count)
@@ -33,7 +33,7 @@ def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
 
 
 def _short(unit, rng, count):
-    """Spans of one to six pixels in few blocks, so that some words are read before the memory has them."""
+    """Spans of one to six pixels in few blocks. Some words are read before their last write has happened."""
     return _spans(unit, rng, count, 6, lines=1)
 
 
@@ -57,12 +57,13 @@ def _near(unit, rng, count):
 
 
 def _edges(unit, rng, count):
-    """Three spans a picture. The last bit of a depth decides whether the third is hidden.
+    """Three spans a picture. The last bit of a depth decides whether the third span is hidden.
 
-    The first span marks pixels of a block. The second span fills the block, and may go on to blocks where it
-    is nearer. In the first block the deepest depths of both spans are near each other. Each is the first code
-    of a step of the bound, or the code before it. The nearest depth of the third span is in the same block.
-    It is the first code of the step behind both, or the code before it.
+    A bound has only the upper bits of a depth. So a step of the bound is many codes. The first span marks
+    pixels of a block. The second span fills the block. It may go on to blocks where it is nearer. In the
+    first block the deepest depths of both spans are near each other. Each is the first code of a step of the
+    bound, or the code before it. The nearest depth of the third span is in the same block. It is the first
+    code of the next step behind both spans, or the code before it.
     """
     given, groups = unit.model, -(-count // 3)
     shift, size, columns = SPAN_DEPTH.width - given.depth_bits, given.block, given.blocks_per_line
@@ -70,7 +71,7 @@ def _edges(unit, rng, count):
     first, end = block * size, np.minimum(block * size + size, given.width) - 1
 
     def line(edge, at, other, falls):
-        """Step of a line of any slope that is ``edge`` at pixel ``at`` and in range at pixel ``other``."""
+        """Any step of a depth that is ``edge`` at pixel ``at`` and in range at pixel ``other``."""
         room = np.where(falls == (at < other), edge, (1 << SPAN_DEPTH.width) - 1 - edge)
         step = (
             room // np.maximum(abs(at - other), 1) * rng.random(groups) * 2.0 ** rng.integers(-30, 1, groups)
@@ -137,9 +138,9 @@ RECORD = Record(
     axis="",
     waivers={"place": "The fault changes the order in which words are swept. Every word is still swept."},
     still={
-        "what a reset finds is swept": "fresh[0] used[0]",
-        "all words are swept only after a reset; else 5 of 30 are swept": "left[3-4]",
-        "a scanline has six words, and begins with an even one": "span[12]",
+        "fresh falls once after a reset, and used rises once": "fresh[0] used[0]",
+        "only after a reset are all 30 words swept, else 5 words": "left[3-4]",
+        "a scanline has six words, so the place of its first word is even": "span[12]",
     },
     remembers=True,
 )

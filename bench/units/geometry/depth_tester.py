@@ -65,7 +65,10 @@ def _far(unit, rng, count):
 
 
 def _again(unit, rng, count):
-    """Pixels at two places that differ in a bit, and a third at one place. Two depths differ in a bit."""
+    """Groups of three pixels, in any order, at two places whose coordinates differ in one bit.
+
+    The depths of two of the three pixels differ in one bit.
+    """
     count = -(-count // 3)
     bits = (unit.x_bits, unit.y_bits)
     first = rng.integers(0, 1 << sum(bits), count)
@@ -82,7 +85,7 @@ def _again(unit, rng, count):
 
 
 def _nearer(unit, rng, count):
-    """Each span is in front of the spans before it. Its first depth is at most 8/512 from a whole code."""
+    """Each span is in front of the spans before it. Its first depth is at most 8/512 from a depth's code."""
     case = _case(rng, count, unit.size, min(8, unit.size[0]), 0)
     last = case.beats["pixel"]["last"]
     span = np.cumsum(last) - last
@@ -103,14 +106,14 @@ RECORD = Record(
         "few": Stimulus(_few, 2000),
         "same": Stimulus(_same, 500),
         "far": Stimulus(_far, 300),
-        # The number is odd. After an even number, a bit that each event inverts would be as before.
+        # The number is odd. After an even number, a bit that each event inverts has its first value again.
         "again": Stimulus(_again, 901),
         "nearer": Stimulus(_nearer, 2001),
     },
     axis="",
     still={
-        "every place that 4 and 3 bits name is in the picture": "read_outside[0]",
-        "the unit finds the depth of a pixel a stage later": "pixel_0[31-54]",
+        "coordinates of 4 and 3 bits never leave the memory of 16 x 8 pixels": "read_outside[0]",
+        "the depth of a pixel is known a stage later, so pixel_0 has none": "pixel_0[31-54]",
         "a counter has room for more events than a run has": "count_{pixels,hidden}[10-31]",
     },
     remembers=True,

@@ -45,7 +45,7 @@ def _case(rng, count, longest):
 
 
 def _short(unit, rng, count):
-    """Pieces of 1 to 4 pixels, some without a direction at an end."""
+    """Pieces of 1 to 4 pixels. At some ends the normal has no direction."""
     return _case(rng, count, 4)
 
 
@@ -60,7 +60,7 @@ def _long(unit, rng, count):
 
 
 def _deciding(unit, rng, count):
-    """Pieces of one pixel, of normals whose rounding depends on a single bit."""
+    """Pieces of one pixel, with normals whose rounding depends on a single bit."""
     vector = deciding_vectors(rng, count)
     beats = _single(unit, rng, len(vector)).beats
     return Case(beats | {"left": vector, "right": vector, "flip": np.ones(len(vector), dtype=np.int64)})
@@ -85,9 +85,10 @@ RECORD = Record(
     },
     axis="",
     waivers={
-        "dot_product.datapath.last_product": "The fault changes a sum of three squares by 1 in the bits "
-        "that are cut off. It carries into the kept bits only if the sum is 7 modulo 8, which no sum is, or "
-        "0 modulo 4. A sum that is 0 modulo 4 has three even components."
+        "dot_product.datapath.last_product": "The fault adds 1 to a sum of three "
+        "squares, or subtracts 1. The last 12 bits of the sum are cut off. Adding 1 changes the other bits "
+        "only if the sum is 7 modulo 8. No sum of three squares is 7 modulo 8. Subtracting 1 changes them "
+        "only if the sum is 0 modulo 4. Then all components are even, and the bit is 0 already."
     },
     still={"a counter has room for more events than a run has": "count_repaired[12-31]"},
 )

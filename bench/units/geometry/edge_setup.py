@@ -30,7 +30,7 @@ def _triangles(unit, rng, count, size=12.0):
 
 
 def _large(unit, rng, count):
-    """Triangles of any size, and triangles with corners at the ends of the grid."""
+    """Sorted triangles of any size. Some have corners at the ends of the grid."""
     case = _triangles(unit, rng, count, 1500.0)
     low, high = unit.grid.coordinate.min_code, unit.grid.coordinate.max_code
     case.beats["x"][::7] = rng.choice([low, high, 0], case.beats["x"][::7].shape)
@@ -55,7 +55,7 @@ def _variants():
 
 RECORD = Record(
     name="edge_setup",
-    title="Quotients and remainders of the steps of a triangle's three edges, and their starts",
+    title="Start and step of each edge of a triangle, as quotient and remainder",
     source="[T] figure 4.10",
     variants=dict(_variants()),
     expect=_expect,

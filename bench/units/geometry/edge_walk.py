@@ -23,7 +23,7 @@ def _walked(unit, rng, count, frame, size=12.0):
 
 
 def _small(unit, rng, count):
-    """Triangles of all kinds in a small picture, with scanlines above it and cut off below."""
+    """Triangles of all kinds in a small picture. Some have scanlines above it, or go on below it."""
     return _walked(unit, rng, count, small_frame(rng))
 
 
@@ -38,7 +38,10 @@ def _below(unit, rng, count):
 
 
 def _flat(unit, rng, count):
-    """Triangles as high as the grid and nearly flat on top, so that the upper edge is short or missing."""
+    """Triangles up to the height of the grid. They are flat on top, or nearly flat.
+
+    So the upper short edge has few scanlines or none.
+    """
     triangles, grid = random_triangles(rng, count, unit.grid, 500.0), unit.grid
     ends = grid.coordinate.min_code, grid.coordinate.max_code
     triangles.x[:] = rng.integers(ends[0], ends[1], triangles.x.shape)

@@ -28,20 +28,20 @@ def _small(unit, rng, count):
 
 
 def _tiny(unit, rng, count):
-    """Triangles of about one pixel, back faces culled."""
+    """Triangles of about one pixel. Back faces are dropped."""
     frame = FrameSettings(-20, -20, 20, 20, "cull", 200)
     return Case(ended(random_triangles(rng, count, unit.grid, 1.0, 0.1), unit.grid).beats, frame.codes)
 
 
 def _mesh(unit, rng, count):
-    """Fine meshes with shared corners and edges, some on pixel centres, with slivers and folds."""
+    """Fine meshes with shared corners and edges, slivers and folds. Some corners are on pixel centres."""
     side, step = 8, unit.grid.steps
     layers = -(-count // (2 * side * side))
     pitch = rng.integers(step // 8, 2 * step, (layers, 1, 1, 1))
     nodes = np.stack(np.meshgrid(*2 * [np.arange(side + 1)]), axis=-1) * pitch
     nodes = nodes + rng.integers(-20 * step, 20 * step, (layers, 1, 1, 2))
-    # Nodes move by less than a cell, by more, or not at all. A third of the meshes lie on centres and
-    # borders.
+    # The nodes of a mesh move by up to half a cell, by up to a cell, or not at all. In a third of the meshes
+    # all nodes are on centres and borders of pixels.
     jitter = rng.integers(-step, step + 1, nodes.shape) * rng.integers(0, 3, (layers, 1, 1, 1))
     nodes += jitter * pitch // (2 * step)
     nodes[::3] = nodes[::3] // unit.grid.half * unit.grid.half
@@ -55,16 +55,16 @@ def _mesh(unit, rng, count):
 
 
 def _drawn(unit, rng, count):
-    """Small triangles. Hardly any is dropped, so triangles come faster than they are set up."""
+    """Small triangles. Few are dropped, so triangles come faster than the setup takes them."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
     return Case(ended(random_triangles(rng, count, unit.grid, 3.0, 0.1), unit.grid).beats, frame.codes)
 
 
 def _dense(unit, rng, count):
-    """Triangles of one pixel, all drawn, so that the setup alone decides the rate."""
+    """Triangles of one pixel. All are drawn, so the setup alone decides the rate."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
     triangles = random_triangles(rng, count, unit.grid, 1.0, 0.1)
-    # Half of a square of 5/4 pixels: the half that holds the only pixel centre.
+    # Each triangle is half of a square with sides of 5/4 pixels. It has the square's only pixel centre.
     step = unit.grid.steps
     for place, far in ((triangles.x, [0, 1, 0]), (triangles.y, [0, 0, 1])):
         place[:] = rng.integers(-40, 40, (count, 1)) * step + np.array(far) * 5 * step // 4
@@ -119,7 +119,7 @@ RECORD = Record(
     },
     axis="",
     still={
-        "block RAMs have more words than there are waiting triangles": (
+        "fewer triangles wait than a block RAM has words": (
             "waiting_triangles_level[9] waiting_walks_level[3-6] waiting_attributes_level[5-6] "
             "waiting_walks_room[0] waiting_attributes_room[0]"
         ),

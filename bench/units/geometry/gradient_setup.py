@@ -49,7 +49,7 @@ def _measure(rng, count):
     share = (y[:, 1] - y[:, 0]) / (y[:, 2] - y[:, 0])
     exact = values[:, 1] - values[:, 0] - share * (values[:, 2] - values[:, 0])
     width = stages.drawn.area / (y[:, 2] - y[:, 0]) / 256
-    # The word has the step per pixel modulo 4, which is not the step in narrow triangles.
+    # The word is the step per pixel modulo 4. In narrow triangles the step may be larger.
     kept = ~stages.scales.sliver & (width > 2)
     found = stages.gradients.inward.values[:, 0] * width
     return Sample(found[kept], exact[kept], None, np.log2(width[kept]))
@@ -61,7 +61,10 @@ RECORD = Record(
     source="docs/theory/geometry.md#normals",
     variants={
         "interval 4": Variant(
-            GradientSetupUnit, _measure, "triangles over 2 pixels wide", note="of the step times the width"
+            GradientSetupUnit,
+            _measure,
+            "triangles over 2 pixels wide",
+            note="error of the step per pixel times the width",
         ),
         "interval 12": Variant(partial(GradientSetupUnit, 12)),
         "interval 6": Variant(partial(GradientSetupUnit, 6), long=True),
@@ -70,10 +73,10 @@ RECORD = Record(
     stimuli={"attributes": Stimulus(_attributes, 2000), "large": Stimulus(_large, 1000)},
     axis="width of the triangle, log2 of pixels",
     still={
-        "lower halves of words are narrower than a multiplier": "multiplier_1_{b,1}[9-17] "
+        "the lower half of a word is narrower than a multiplier's operand": "multiplier_1_{b,1}[9-17] "
         "multiplier_2_{a,0}[16-17]",
-        "an attribute has one fraction bit less than a product": "rise[0]",
-        "half a step is added to what was cut": "fraction_word[0]",
-        "a bit for the rounding is shifted in": "shifter_0_0[0]",
+        "rise is a difference of attributes, and has one fraction bit more": "rise[0]",
+        "the fraction ends with a constant 1, for half a step": "fraction_word[0]",
+        "the shifter's operand has a 0 below its word, for the rounding": "shifter_0_0[0]",
     },
 )

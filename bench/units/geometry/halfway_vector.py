@@ -18,7 +18,7 @@ def _expect(unit, case):
 
 
 def _vectors(unit, rng, count):
-    """Directions of all kinds. Some have any words, some are opposite or nearly opposite, some are equal."""
+    """Directions to light and viewer. Some are equal, opposite or nearly opposite. Some have any codes."""
     beats = {"light": unit_codes(rng, count), "viewer": unit_codes(rng, count)}
     beats["viewer"][::5] = -beats["light"][::5]
     beats["viewer"][::10] += rng.integers(-3, 4, beats["viewer"][::10].shape)
@@ -40,7 +40,9 @@ RECORD = Record(
     name="halfway_vector",
     title="Unit vector half-way between light and viewer",
     source="[T] figure 4.10",
-    variants={"": Variant(HalfwayVectorUnit, _measure, "angles to 179 degrees", note="components over ONE")},
+    variants={
+        "": Variant(HalfwayVectorUnit, _measure, "angles to 179 degrees", note="components divided by ONE")
+    },
     expect=_expect,
     stimuli={"vectors": Stimulus(_vectors, 2000, pace=lambda unit: 1)},
     axis="angle between light and viewer, degrees",

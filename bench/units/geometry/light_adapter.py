@@ -22,7 +22,7 @@ def _addresses(unit):
 
 
 def _write(unit, codes):
-    """Writes of axes, and writes of missing lights and colours, which change nothing."""
+    """Writes of axes. Writes to addresses of missing lights and of colours follow, and change no axis."""
     beyond = AXES_ADDRESS + (unit.lights + 1) * LIGHT_STRIDE
     address = [*_addresses(unit).ravel(), beyond, AXES_ADDRESS, LIGHT_STRIDE, 2 * LIGHT_STRIDE]
     return {"address": np.array(address), "data": np.r_[codes.ravel(), 1:5] & 0x3FFFF}
@@ -45,7 +45,7 @@ def _case(unit, rng, length, codes, **vectors):
 
 
 def _spans(unit, rng, count):
-    """Vectors no longer than 1, and steps, of spans of every length."""
+    """Vectors and steps no longer than 1, of spans of every length."""
     vectors = {
         name: np.rint(sphere(rng, count) * rng.uniform(0, 2**17 - 32, (count, 1))).astype(np.int64)
         for name in ("start", "step")
@@ -56,10 +56,10 @@ def _spans(unit, rng, count):
 
 
 def _any(unit, rng, count):
-    """Words of any codes. Vectors may be longer than 1, so sums are modulo 2. Most spans have one pixel."""
+    """Words of any codes. Vectors may be longer than 1, so sums wrap modulo 2. Most spans have one pixel."""
     vectors = {name: any_codes(rng, LightAdapter.FORMAT, count, 3) for name in ("start", "step")}
     codes = any_codes(rng, LightAdapter.FORMAT, unit.lights, unit.rows, 3)
-    # Every bit of an axis's words changes.
+    # The second component of an axis is the complement of the first. So every bit of the words changes.
     codes[..., 1] = ~codes[..., 0]
     return _case(unit, rng, 1 + (rng.random(count) < 0.3), codes, **vectors)
 

@@ -36,12 +36,12 @@ def _case(rng, length, angle):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, with short spans between. Sine and cosine of 26 degrees have odd codes."""
+    """Spans of every length. The angle a is 26 degrees, whose sine and cosine have odd codes."""
     return _case(rng, np.maximum(4095 >> rng.integers(0, 13, count), 1), np.radians(26))
 
 
 def _points(unit, rng, count):
-    """Spans of one pixel, seldom of two, with a light behind the surface's horizon."""
+    """Spans of one pixel, seldom of two. The angle a is 80 degrees."""
     return _case(rng, 1 + (rng.random(count) < 0.1), np.radians(80))
 
 

@@ -30,7 +30,7 @@ def _expect(unit, case):
     planes = PlaneAssembler().compute(gradients, beats["least"][:, 0], frame_of(case.constants)).beats
     if not unit.serial:
         return planes
-    # One attribute after the other, each with the piece of its triangle.
+    # One attribute after the other. Each has the length of the triangle's pieces.
     return {
         name: np.repeat(value, ATTRIBUTES) if name == "piece" else value.reshape(-1)
         for name, value in planes.items()
@@ -44,7 +44,7 @@ def _case(rng, count, limit):
     size[::5, 0] = rng.choice([1, (1 << 20) - 1], len(size[::5]))
     least = rng.integers(0, 3457, count)
     least[::7] = rng.choice([0, 1, 3456], len(least[::7]))
-    # Bounds for which ``least`` times ``limit`` is next to the sum times a power of two.
+    # A third of the bounds: ``least`` times ``limit`` is next to ``norm`` times a power of two.
     norm = size[:, :3].max(axis=1) + size[:, :3].sum(axis=1)
     close = np.arange(count) % 3 == 0
     near = (norm << rng.integers(0, 13, count)) // max(limit, 1) + rng.integers(0, 2, count)
@@ -54,17 +54,20 @@ def _case(rng, count, limit):
 
 
 def _usual(unit, rng, count):
-    """Sizes of every power of two, and bounds next to the borders of a piece's length. The default limit."""
+    """Sizes of every power of two, with the default limit.
+
+    A third of the bounds are next to a value where the length of a piece changes.
+    """
     return _case(rng, count, 267)
 
 
 def _largest(unit, rng, count):
-    """The largest limit."""
+    """As above, with the largest limit."""
     return _case(rng, count, 1023)
 
 
 def _least(unit, rng, count):
-    """A limit of 0 or 1. With 0 all spans are cut to single pixels."""
+    """As above, with a limit of 0 or 1. A limit of 0 cuts all spans to single pixels."""
     return _case(rng, count, int(rng.integers(0, 2)))
 
 

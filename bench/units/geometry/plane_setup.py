@@ -23,7 +23,7 @@ def _triangles(unit, rng, count):
 
 
 def _large(unit, rng, count):
-    """Triangles of any size, some with heights and areas whose bits have a single 1, or are all 1."""
+    """Triangles of any size. Half of the heights and areas are a power of two, or a power of two less 1."""
     case = _case(rng, count, unit.grid, 1500.0)
     bits = rng.integers(0, 2 * unit.grid.bits, count)
     area, height = 1 << bits, 1 << (bits // 2)
@@ -41,7 +41,7 @@ def _measure(rng, count):
     scales = scales_of_corners(beats, GRID)
     kept = ~scales.sliver
     width = beats["area"] / beats["long_height"] / GRID.steps
-    # The shift, 8 minus the exponent of 1/W, from its five bits.
+    # The word has five bits of the shift. The shift is 8 minus the exponent of 1/W, at least -3.
     shift = (scales.column_shift + 3) % 32 - 3
     found = scales.width_reciprocal.values * 2.0 ** (8.0 - shift) * width
     return Sample(found[kept], np.ones(kept.sum()), None, np.log2(width[kept]))
@@ -52,7 +52,12 @@ RECORD = Record(
     title="Reciprocals of a triangle's height and width",
     source="docs/theory/geometry.md#normals",
     variants={
-        "": Variant(PlaneSetupUnit, _measure, "triangles over 1/256 pixel wide", note="of 1/W, relative"),
+        "": Variant(
+            PlaneSetupUnit,
+            _measure,
+            "triangles over 1/256 pixel wide",
+            note="relative error of 1/W, with the width W",
+        ),
         "interval 67": Variant(partial(PlaneSetupUnit, GRID, 67, skid=False)),
         "4 fraction bits": Variant(partial(PlaneSetupUnit, Grid(4)), long=True),
     },
@@ -60,11 +65,14 @@ RECORD = Record(
     stimuli={"triangles": Stimulus(_triangles, 800), "large": Stimulus(_large, 800)},
     axis="width of the triangle, log2 of pixels",
     still={
-        "words begin with their first 1": "{height,area}_moved_kept[39]",
-        "a height has 20 bits, and zeros behind them": "height_moved_kept[0-19] height_moved_kept[45]",
-        "a reciprocal is 1/2 or more": "table_0_row[27] {height,area}_reciprocal_row[27] "
-        "reciprocals.port__data[27]",
-        "second factors have no sign": "multiplier_0_{b,1}[17]",
-        "a ratio is less than 2": "ratio_cut[29]",
+        "a word is shifted until its first bit is 1": "{height,area}_moved_kept[39]",
+        "a height has 20 bits above 20 zeros, and is shifted by fewer than 32 places": (
+            "height_moved_kept[0-19] height_moved_kept[45]"
+        ),
+        "a reciprocal is at least 1/2, so its first bit in the table is 1": (
+            "table_0_row[27] {height,area}_reciprocal_row[27] reciprocals.port__data[27]"
+        ),
+        "the second factor of a product is never negative": "multiplier_0_{b,1}[17]",
+        "a ratio is less than 2, so its first bit is 0": "ratio_cut[29]",
     },
 )

@@ -30,7 +30,7 @@ def _pieces(unit, case):
 
 
 def _serial(stimulus):
-    """Maker of a stimulus of the span halver, attribute by attribute."""
+    """Function that makes a stimulus of the span halver, with a beat for each attribute."""
 
     @wraps(stimulus.make)
     def make(unit, rng, count):
@@ -42,7 +42,7 @@ def _serial(stimulus):
 
 RECORD = Record(
     name="serial_vectors",
-    title="Spans, attribute by attribute, to pieces as words of the quotient method",
+    title="Spans that come attribute by attribute, cut into pieces, as words of the quotient method",
     source="docs/theory/geometry.md#composition",
     variants={
         "": Variant(SerialVectorsUnit, note="1/2 step of each word"),
@@ -59,6 +59,6 @@ RECORD = Record(
     axis="",
     still={
         "a counter has room for more than a run has": "count_cut[10-31]",
-        "the exponent has a register of its own": "result[108-111]",
+        "the output takes the exponent from a register of its own": "result[108-111]",
     },
 )

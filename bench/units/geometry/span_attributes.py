@@ -35,7 +35,7 @@ def _pieces(beats, whole):
 
 
 def _rows_of(unit, beats):
-    """Scanlines, each once, with all its planes, from the input beats of a unit."""
+    """Each scanline once, with the planes of its triangle, from the input beats of a unit."""
     if not unit.serial:
         return beats
     whole = len(beats["row"]["last"]) // ATTRIBUTES
@@ -75,7 +75,7 @@ def attributes_of(spans):
 def _status(unit, case):
     beats = _rows_of(unit, case.beats)
     counts, rows = _pieces(beats, unit.whole)[1], beats["row"]
-    # Before its last scanline, the unit does not know that a triangle is empty.
+    # The unit knows at the last scanline of a triangle whether the triangle is empty.
     begun = np.flatnonzero(_firsts(rows["last"]))[-1]
     unknown = not rows["last"][-1] and not rows["length"][begun:].any()
     counts["empty"] -= unknown
@@ -83,7 +83,7 @@ def _status(unit, case):
 
 
 def _case(unit, triangles, frame, count):
-    # The triangles are low, because a few high triangles would fill the run.
+    # A few high triangles would fill the run, so only triangles lower than 64 pixels are kept.
     low = np.ptp(triangles.y, axis=1) < 64 * GRID.steps
     stages = Stages(triangles[low], frame)
     rows = stages.clipped
@@ -93,19 +93,22 @@ def _case(unit, triangles, frame, count):
 
 
 def _rows(unit, rng, count):
-    """Scanlines of triangles of all kinds in a small picture, with spans that a limit cuts into pieces."""
+    """Scanlines of triangles of all kinds in a small picture. The limit cuts wide spans into pieces."""
     frame = FrameSettings(-18, -22, 21, 19, limit=100)
     return _case(unit, random_triangles(rng, count, spread=0.1), frame, count)
 
 
 def _narrow(unit, rng, count):
-    """Spans of few pixels, not cut into pieces."""
+    """Spans of few pixels that are not cut into pieces."""
     frame = FrameSettings(-18, -22, 21, 19, limit=1023)
     return _case(unit, random_triangles(rng, count, size=1.5, spread=0.0), frame, count)
 
 
 def _any(unit, rng, count):
-    """Planes of any codes, any pieces and lengths, with sums modulo 4, saturation, the longest spans."""
+    """Planes of any codes, with pieces and spans of any length up to the largest.
+
+    Sums wrap modulo 4, and words saturate.
+    """
     triangles = rng.integers(1, 12, count)
     total = int(triangles.sum())
     last = np.zeros(total, dtype=bool)
@@ -160,6 +163,6 @@ RECORD = Record(
     axis="",
     still={
         "a counter has room for more events than a run has": "count_empty[8-31] count_cut[9-31]",
-        "attributes are side by side, so each is the last": "found[456]",
+        "a beat has all attributes side by side, so its flag of the last attribute is 1": "found[456]",
     },
 )

@@ -46,7 +46,7 @@ def _case(rng, length, **attributes):
 
 
 def _lines(rng, length, near, far):
-    """Spans from ends of N/W, of any depths."""
+    """Spans with given N/W and random depths at both ends."""
     ends = [np.c_[end, rng.uniform(-1, 1, len(length))] for end in (near, far)]
     step = (ends[1] - ends[0]) / np.maximum(length - 1, 1)[:, np.newaxis]
     start, inward = (Fixed.round(SPAN_STEP, word).codes for word in (ends[0], step))
@@ -55,7 +55,7 @@ def _lines(rng, length, near, far):
 
 
 def _spans(unit, rng, count):
-    """Ends of all lengths and angles in spans of 1 to 4095 pixels. Few need no cut."""
+    """Spans of 1 to 4095 pixels. N/W has any length and direction at both ends. Most spans are cut."""
     near, far = (sphere(rng, count) * 2.0 ** -rng.uniform(0, 9, (count, 1)) for _ in range(2))
     alike = rng.random((count, 1)) < 0.5
     far = np.where(alike, near * 2.0 ** rng.uniform(-1, 1, (count, 1)) + 0.2 * far, far)
@@ -64,7 +64,7 @@ def _spans(unit, rng, count):
 
 
 def _short(unit, rng, count):
-    """Spans of one to six pixels. Most need no cut, so that they follow each other on every cycle."""
+    """Spans of one to six pixels. Most are not cut, so a span comes on nearly every cycle."""
     near = sphere(rng, count) * 2.0 ** -rng.uniform(0, 9, (count, 1))
     return _lines(
         rng, rng.integers(1, 7, count), near, near + near[:, ::-1] * rng.uniform(-0.5, 0.5, (count, 1))
@@ -72,13 +72,13 @@ def _short(unit, rng, count):
 
 
 def _any(unit, rng, count):
-    """Attributes of any codes, with sums modulo 4 and saturation."""
+    """Attributes of any codes. Sums wrap modulo 4, and words saturate."""
     words = {name: any_codes(rng, SPAN_STEP, count, ATTRIBUTES) for name in _WORDS}
     return _case(rng, rng.integers(1, 20, count), **words)
 
 
 def _sizes(unit, rng, count):
-    """Powers of two, their halves and quarters, and codes beside them. They decide each bit of the test."""
+    """Components k 2^j with k from 1/4 to 7/4, or a code next to them. They decide each bit of the test."""
     length = rng.integers(1, 12, count)
     ends = []
     for _ in range(2):
@@ -91,7 +91,10 @@ def _sizes(unit, rng, count):
 
 
 def _steep(unit, rng, count):
-    """Spans of two pixels at four scales. A component of the ends differs by about 9/16 of the length."""
+    """Spans of two pixels, at four scales of N/W.
+
+    From one end to the other a component changes by 0.4 to 0.7 of the vector's length.
+    """
     near = sphere(rng, count)
     apart = rng.uniform(-0.1, 0.1, (count, 3))
     apart[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-1, 1], count) * rng.uniform(

@@ -50,7 +50,7 @@ def _case(rng, **vectors):
 
 
 def _lines(unit, rng, count):
-    """Ends of all lengths, and the step from the first end to the last in 1 to 4095 pixels."""
+    """N/W of all lengths at both ends of spans of 1 to 4095 pixels, and the step between the pixels."""
     start = sphere(rng, count) * 2.0 ** rng.uniform(-14, 0, (count, 1))
     end = start + np.linalg.norm(start, axis=1, keepdims=True) * rng.uniform(-0.5, 0.5, (count, 3))
     length = 4095 >> rng.integers(0, 12, count)
@@ -62,12 +62,12 @@ def _lines(unit, rng, count):
 
 
 def _any(unit, rng, count):
-    """Words of any codes, ends of the range, steps of every size."""
+    """Words of any codes, with extreme codes, and steps of every size."""
     return _case(rng, **{name: any_codes(rng, _FORMATS[name], count, 3) for name in _VECTORS})
 
 
 def _sizes(unit, rng, count):
-    """Powers of two, and powers of two minus a step. They decide each bit of a shift."""
+    """Vectors whose largest component is a power of two, or a step less. They decide each bit of a shift."""
     beats = {}
     for name in _VECTORS:
         bits = _FORMATS[name].width - 1

@@ -26,7 +26,7 @@ def _codes(vectors):
 
 
 def _vectors(unit, rng, count):
-    """Vectors of all lengths, some of any words, some without direction."""
+    """Vectors of all lengths. Some have any codes, and some have no direction."""
     vector = _codes(sphere(rng, count) * 2.0 ** rng.uniform(8, 26.5, (count, 1)))
     vector[::8] = any_codes(rng, SPAN_NORMAL, *vector[::8].shape)
     return Case({"vector": vector, "flip": rng.integers(0, 2, count)})
@@ -49,10 +49,10 @@ def _corners(unit, rng, count):
 
 
 def deciding_vectors(rng: np.random.Generator, draws: int) -> np.ndarray:
-    """Random vectors of length 1 whose unit vector depends on a single bit. About 1 in 3,000 vectors does.
+    """Random vectors v of length 1 whose unit vector depends on a single bit. About 1 in 3,000 is chosen.
 
-    A vector is chosen if a step of the squared length, up or down, changes the factor e. It is also chosen if
-    a component of ``v + e v`` is a tie of the rounding, or differs from a tie in one bit.
+    A vector is chosen if one step more or less of its squared length changes the factor e. It is also chosen
+    if a component of ``v + e v`` is a tie of the rounding, or differs from a tie in one bit.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def deciding_vectors(rng: np.random.Generator, draws: int) -> np.ndarray:
 
 
 def _deciding(unit, rng, count):
-    """Vectors whose unit vector depends on a single bit, most of them negated."""
+    """Vectors whose unit vector depends on a single bit. The flag ``flip`` negates most of them."""
     vector = deciding_vectors(rng, count)
     return Case({"vector": vector, "flip": (rng.random(len(vector)) < 0.9).astype(np.int64)})
 
@@ -97,7 +97,7 @@ RECORD = Record(
     title="Vector of any length divided by its length",
     source="docs/theory/geometry.md#normals",
     variants={
-        "": Variant(VectorNormaliserUnit, _measure, "lengths 2^-12 to 1", note="components over ONE"),
+        "": Variant(VectorNormaliserUnit, _measure, "lengths 2^-12 to 1", note="components divided by ONE"),
         "interval 4": Variant(partial(SharedVectorNormaliserUnit, initiation_interval=4), long=True),
         "interval 7": Variant(partial(SharedVectorNormaliserUnit, initiation_interval=7)),
     },
@@ -110,7 +110,7 @@ RECORD = Record(
     },
     axis="log2 of the vector's length",
     still={
-        "u is in halves of a step, odd": "u[0]",
-        "pairs of Booth digits weigh 16 and 256 times as much": "pair_2[0-3] pair_4[0-7]",
+        "u counts half steps, and is odd": "u[0]",
+        "pair_2 is a multiple of 16, and pair_4 of 256": "pair_2[0-3] pair_4[0-7]",
     },
 )

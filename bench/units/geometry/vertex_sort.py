@@ -19,18 +19,18 @@ def _sorted(unit, case):
 
 
 def _flipped(unit, rng, count, back_faces="flip"):
-    """Triangles of all kinds in a small picture, normals of back faces negated."""
+    """Triangles of all kinds in a small picture. The normals of back faces are negated."""
     frame = small_frame(rng, back_faces)
     return Case(random_triangles(rng, count, unit.grid).beats, frame.codes)
 
 
 def _culled(unit, rng, count):
-    """Triangles of all kinds in a small picture, back faces culled."""
+    """Triangles of all kinds in a small picture. Back faces are dropped."""
     return _flipped(unit, rng, count, "cull")
 
 
 def _shown(unit, rng, count):
-    """Triangles of all kinds in a small picture, back faces unchanged."""
+    """Triangles of all kinds in a small picture. Back faces are not changed."""
     return _flipped(unit, rng, count, "show")
 
 
@@ -40,7 +40,10 @@ def _whole(unit, rng, count):
 
 
 def _near(unit, rng, count):
-    """Two corners at one height, a few steps of the grid apart. The lowest bits decide their order."""
+    """Triangles with two corners at the same height, at most 7 steps of the grid apart.
+
+    The lowest bits decide the order of the two corners.
+    """
     triangles = random_triangles(rng, count, unit.grid, 500.0)
     rows, first = np.arange(count), rng.integers(0, 3, count)
     second = (first + rng.integers(1, 3, count)) % 3
@@ -52,7 +55,10 @@ def _near(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Pictures at any place. Boxes begin or end at borders or 2^k pixels beside, or are 2^k pixels high."""
+    """Pictures at any place. The bounding box of a triangle begins or ends near a border of the picture.
+
+    Or it begins 2^k pixels from a border, or its height is about 2^k pixels.
+    """
     grid, first = unit.grid, rng.integers(-2048, 2047, 2)
     end = np.minimum(first + 2 ** rng.integers(0, 11, 2), 2048)
     frame = FrameSettings(*(int(end) for end in (*first, *end)))
@@ -65,7 +71,7 @@ def _borders(unit, rng, count):
     high = low + often(0.7, powers[1]) + rng.integers(-1, 2, (count, 2))
     pixels = np.stack([low, high, rng.integers(np.minimum(low, high), np.maximum(low, high) + 1)], axis=1)
     pixels = rng.permuted(pixels, axis=1)
-    # Any place from a pixel's centre back to just behind the centre of the pixel before.
+    # Any place after the centre of the pixel before, up to the centre of the pixel.
     codes = pixels * grid.steps - grid.half + 1 + rng.integers(0, grid.steps, pixels.shape)
     codes = codes.clip(grid.coordinate.min_code, grid.coordinate.max_code)
     return Case(
@@ -94,7 +100,7 @@ RECORD = Record(
     },
     axis="",
     still={
-        "the first digit looks back to nothing": "rest_{0,1}[0]",
+        "a constant 0 stands below the first Booth digit": "rest_{0,1}[0]",
         "a counter has room for more events than a run has": "count_empty[8-31] "
         "count_culled[7-31] count_zero_area[6-31]",
     },

@@ -11,7 +11,7 @@ RECORD = Record(
     title="Normals on straight lines between points of the great circle",
     source="docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7",
     variants={
-        "bisection": measured(BisectionInterpolator(), "; the bisection's fit counts as arithmetic"),
+        "bisection": measured(BisectionInterpolator(), "; the bisection's fit counts as arithmetic error"),
         "bisection, of a chord, compact": options(
             BisectionInterpolator("one_minus_cosine"), 2, length_bits=9, product_interval=3
         ),

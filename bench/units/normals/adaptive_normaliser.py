@@ -34,7 +34,7 @@ def straight_lines(left: np.ndarray, right: np.ndarray, levels: np.ndarray, t: n
     left, right : array, shape (pixels, 3)
         Ends of each pixel's span.
     levels, t : array, shape (pixels,)
-        Number of levels of the pixel's span, and the pixel's parameter, 0 to 1.
+        Number of levels of the pixel's span, and position of the pixel in the span, 0 to 1.
     """
     parts = 2.0**levels
     segment = np.minimum(np.floor(t * parts), parts - 1)
@@ -81,7 +81,10 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Every number of levels; angles 0, 45, 90, 180 degrees; lengths 0, 4095 and near powers of two."""
+    """Spans of every number of levels, with angles of 0, 45, 90 and 180 degrees among them.
+
+    Some lengths are 0, 4095 or next to a power of two.
+    """
     length = np.r_[1, 2, 3, 16, 0, 1, 1, 2, 2, 5, 17, 33, 64, 65, 100, 0, 0, 129, rng.integers(0, 80, count)]
     angles = rng.uniform(0, 95, len(length))
     angles[::5] = 10.0 ** rng.uniform(-4, 1, len(angles[::5]))
@@ -93,14 +96,14 @@ def _corners(unit, rng, count):
 def _last_bits(unit, rng, count):
     """Many spans, some of them long.
 
-    Further spans have five pixels, and a u, ``1 - N_l·N_r``, at the border of its rounding.
+    Further spans have five pixels. Their u, ``1 - N_l·N_r``, is at the border of its rounding.
     """
     few = count // 100
     length = np.r_[rng.integers(1, 70, count), rng.integers(1000, 4096, few)]
     angles = rng.uniform(0, 95, len(length))
     angles[::2] = 10.0 ** rng.uniform(-4, 1, len(angles[::2]))
     ends = code_pairs_at(rng, len(length), angles)
-    # The third of five pixels has the middle normal.
+    # The third of five pixels gets the middle normal, whose factor depends on u.
     border = pairs_chosen(
         *code_pairs_at(rng, 1500, 90),
         lambda u: (u < ONE_SQUARED.codes) & (abs(u % (1 << 17) - (1 << 16)) < 4),
@@ -119,7 +122,7 @@ def _variants():
                 partial(_measure, model=model),
                 "spans to 90 degrees, 1 to 4095 pixels",
                 beat={"normal_left": AXIS, "normal_right": AXIS, "length": 64},
-                note="model: straight lines; the bisection's fit counts as arithmetic; "
+                note="model error: of straight lines; the bisection's fit counts as arithmetic error; "
                 "latency: for equal normals",
                 as_published=published,
                 long=exponent == 6,
@@ -145,22 +148,26 @@ RECORD = Record(
     },
     waivers={
         "fsm_state": (
-            "In the first state all bits of the state are 0. The controlling bit of the next state is 0, too."
+            "The fault needs a controlling bit of 1. In the first state all bits of the state are 0. In the "
+            "next state the controlling bit is 0, too."
         ),
-        "write_index": "A middle is at most 16 of 32 segments from its ends. So the bit for 32 is 0.",
-        "inner_level": "The FIFO's level falls only from 1 or more: the controlling bit, the borrow, is 0.",
-        "angle": "The bit is for u of 1 or more. From 45 degrees on the unit reads the cosine in its place.",
+        "write_index": "A middle is at most 16 of 32 segments from its ends, so the bit for 32 is 0 already.",
+        "inner_level": (
+            "The controlling bit is the borrow when the level of the FIFO falls. The level falls only from 1 "
+            "or more, so the borrow is 0."
+        ),
+        "angle": "The bit is 1 only if u is 1 or more. From 45 degrees on the unit reads the cosine, not u.",
     },
     still={
-        "ends that are bisected are at least two of 32 segments apart": "top.index[0]",
-        "a middle is at most 16 of 32 segments from its ends, and its index is under 32": (
+        "ends that are bisected are at least two of 32 segments apart, so the index is even": "top.index[0]",
+        "a middle is at most 16 of 32 segments from its ends, and its index is less than 32": (
             "half[5] write_index[5]"
         ),
         "at most 16 spans are in the unit": "ready_spans[5-6]",
-        "a reciprocal is normalised and not negative, so that its first bits are 01": (
+        "a reciprocal is normalised and not negative, so its first bits are 01": (
             "reciprocal[16-17] reciprocals.table_port__data[16]"
         ),
-        "the pixels of a segment take at most the steps in `available`, 14 bits": "advance[14-23]",
+        "the steps of a segment's pixels are at most `available`, which has 14 bits": "advance[14-23]",
         "a segment of 4096 steps is always divided": "top.count[12]",
         "a fraction is not negative": "phi[17]",
     },

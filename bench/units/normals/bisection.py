@@ -23,7 +23,7 @@ __all__ = ["RECORD", "factor_of"]
 
 
 def factor_of(model: Bisection, cosine: np.ndarray, first_step: np.ndarray) -> np.ndarray:
-    """``e`` by the polynomials of a bisection in float64.
+    """The factor ``e`` of a bisection, by its polynomials in float64.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def _measure(rng, count, model):
     first_step = (u > model.widest_narrow) & (model.max_angle == 90)
     factor = 0.5 + factor_of(model, cosine, first_step)
     formula = (left + right) * COMPONENT.step * factor[:, np.newaxis]
-    # If the factor is too large, a component near 1 leaves the range of its word.
+    # If the factor is too large, a component near 1 is outside the range of its word.
     formula = np.clip(formula, -1, 1 - COMPONENT.step)
     return Sample(found.values, exact, formula, degrees_between(left, right))
 
@@ -70,22 +70,23 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles of 0, 45, 90 and 180 degrees, small and any angles, extreme codes, u on a tie, the least u."""
+    """Angles of 0, 45, 90 and 180 degrees, small and any angles, extreme codes, u at a tie, the least u."""
     angles = np.r_[np.zeros(20), np.full(20, 45), np.full(20, 90), 10.0 ** rng.uniform(-4, 0, 100)]
     angles = np.r_[angles, rng.uniform(0, 90, count), rng.uniform(90, 180, 60), 180]
     a, b = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))
     order = rng.permutation(len(a))
     a, b = a[order], b[order]
-    # The tie: 1 - cosine is 180994.5 steps of 2^-17.
+    # A tie of the rounding of u: 1 - cosine is 180994.5 steps of 2^-17.
     a[0], b[0] = (35421, 119829, 39572), (-5993, -85566, 99107)
     a[1] = b[1] = COMPONENT.min_code
     return _case(a, b)
 
 
 def _last_bits(unit, rng, count):
-    """Operands for the last bits of products and sums, which are rounded off, and u at a border of rounding.
+    """Many pairs, because the last bits of products and sums rarely change a rounded result.
 
-    The first pairs are arbitrary. Later pairs lie within a shrinking distance of the border, some on it.
+    The first pairs are arbitrary. In later pairs u is nearer and nearer to a border of its rounding, down to
+    a distance of 0.
     """
     a, b = code_pairs_at(rng, count, rng.uniform(0, 100, count))
     border = (ONE_SQUARED.codes - dot(a, b)) % (1 << 17) - (1 << 16)
@@ -125,7 +126,7 @@ def _variants():
 
 RECORD = Record(
     name="bisection",
-    title="Normal half-way between two others",
+    title="Normal half-way between two normals",
     source="docs/theory/interpolation.md#bisection; [T] 2.1, figure 2.6",
     variants=dict(_variants()),
     expect=_expect,
@@ -136,8 +137,9 @@ RECORD = Record(
     },
     waivers={
         "operands": (
-            "While the output is stalled, the operands of a beat four cycles before are not read any more."
+            "The fault changes operands while the output is stalled. The beat of these operands came four "
+            "cycles before, and the unit does not read them any more."
         ),
     },
-    still={"the first sum of the polynomials is 0.056, or 0.136 to 0.303": "total_2[17]"},
+    still={"the first sum of a polynomial is 0.056, or 0.136 to 0.303, so its first bit is 0": "total_2[17]"},
 )

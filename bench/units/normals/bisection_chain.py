@@ -31,7 +31,10 @@ _LENGTH = ONE * COMPONENT.step
 
 
 def _weights(chain, cosine, level, limit):
-    """Weights ``l`` and ``m`` in float64. Where u exceeds the limit, the first step's polynomial is taken."""
+    """Weights ``l`` and ``m`` of the ends in float64.
+
+    If u is over the limit, the polynomial of the first step gives the factor.
+    """
     model, u = chain.bisection, 1 - cosine
     weight_l, weight_m = np.zeros(len(u)), np.ones(len(u))
     for k in range(1, _LEVELS + 1):
@@ -52,8 +55,7 @@ def _measure(rng, count, chain):
     def vectors(of_left, of_right):
         return _LENGTH * (of_left[:, np.newaxis] * a + of_right[:, np.newaxis] * b)
 
-    # The exact normal gets its own weights for the great circle, because the vectors of codes differ in
-    # length.
+    # Vectors of codes differ in length. So the exact normal has weights for a great circle between them.
     psi = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), dot(a, b))
     part = psi * 2.0**-level
     apart = psi > 0
@@ -62,7 +64,7 @@ def _measure(rng, count, chain):
         np.where(apart, np.sin(psi - part) / sine, 1 - 2.0**-level),
         np.where(apart, np.sin(part) / sine, 2.0**-level),
     )
-    # Near the limit, rounding decides which polynomial the unit takes. The nearer of both results counts.
+    # Near the limit, rounding decides which polynomial the unit takes. The formula is the nearer result.
     limits = model.widest_narrow.values + np.array([-8, 8]) * model.ANGLE_FORMAT.step
     early, late = (
         np.clip(vectors(*_weights(chain, dot(a, b), level, limit)), -1, _LENGTH) for limit in limits
@@ -85,12 +87,12 @@ def _case(ends, level):
 
 def _spans(unit, rng, count):
     """Pairs of normals at angles of every size, and pairs of arbitrary codes. Most chains are short."""
-    # A level takes 17 cycles.
+    # A level takes 17 cycles, so most pairs have few levels.
     return _case(any_pairs(rng, count), 1 + (rng.zipf(2, count) - 1) % _LEVELS)
 
 
 def _corners(unit, rng, count):
-    """Angles 0, 45, 90, 180, small angles, angles up to 100 degrees, extreme codes, each at all levels."""
+    """Angles 0, 45, 90, 180, small angles, angles up to 100 degrees, and extreme codes, at any level."""
     angles = np.r_[0, 45, 90, 180, 10.0 ** rng.uniform(-4, 0, count // 4), rng.uniform(0, 100, count)]
     ends = (
         np.vstack([end, word_ends(rng, count // 4, 3)]) for end in code_pairs_at(rng, len(angles), angles)
@@ -101,14 +103,14 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Spans of one level at the borders of roundings, where a single step of a product changes the result."""
+    """Spans of one level at the border of a rounding. There a single step of a product changes the result."""
 
     def at_border(u):
-        # At the borders of both roundings of u, to 20 and to 17 fraction bits.
+        # u is rounded to 20 and to 17 fraction bits. It is at the border of both roundings.
         return (abs((u - (7 << 13) + 20) % (1 << 17) - 20) < 20) & (u < ONE_SQUARED.codes)
 
     first = pairs_chosen(*code_pairs_at(rng, 2000, 90), at_border)
-    # The result of level 1 is f times the sum of the ends. Take pairs with a component at the border.
+    # The result of level 1 is f times the sum of the ends. In these pairs a component is at the border.
     ends = code_pairs_at(rng, count, rng.uniform(0, 90, count))
     model = unit.model.bisection
     u = (ONE_SQUARED - DotProduct().compute(*component_words(*ends))).round_half_up(20)
@@ -129,7 +131,7 @@ def _variants():
                 partial(_measure, chain=chain),
                 "spans to 90 degrees, levels 1 to 15",
                 beat={"normal_left": AXIS, "normal_right": AXIS, "level": 1},
-                note="times for level 1",
+                note="latency and interval: for level 1",
                 as_published=model.as_published,
             ),
         )
@@ -150,12 +152,15 @@ RECORD = Record(
     },
     waivers={
         "weight_l": (
-            "l starts at 0, and a step gives at most l/2 + 1. So l is never negative, stays below 2, and "
-            "never saturates."
+            "The weight l starts at 0, and a step gives at most l/2 + 1. So l is never negative, stays less "
+            "than 2, and never saturates."
         ),
-        "factor": "Operands are read on the cycle after they come. m, a product of factors, is not negative.",
+        "factor": (
+            "The fault changes the operands after the cycle on which they are read, or it sets to 0 the sign "
+            "of m. The weight m is a product of factors, so its sign is 0 already."
+        ),
     },
     still={
-        "weights are not negative": "top.weight_{l,m}[21]",
+        "the weights l and m are not negative": "top.weight_{l,m}[21]",
     },
 )

@@ -34,7 +34,7 @@ def _expect(unit, case):
 
 
 def spans_of(unit, rng, length):
-    """Spans of given lengths, with values of any size. Some second pixels are near a border of a rounding."""
+    """Spans of given lengths, with values of any size. Some second pixels are at a border of rounding."""
     model = unit.model
     start = any_codes(rng, model.start_format, len(length), 3)
     first, second = (any_codes(rng, model.difference_format, len(length), 3) for _ in range(2))
@@ -50,7 +50,7 @@ def _spans(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of the differences show."""
+    """Spans of 3000 to 4095 pixels, where the last bits of the differences change the normals."""
     return spans_of(unit, rng, rng.integers(3000, 4096, count // 3500))
 
 

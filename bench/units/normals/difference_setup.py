@@ -33,7 +33,7 @@ def _expect(unit, case):
 
 
 def _case(unit, rng, length):
-    """Curves of any coefficients with lengths. For a straight line there is no G."""
+    """Curves with any coefficients, for spans of given lengths. A straight line has no G."""
     beats = any_curves(rng, len(length)) | {"length": length}
     if unit.order == 1:
         del beats["g"]
@@ -47,7 +47,7 @@ def _spans(unit, rng, count):
 
 
 def _every_length(unit, rng, count):
-    """Every length that fits, and short lengths again."""
+    """Every length that the unit takes, and further short lengths."""
     longest = 1 << unit.length_bits
     length = np.r_[np.arange(1, longest), rng.integers(1, min(longest, 40), count)]
     return _case(unit, rng, rng.permutation(length))
@@ -59,7 +59,7 @@ def _last_bits(unit, rng, count):
 
 
 def _variants():
-    note = "of the curve at any pixel that the differences lead to"
+    note = "error of the curve at any pixel, by the differences"
     for name, model, interval in (
         ("", DifferenceSetup(), 7),
         ("interval 1", DifferenceSetup(), 1),
@@ -108,20 +108,33 @@ RECORD = Record(
     axis="pixel of the span",
     logarithmic=True,
     waivers={
-        "address": "The table and the shift read the address on the first of its seven cycles.",
-        "places": "The upper half is read for the address, on the first of its seven cycles.",
-        "positions": "The upper half is read for the address, on the first of its seven cycles.",
+        "address": (
+            "The register holds its word for seven cycles. The table and the shift read it on the first cycle. "
+            "The fault changes it later."
+        ),
+        "places": (
+            "The register holds its word for seven cycles. Its upper half is read on the first cycle. The "
+            "fault changes it later."
+        ),
+        "positions": (
+            "The register holds its word for seven cycles. Its upper half is read on the first cycle. The "
+            "fault changes it later."
+        ),
         "reciprocal": (
-            "An address stays for seven cycles: what is read again while the output is stalled is the same "
-            "word."
+            "The fault reads the table again while the output is stalled. An address stays for seven cycles, "
+            "so the table gives the same word."
         ),
     },
     still={
-        "twice a number is even": "top.spare[186] top.spare[230] top.spare[274] second_{0-2}[0]",
-        "a reciprocal is normalised, and so is its square, so that the first bit is 1": (
+        "a second difference is twice a number, so its last bit is 0": (
+            "top.spare[186] top.spare[230] top.spare[274] second_{0-2}[0]"
+        ),
+        "a reciprocal and its square are normalised, so their first bits are 1": (
             "reciprocals_word[16] reciprocals.port__data[16] square[16] square_rounded[16]"
         ),
-        "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
-        "a length of 12 bits takes shifts up to 12, and its square up to 25": "shift[4] square_shift[5]",
+        "the largest square of a reciprocal is 62 steps less than 1": "square_rounded[17]",
+        "for a length of 12 bits the shift is at most 12, and the square's shift at most 25": (
+            "shift[4] square_shift[5]"
+        ),
     },
 )

@@ -28,13 +28,16 @@ def _expect(unit, case):
 
 
 def _words(unit, rng, count):
-    """Words of every size, with their ends."""
+    """Words of every size, with the extreme codes."""
     p = unit.model
     return Case({"a": any_codes(rng, p.a_format, count, 3), "b": any_codes(rng, p.b_format, count, 3)})
 
 
 def _corners(unit, rng, count):
-    """Every combination of extreme codes in a and in the first component of b. The rest of b is as in a."""
+    """Every combination of extreme codes in a and in the first component of b.
+
+    The other components of b are those of a.
+    """
     ends = [COMPONENT.min_code, COMPONENT.max_code, 0, 1, -1]
     a0, a1, a2, b0 = (grid.ravel() for grid in np.meshgrid(ends, ends, ends, ends))
     return Case({"a": np.stack([a0, a1, a2], axis=1), "b": np.stack([b0, a1, a2], axis=1)})

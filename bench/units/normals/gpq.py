@@ -39,7 +39,7 @@ def _expect(unit, case):
 
 
 def _normals(unit, rng, count):
-    """Ends at angles of every size, or any codes. The middle is their middle normal, or any code."""
+    """End normals at angles of every size, or any codes. The middle is their middle normal, or any codes."""
     left, right = any_pairs(rng, count)
     middle = any_codes(rng, MiddleNormal.FORMAT, count, 3)
     middle[::2] = MiddleNormal().compute(*component_words(left, right))[0].codes[::2]
@@ -47,7 +47,10 @@ def _normals(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Extreme codes, where G and P saturate, and middles near the mean of any ends, where G and P fit."""
+    """Extreme codes, for which G and P saturate. Half of the middles are near the mean of their ends.
+
+    For these G and P do not saturate.
+    """
     left, right = word_ends(rng, count, 3), word_ends(rng, count, 3)
     format = MiddleNormal.FORMAT
     middle = rng.choice([format.min_code, format.max_code, 0], (count, 3))

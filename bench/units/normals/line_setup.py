@@ -16,7 +16,10 @@ _FORMAT = LineSetup.VECTOR_FORMAT
 
 
 def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of ends of lines at any angle, with lengths of 1/100 to 1. Every eighth line has any codes."""
+    """Codes of the vectors at both ends of lines. Every eighth line has any codes.
+
+    The others have any angle, and vectors of length 1/100 to 1.
+    """
     ends = [sphere(rng, count) * 10.0 ** -rng.uniform(0, 2, (count, 1)) for _ in range(2)]
     left, right = quantise_line(*ends)
     left[::8], right[::8] = any_codes(rng, _FORMAT, 2, *left[::8].shape)
@@ -24,7 +27,7 @@ def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndar
 
 
 def _measure(rng, count):
-    """Components of the point of a line at any of its pixels."""
+    """Components of the vector at any pixel of a line."""
     left, right = quantise_line(*(sphere(rng, count) * rng.uniform(0.1, 1, (count, 1)) for _ in range(2)))
     length = log_lengths(rng, count, 2)
     pixel = pixel_of(rng, length)[:, np.newaxis]
@@ -46,13 +49,13 @@ def _lengths(unit, rng, count):
 
 
 def _lines(unit, rng, count):
-    """Lines of `any_lines`. Numbers of pixels have a uniform logarithm."""
+    """Lines of any angle with lengths of 1/100 to 1, or of any codes. The logarithm of pixels is uniform."""
     left, right = any_lines(rng, count)
     return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
 
 
 def _corners(unit, rng, count):
-    """Extreme codes, and differences next to a border of their lower word."""
+    """Extreme codes. In half of the lines the difference of the ends is next to a multiple of 2^7."""
     left, right = any_lines(rng, count)
     words = np.array([_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code])
     left[: count // 2] = rng.choice(words, (count // 2, 3))
@@ -87,15 +90,17 @@ RECORD = Record(
     axis="pixel of the span",
     logarithmic=True,
     still={
-        "a reciprocal is normalised, so that its first bit is 1": (
+        "a reciprocal is normalised, so its first bit is 1": (
             "reciprocals_word[23] reciprocals.port__data[23]"
         ),
-        "a length of 12 bits takes shifts up to 12": "shift[4]",
-        "a reciprocal's upper word, of 17 bits, is not negative": "multiplier_{0,2}_{1,b}[17]",
-        "a lower word, of P or of the reciprocal, has 7 bits": (
+        "for a length of 12 bits the shift is at most 12": "shift[4]",
+        "the upper word of a reciprocal has 17 bits and is not negative": "multiplier_{0,2}_{1,b}[17]",
+        "the lower word of P, and of the reciprocal, has 7 bits": (
             "multiplier_1_{1,b}[7-17] multiplier_2_{0,a}[7-17]"
         ),
-        "a product of 7 by 17 bits has 24": "multiplier_2_product[24-35]",
-        "twice P r has three fraction bits less than the shifted word": "shifter_0_0[0-2]",
+        "a product of 7 by 17 bits has 24 bits": "multiplier_2_product[24-35]",
+        "the shifted word has three fraction bits more than 2 P r, with the reciprocal r": (
+            "shifter_0_0[0-2]"
+        ),
     },
 )

@@ -30,7 +30,7 @@ def _measure(rng, count, model):
     u = (1 - cosine) * ONE_SQUARED.values
     coefficients = np.r_[0.5 + model.constant.values, model.coefficients.values]
     factor = np.polynomial.polynomial.polyval(u, coefficients)[:, np.newaxis]
-    # If the factor is too large, a component near 1 leaves the range of its word.
+    # If the factor is too large, a component near 1 is outside the range of its word.
     formula = (left + right) * COMPONENT.step * factor
     formula = np.clip(formula, -1, model.FORMAT.max_code * model.FORMAT.step)
     return Sample(found.values, exact, formula, degrees_between(left, right))
@@ -52,14 +52,14 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Equal and opposite normals, angles up to 45 degrees, of 45, and of more, and extreme codes."""
+    """Equal and opposite normals, angles up to 45 degrees, of 45 degrees and of more, and extreme codes."""
     angles = np.r_[np.zeros(20), rng.uniform(0, 45, count), np.full(20, 45), rng.uniform(45, 180, 60), 180]
     ends = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))
     return _case(*ends)
 
 
 def _last_bits(unit, rng, count):
-    """Operands for last bits that are rounded off, and u at the border of a step."""
+    """Many pairs, because last bits rarely change a rounded result. Some u are at a border of rounding."""
     left, right = code_pairs_at(rng, count, rng.uniform(0, 60, count))
     few = left[:1500], right[:1500]
     border = pairs_chosen(*few, lambda u: (u < ONE_SQUARED.codes // 2) & ((u + 8) % (1 << 16) < 16))
@@ -91,11 +91,11 @@ RECORD = Record(
         "last bits": Stimulus(_last_bits, 40_000, stalled=False),
     },
     waivers={
-        "slot": "The fault makes slot 6 of slot 4. Slot 5 still follows. Only slots 0 and 5 have effects.",
-        "turn": "The fault makes slot 6 of slot 4. Slot 5 still follows. Only slots 0 and 5 have effects.",
+        "slot": "The fault turns slot 4 into 6. Slot 5 still follows, and only slots 0 and 5 have effects.",
+        "turn": "The fault turns slot 4 into 6. Slot 5 still follows, and only slots 0 and 5 have effects.",
     },
     still={
-        "the polynomial's products are at most 0.0127 and 0.0293": "rounded_2[13-16] rounded_1[14-16]",
-        "its inner sums are 0.0458 to 0.0586 and 0.1250 to 0.1544": "datapath.total_{1,2}[14-16]",
+        "products of the polynomial are at most 0.0127 and 0.0293": "rounded_2[13-16] rounded_1[14-16]",
+        "sums of the polynomial are 0.0458 to 0.0586 and 0.1250 to 0.1544": "datapath.total_{1,2}[14-16]",
     },
 )

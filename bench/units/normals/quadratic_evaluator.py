@@ -55,7 +55,7 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Curves of real spans at every angle and length, also with opposite normals, and extreme codes."""
+    """Curves of spans between unit normals, with angles of 0 to 180 degrees, and curves of extreme codes."""
     angles = np.repeat([0, 1e-4, 1, 45, 89.9, 90, 90.01, 135, 180], 5)
     length = np.r_[np.tile([1, 2, 3, 16, 4095], 9), np.full(8, 33)]
     real = curves_of(*component_words(*code_pairs_at(rng, len(angles), angles)))
@@ -69,7 +69,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Lengths over their whole range and many short spans, for the last bits of products and steps."""
+    """Spans of all lengths, and many short spans, because last bits of products rarely change a result."""
     return spans_of(rng, np.r_[rng.permutation(4096)[:60], rng.integers(0, 40, count // 20)])
 
 
@@ -95,13 +95,13 @@ RECORD = Record(
     },
     axis="pixel of the span",
     logarithmic=True,
-    waivers={"reciprocal": "A reciprocal is normalised: its first bit is 1 already."},
+    waivers={"reciprocal": "A reciprocal is normalised, so its first bit is 1 already."},
     still={
-        "a reciprocal is normalised, so that its first bit is 1": (
+        "a reciprocal is normalised, so its first bit is 1": (
             "reciprocals_word[17] reciprocals.port__data[17]"
         ),
-        "a length of 12 bits takes shifts up to 12": "shift[4]",
-        "the second bit of a square is 0": "square[1]",
-        "the square of t is 1 at most, and not negative": "square[35]",
+        "for a length of 12 bits the shift is at most 12": "shift[4]",
+        "a square is 0 or 1 modulo 4": "square[1]",
+        "the square of t is at most 1, and not negative": "square[35]",
     },
 )

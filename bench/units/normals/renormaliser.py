@@ -46,7 +46,7 @@ def _lengths(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Extreme codes, 0 and its neighbours, largest components next to every power of two, axes."""
+    """Extreme codes, 0, 1 and -1, largest components next to every power of two, and vectors along axes."""
     words = [_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code]
     ends = np.array(np.meshgrid(*[words] * 3)).reshape(3, -1).T
     powers = (1 << np.arange(_FORMAT.fraction_bits))[:, np.newaxis] + np.arange(-1, 2)
@@ -59,7 +59,7 @@ def _corners(unit, rng, count):
 
 
 def _segments(unit, rng, count):
-    """Squared lengths next to each border of a segment and of an octave."""
+    """Vectors whose squared length is next to a border of a segment or of an octave, for each border."""
     model = unit.model
     starts = 1 + np.arange(1 << model.SEGMENT_BITS) / (1 << model.SEGMENT_BITS)
     squares = np.ravel([starts * 2.0**octave for octave in (-2, -1, 0, 1)])
@@ -73,7 +73,7 @@ def _segments(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many vectors, for the last bits of products."""
+    """Many vectors, because the last bits of products rarely change a result."""
     return _case(rng, _vectors(rng, count))
 
 
@@ -92,12 +92,14 @@ RECORD = Record(
     axis="length of the vector",
     logarithmic=True,
     waivers={
-        "dot_product.*": "The dot product inside is accepted at once, so its skid buffer is never used.",
+        "dot_product.*": "The unit takes each dot product at once, so the skid buffer inside is never used.",
     },
     still={
-        "c2 is at most 0.695, c1 at most 0.9988, and the word subtracted from c1 is not negative": (
+        "c2 is at most 0.695, c1 at most 0.9988, and no negative word is subtracted from c1": (
             "coefficients.port__data[35] coefficients.port__data[47] c1_10[16] slope[16]"
         ),
-        "a product of two numbers less than 1/16 and 1 is less than 1/16": "square_term[28] linear_term[33]",
+        "a product is less than 1/16 if its factors are less than 1/16 and 1": (
+            "square_term[28] linear_term[33]"
+        ),
     },
 )

@@ -19,7 +19,7 @@ def _expect(unit, case):
 
 
 def _ranges(unit, rng, count):
-    """Ranges of one vertex to all of them."""
+    """Ranges of one vertex up to all vertices."""
     vertices = unit.model.vertices
     first = rng.integers(0, vertices, count)
     size = 1 + (rng.random(count) ** 3 * (vertices - first)).astype(np.int64)

@@ -17,7 +17,7 @@ _AXIS = (0.3, 1.0, -0.2)
 
 @cache
 def _motion() -> Motion:
-    """Two slots. One has a memory's mesh before a camera, and one has any codes."""
+    """Motion in two slots. Slot 0 turns the mesh of a memory before a camera. Slot 1 has any codes."""
     memory = any_memory()
     camera = Camera.framing(memory.world(memory.parts[0]).vertices, (0.2, 0.4, 1.0), "perspective")
     made = Motion.of(memory, camera, (640, 480), _AXIS)
@@ -35,7 +35,7 @@ def _expect(unit, case):
 
 
 def _angles(unit, rng, count):
-    """Any angles of both slots, with the angles at the quarters."""
+    """Any angles in both slots. The first angles are at and next to the quarters of a turn."""
     angle = rng.integers(0, 1 << ANGLE_BITS, count)
     quarters = np.array([0, 1023, 1024, 2047, 2048, 3071, 3072, 4095])
     angle[: len(quarters)] = quarters[:count]

@@ -16,7 +16,10 @@ __all__ = ["RECORD", "any_matrix"]
 
 
 def any_matrix(rng: np.random.Generator, distance: float = 1.4, size: float = 0.4) -> Matrix:
-    """Matrix of any rotation before a camera. Distance and size of the object are in near-plane distances."""
+    """Matrix of an object with any rotation before a camera.
+
+    Distance and size of the object are in units of the distance of the near plane.
+    """
     turn = rotation(rng.normal(size=3), rng.uniform(0, 6.3))
     rows = size * np.array([[1.7], [1.7], [1.0]]) * turn
     position, normal = (Fixed.round(ENTRY, values).codes for values in (rows, turn))
@@ -47,7 +50,7 @@ def _inside(unit, rng, count):
 
 
 def _around(unit, rng, count):
-    """An object that is mostly nearer than, farther than or beside the visible space."""
+    """An object whose vertices are mostly outside the visible space: too near, too far, or beside it."""
     matrix = any_matrix(rng, distance=rng.choice([0.5, 1.5, 15.5]), size=1.1)
     return _case(rng, count, matrix, len(unit.i.payload.index))
 
@@ -61,7 +64,7 @@ def _any(unit, rng, count):
 
 
 def _measure(rng, count):
-    """Columns of vertices inside, in steps of the grid."""
+    """Columns of the vertices inside the visible space, in steps of the grid."""
     unit, matrix = VertexTransform(), any_matrix(rng)
     position = rng.integers(-ONE, ONE + 1, (count, 3))
     found = unit.compute(position, unit_codes(rng, count), matrix)
@@ -78,7 +81,7 @@ RECORD = Record(
     source="docs/theory/video.md#vertices",
     variants={
         "one multiplier": Variant(
-            VertexUnit, _measure, "vertices inside", note="of the column, in 1/256 pixel"
+            VertexUnit, _measure, "vertices inside", note="error of the column, in 1/256 pixel"
         ),
         "two multipliers": Variant(partial(VertexUnit, None, 10, 15), long=True),
     },
@@ -90,7 +93,7 @@ RECORD = Record(
     },
     axis="W, near planes",
     still={
-        "a number from 1 on begins with 1, and so does its reciprocal over 1/2": (
+        "a mantissa is at least 1 and its reciprocal at least 1/2, so both begin with a bit of 1": (
             "mantissa[25] {table_0_row,reciprocal_row,port__data}[27]"
         )
     },
