@@ -109,8 +109,8 @@ RECORD = Record(
     logarithmic=True,
     waivers={
         "address": (
-            "The register holds its word for seven cycles. The table and the shift read it on the first cycle. "
-            "The fault changes it later."
+            "The register holds its word for seven cycles. Table and shift read it on the first cycle. The "
+            "fault changes it later."
         ),
         "places": (
             "The register holds its word for seven cycles. Its upper half is read on the first cycle. The "
