@@ -292,7 +292,7 @@ class ShadingPipelineUnit(wiring.Component):
     def _carry_albedo(
         self, m: Module, frame: FrameConstantsUnit
     ) -> tuple[stream.Interface, tuple[Value, Value]]:
-        """Make the albedo of the pixels, which waits for their terms. Returns it and the handshake."""
+        """Make the albedo path. Returns its output, which waits for the terms, and its input's handshake."""
         m.submodules.albedo = unit = self._albedo
         source = unit.i.signature.flip().create(path=("attributes",))
         attributes = self.i.payload.attributes

@@ -21,7 +21,7 @@ from blysk.hdl.core.views import copy, copy_fields
 __all__ = ["AlbedoUnit", "span_albedo_shape"]
 
 _WAITING = 32
-"""Vertex colours that wait for their texels; a sample in a memory inside takes fewer cycles."""
+"""Room for vertex colours that wait for their texels. A sample in a memory inside takes fewer cycles."""
 
 
 def span_albedo_shape(model: Albedo) -> data.StructLayout:
@@ -69,7 +69,7 @@ class _ColorProductUnit(PipelinedUnit):
 
 
 def _rounded(product):
-    # Neither factor is over 1, and so is the product.
+    # Both factors are at most 1, so the product is at most 1.
     format = Albedo.FORMAT
     return product.round_half_up(format.fraction_bits).wrap(format)
 

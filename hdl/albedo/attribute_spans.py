@@ -1,4 +1,4 @@
-"""Spans of attributes: vertex colours and texture coordinates over W, and 1/W, of a pixel on every cycle."""
+"""Spans of attributes: on every cycle a pixel's colours and texture coordinates over W, and its 1/W."""
 
 from collections.abc import Iterator
 from typing import ClassVar
@@ -111,7 +111,7 @@ class AttributeSpansUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """A counter of pixels, the accumulators, and registers of what belongs to the span."""
+        """A counter of pixels, the accumulators, and registers of the words that all pixels share."""
         m = Module()
         p, span = self.model, self.i.payload
         advance = Signal()

@@ -150,7 +150,7 @@ class AttributesUnit(PipelinedUnit):
             def shifted(numerator, shift):
                 return FixedValue(SQ(2, 23), (Value.cast(numerator) << shift)[:25])
 
-            # As late as the reciprocal needs it: a word that waits is copied.
+            # It is made as late as the reciprocal needs it, because a word that waits is copied.
             moved = g.register(f"{name}_shifted", shifted, numerator, shift, since=bend, formula="U' = 2^k·U")
             if name.startswith("colors"):
                 moved = operand = g.register(f"{name}_inside", lambda u: u.saturate(UQ(0, 23)), moved)
@@ -171,14 +171,14 @@ class AttributesUnit(PipelinedUnit):
 
     @staticmethod
     def _whole(numerator: FixedValue, halves: Value) -> FixedValue:
-        """U, with none, one or two halves of it."""
+        """U plus no, one or two halves of U."""
         code, format = Value.cast(numerator), numerator.format
         more = Mux(halves[1], code, Mux(halves[0], code >> 1, 0))
         format = type(format)(format.signed, format.integer_bits + 1, format.fraction_bits)
         return FixedValue(format, (code + more)[: format.width])
 
     def _reciprocal(self, normal: Word) -> tuple[Word, Word, Word]:
-        """Words of d, of the halves that c stands for, and of the product of the table."""
+        """Words of the reciprocal (see `Attributes`): d, c as a number of halves, and the table's product."""
         p, g = self.model, self._graph
         bits = p.BASE_FORMAT.width + p.SLOPE_FORMAT.width
         base, slope = (word.codes for word in p.table)
@@ -208,7 +208,7 @@ class AttributesUnit(PipelinedUnit):
         return rest, g.register("halves", halves, address), bend
 
     def _color(self, name: str, word: Word) -> Word:
-        """Word of a colour, from that of its quotient, or of its line."""
+        """Word of a colour, from the word of its quotient, or without perspective from that of its line."""
         p, g = self.model, self._graph
         if not p.spans.perspective:
             word = g.register(f"{name}_inside", lambda u: u.saturate(UQ(0, 23)), word)
@@ -221,13 +221,13 @@ class AttributesUnit(PipelinedUnit):
         return g.register(name, saturated, word, formula="A")
 
     def _coordinate(self, name: str, word: Word, range_: Word, base: Word) -> Word:
-        """Word of a texture coordinate, from that of its quotient, or of its line."""
+        """Word of a texture coordinate, from its quotient, or without perspective from its line."""
         p, g = self.model, self._graph
         format = p.coordinate_format
         dropped = Attributes.QUOTIENT_FORMAT.fraction_bits - p.share_bits
 
         def spread(offset, range_):
-            # With a bit for the rounding.
+            # There is one bit more than in the result, for the rounding.
             return (Value.cast(offset) << range_)[dropped - 1 :][: format.width + 1]
 
         def placed(offset, base):

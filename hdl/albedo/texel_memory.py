@@ -29,8 +29,8 @@ class TexelMemoryUnit(PipelinedUnit):
     The latency is 2 cycles: the memory's register and the register behind it. A memory outside of a design
     has the same streams, and any latency. It answers requests in their order.
 
-    A write is taken on every cycle. A write with ``begins`` is an index, in pairs of words. Each two values
-    behind it are the lower and the upper half of a word: of banks 0, 1, 2, 3, then of the next address.
+    A write is taken on every cycle. A write with ``begins`` gives an address, divided by 2. The values after
+    it are halves of words, first the lower half. The words go to banks 0, 1, 2, 3, then to the next address.
     Values past the end of the banks must not come. Reset begins at address 0, and clears no word. Write only
     while no request is inside: on a cycle of a write the registers stand still.
 
@@ -61,7 +61,7 @@ class TexelMemoryUnit(PipelinedUnit):
         )
 
     def elaborate(self, platform):
-        """The pipeline's control, and the banks beside it, which are written while it stands, too."""
+        """The pipeline's control, and the banks, which are also written while the pipeline stands still."""
         p = self.model
         self._words = [Signal(p.WORD_BITS, name=f"texel_{bank}") for bank in range(BANKS)]
         m = super().elaborate(platform)

@@ -50,7 +50,7 @@ def bank_addresses_shape(model: TextureAddress) -> data.StructLayout:
 
 
 class TextureAddressUnit(PipelinedUnit):
-    """Finds the four texels around a place, wrapped, and their weights.
+    """Finds the four texels around a place, with wrapping, and their weights.
 
     `TextureAddress`, the bit-accurate model, has the rules. The latency is 7 cycles, and the initiation
     interval is 1. There is no multiplier. The adders are those of a coordinate's half texel, of the next
@@ -87,7 +87,7 @@ class TextureAddressUnit(PipelinedUnit):
     def datapath(self, m, operands):
         """The graph, read at the stage of its last word."""
         descriptor, bits = self.constants, self.model.memory.address_bits
-        # First word behind level 0, from the base on.
+        # First word behind level 0, counted from the base.
         self._behind = Signal(bits, name="behind")
         exponent = _less_one(descriptor.width) + _less_one(descriptor.height)
         m.d.sync += self._behind.eq((Const(1) << exponent)[:bits])
@@ -120,7 +120,7 @@ class TextureAddressUnit(PipelinedUnit):
             return Mux(level.any(), self._behind | size, 0)[:bits]
 
         def sum_of(width, height):
-            # A level behind level 0 has no larger exponent.
+            # Only levels behind level 0 use this sum, and theirs fits these bits.
             return (_less_one(width) + _less_one(height))[: (bits - 1).bit_length()]
 
         exponent = g.register("exponent", sum_of, *sizes, formula="log2 S")
@@ -151,7 +151,7 @@ class TextureAddressUnit(PipelinedUnit):
         return found, [across, down]
 
     def _axis(self, axis: int, size: Word) -> tuple[list[Word], Word]:
-        """Words of half the even and half the odd column or row, and of the weight of the odd."""
+        """Words of the even and of the odd column or row, both halved, and of the weight of the odd."""
         p, g, name = self.model, self._graph, "uv"[axis]
         share_bits = p.share_bits if p.bilinear else 0
 
@@ -222,7 +222,7 @@ class TextureAddressUnit(PipelinedUnit):
 
 
 def _less_one(size: Value) -> Value:
-    """A logarithm less one, 0 at least."""
+    """A logarithm minus one, but at least 0."""
     return (size - size.any())[: len(size)]
 
 

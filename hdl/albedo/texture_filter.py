@@ -128,7 +128,7 @@ class TextureFilterUnit(PipelinedUnit):
         return colors
 
     def _nearest(self) -> list[Word]:
-        """Words of the colours by a choice."""
+        """Words of the colours: one texel is chosen."""
         g = self._graph
         across, down = (self._weight(axis) for axis in (0, 1))
         colors = []
@@ -147,7 +147,7 @@ class TextureFilterUnit(PipelinedUnit):
         return colors
 
     def _row(self, register, a, b, weight):
-        """Mean of two texels, with 18 fraction bits, and half a step of the colour and of a row."""
+        """Mean of two texels with 18 fraction bits, plus half a step of the colour and of a row."""
         a, b = _value(a), _value(b)
         difference = register((b - a).as_signed(), "difference")
         start = Cat(Const(3, 4), register(register(a, "start"), "start_behind"))
@@ -160,7 +160,7 @@ class TextureFilterUnit(PipelinedUnit):
         return self._sum(register, difference, weight, start, _ROW)
 
     def _sum(self, register, difference, weight, start, fraction_bits):
-        """``start + w difference``, where the difference has some fraction bits."""
+        """``start + w difference``. The difference has ``fraction_bits``."""
         weight = register(weight, "weight")
         cut = fraction_bits + self.model.share_bits - _MEAN
         product = register((difference * weight)[cut : cut + _MEAN + 1].as_signed(), "product")
@@ -168,13 +168,13 @@ class TextureFilterUnit(PipelinedUnit):
 
 
 def _value(code: Value) -> Value:
-    """Code of `TexelMemory.VALUE_FORMAT` of a channel."""
+    """Code of a channel in `TexelMemory.VALUE_FORMAT`."""
     number = code[:-1]
     shift = TexelMemory.COARSE_SHIFT
     return Mux(code[-1], Cat(Const((1 << shift) - 1, shift), number), number)[:_VALUE]
 
 
 def _color(mean: Value) -> FixedValue:
-    """Colour of a mean, in which 1 is the largest code."""
+    """Colour of a mean. In the mean the largest code stands for 1."""
     total = mean + mean[_VALUE:]
     return FixedValue(TextureFilter.COLOR_FORMAT, total[2 : 2 + TextureFilter.COLOR_FORMAT.width])

@@ -19,11 +19,11 @@ from blysk.hdl.core.stream import connect
 __all__ = ["TextureSamplerUnit"]
 
 _INSIDE = 4
-"""Samples whose weights wait while the memory inside reads; it takes three."""
+"""Depth of the FIFO of weights beside a memory inside. Three samples wait there at most."""
 
 
 class TextureSamplerUnit(wiring.Component):
-    """Colours of a texture at places of a surface, in their order.
+    """Colours of a texture at places of a surface, in the order of the places.
 
     `TextureSampler` is the bit-accurate model. The weights of a sample wait in a FIFO while its texels are
     read. So a memory outside may have any latency. The sampler keeps its rate if the latency is less than

@@ -31,8 +31,10 @@ SYMBOLS = {
 """Symbols of a beat's fields in formulas. Other fields appear by their names."""
 
 LONGEST = 14
-"""Formulas of at most this many characters are repeated in other formulas. For a longer formula the other
-formulas show the word's name."""
+"""Largest number of characters of a formula that other formulas repeat.
+
+For a longer formula they show the word's name.
+"""
 
 _SUM, _PRODUCT, _ATOM = range(3)
 

@@ -70,11 +70,12 @@ def emit(
     """Verilog-2001 text of a component, one module per submodule, without warnings.
 
     The top module is called ``name`` and every other module ``name_...``. So two cores can live in one
-    project. The top module has the ports ``clk`` and ``rst``, and one for every field of every member. ``i``
-    with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes ``i_valid``, ``i_ready``,
-    ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes. The port table at the top
-    of the text gives direction, width, signedness, number format and description of each port. A memory's
-    read register starts undefined in Verilog simulators, and at 0 in Amaranth's own simulator.
+    project. The ports of the top module are ``clk``, ``rst``, and one for every field of every member. For
+    example, the member ``i`` with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes
+    ``i_valid``, ``i_ready``, ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes.
+    The port table at the top of the text gives direction, width, signedness, number format and description
+    of each port. A memory's read register starts undefined in Verilog simulators, and at 0 in Amaranth's own
+    simulator.
 
     Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning.
     The text switches off Verilator's warnings about the style of generated netlists, by name and with the

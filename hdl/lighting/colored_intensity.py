@@ -30,23 +30,23 @@ _STAGES = 3
 
 
 def _limited(light: FixedValue, model: Intensity) -> FixedValue:
-    """Light on a surface, rounded, in the format of the factor of the albedo."""
+    """Bring rounded light on a surface into the format that the albedo multiplies."""
     if _SURFACE.holds(light.format):
         return light.extend(_SURFACE)
-    # Ambient light and one term are less than the limit.
+    # Ambient light and a single term stay below the limit of the format.
     only_one = model.lights == 1 and not model.tints
     return light.wrap(_SURFACE) if only_one else light.saturate(_SURFACE)
 
 
 class ColoredIntensityUnit(IntensityUnit):
-    """``I = a (k_a I_a + sum_i I_i k_d D_i) + E + sum_i I_i k_s S_i`` for each channel, a the albedo.
+    """``I = a (k_a I_a + sum_i I_i k_d D_i) + E + sum_i I_i k_s S_i`` for each channel; a is the albedo.
 
     Formats and error are those of the bit-accurate model `Intensity` with ``has_albedo``. With ``tints`` the
     constant ``tinted`` moves the specular sum into the brackets.
 
     The latency is ``9 + ceil(log2(lights + 1))`` cycles: terms, factors, products, adder tree, rounded light
     on the surface, operands, product, sum, rounding, saturation. Tints take 1 more. The initiation interval
-    is 1. There is a multiplier of 18 by 17 bits for each channel more than in an `IntensityUnit`.
+    is 1. Each channel has one multiplier of 18 by 17 bits more than in an `IntensityUnit`.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class ColoredIntensityUnit(IntensityUnit):
         return 7 + model.lights.bit_length() + model.tints
 
     def staged(self, m, operands):
-        """Registers of the terms, and of the albedo on the stage of its product's operands."""
+        """Registers of the terms, and the albedo, delayed to the operands of its product."""
         p, found = self.model, {}
         if p.lights:
             found = {kind: self.register(m, operands[kind], f"terms_{kind}") for kind in self.kinds}
@@ -121,17 +121,17 @@ class ColoredIntensityUnit(IntensityUnit):
 
 
 class _Issue(NamedTuple):
-    """What is issued to the multiplier on a cycle.
+    """A product that is issued to the multiplier on a cycle.
 
     Parameters
     ----------
     busy, first, ends_channel, colored : Signal
-        Whether there is a product; whether it is the first and the last of its channel in its pass; whether
-        the pass is that of the albedo.
+        Whether there is a product; whether it is the first product of its channel in the pass, and the last;
+        whether the pass is the second, that of the albedo.
     channel : Signal
-        Its channel.
+        Channel of the product.
     operands : pair of Value
-        Its operands, the term or albedo, and the colour or light.
+        Operands of the product: the term or albedo, and the colour or light.
     """
 
     busy: Signal
@@ -145,13 +145,13 @@ class _Issue(NamedTuple):
 class CompactColoredIntensityUnit(CompactIntensityUnit):
     """The sum of a `ColoredIntensityUnit` on one multiplier of 18 by 18 bits, without the terms that are 0.
 
-    A pixel has two passes through its channels. In the first the terms that the albedo multiplies are added
-    to the ambient light. In the second the albedo multiplies this sum, and the other terms are added. A pixel
-    without a term for the albedo has the second pass alone.
+    A pixel has two passes through its channels. In the first pass the terms that the albedo multiplies are
+    added to the ambient light. In the second pass the albedo multiplies this sum, and the other terms are
+    added. A pixel without a term for the albedo has the second pass alone.
 
-    A pixel takes ``c = 3 (1 + T)`` cycles, T the number of its terms that are not 0 (`Intensity.cycles`).
-    With one channel it takes ``1 + T``, and 2 more with a first pass. The pixel leaves after ``c + 5``
-    cycles, without cycles of stall.
+    A pixel takes ``c = 3 (1 + T)`` cycles, where T is the number of its terms that are not 0
+    (`Intensity.cycles`). With one channel it takes ``1 + T``, and 2 more with a first pass. The pixel leaves
+    after ``c + 5`` cycles, without cycles of stall.
 
     Parameters
     ----------
@@ -192,7 +192,8 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
             for of, name in ((_FACTOR, "term"), (_SURFACE, "color"))
         ]
         product = Signal(FixedShape(_FACTOR * _SURFACE), reset_less=True)
-        # Numbers under 2^11: ambient light and every term; E, a product under 2^13, and specular terms.
+        # The first pass adds ambient light and terms, all under 2^11. The second pass adds E, specular terms,
+        # and a product under 2^13, which counts as four numbers under 2^11.
         most = max(1 + self._terms, 5 + p.lights * p.has_specular)
         total = Signal(FixedShape(UQ(11 + (most - 1).bit_length(), 23)))
         of = multiplied.channel
@@ -232,7 +233,7 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
     def _park(self, m: Module, advance, added: data.View, total: FixedValue, channel, surface: Signal):
         """Keep the light on the surface of each channel until the albedo multiplies it.
 
-        The first channel's albedo may come on the cycle on which the last product is in the sum.
+        If the light of a channel is needed on the cycle on which it is parked, it is passed on directly.
         """
         now = _limited(total.round_half_up(_SURFACE.fraction_bits), self.model).as_value()
         of_light, parked = Signal(name="of_light"), []
@@ -248,8 +249,8 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
     def _issue(self, m: Module, advance, surface: Signal) -> _Issue:
         """Take pixels in, and give their products one by one to the multiplier.
 
-        The bits of the products of a channel are the albedo, the terms, and products of 0 that give the sum
-        of a single channel its time.
+        Each product of a channel has a bit: first the albedo, then the terms. With a single channel products
+        of 0 follow, which give its sum the time that it needs.
         """
         p, given = self.model, self.i.payload
         terms = [Value.cast(term) for kind in self.kinds for term in given[kind]]
@@ -262,7 +263,7 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
         chosen, rest, remain = (Signal(bits, name=name) for name in ("chosen", "rest", "remain"))
         busy, first, colored = Signal(name="busy"), Signal(name="first", init=1), Signal(name="colored")
         channel, accept = Signal(2, name="channel"), Signal(name="accept")
-        # Whether the pixel came without a first pass: its light is ambient.
+        # Whether the pixel has no first pass, so that its light is ambient.
         dark, is_dark = Signal(name="dark"), Signal(name="is_dark")
         ends_channel, ends_pass, ends_pixel = (
             Signal(name=name) for name in ("ends_channel", "ends_pass", "ends_pixel")
@@ -306,7 +307,7 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
             with m.If(ends_pixel):
                 m.d.sync += busy.eq(0)
         light = Mux(dark, of_channel(self.constants.ambient, channel), surface)
-        # An albedo has a fraction bit less than a term.
+        # An albedo has one fraction bit less than a term.
         words = Cat(0, of_channel((albedo * 3)[:3], channel)), *held
         colors = [light, *(of_channel(color, channel) for color in colors)]
         operands = selected(chosen, words), selected(chosen, colors)

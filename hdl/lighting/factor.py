@@ -1,4 +1,4 @@
-"""Factor unit: the terms of a light that fades, with the specular term times its factor."""
+"""Factor unit: the specular term of a light that fades, times the light's factor."""
 
 from typing import ClassVar
 
@@ -13,11 +13,11 @@ __all__ = ["FactorUnit"]
 
 
 class FactorUnit(PipelinedUnit):
-    """``a S`` of a specular term S and a factor a, beside the diffuse term. `Factor` is the model.
+    """``a S`` of a specular term S and a factor a. `Factor` is the bit-accurate model.
 
-    The latency is 2 cycles (operands, product), the initiation interval 1. There is one multiplier of 17 by
-    17 bits, with registers before and after. Without a factor the unit only delays the terms, and has no
-    multiplier.
+    The diffuse term passes beside the product. The latency is 2 cycles (operands, product), the initiation
+    interval 1. There is one multiplier of 17 by 17 bits, with registers before and after. Without a factor
+    the unit only delays the terms, and has no multiplier.
 
     Parameters
     ----------

@@ -17,9 +17,10 @@ __all__ = ["HighlightGateUnit"]
 
 
 class HighlightGateUnit(PipelinedUnit):
-    """Whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
+    """Decides whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
 
-    The bit-accurate model `HighlightGate` has the comparisons, formats and proof.
+    The bit-accurate model `HighlightGate` has the comparisons with their words (T, u, w, a, b, d), the
+    formats and the proof.
 
     There are fifteen multiplications: three for each of ``N_l . N_r``, ``N_l . H`` and ``N_r . H``, and six
     products for the comparisons: ``T u``, ``a b``, ``u w``, ``max(a, b)^2``, ``max(a, b) u`` and ``d^2``.
@@ -46,7 +47,8 @@ class HighlightGateUnit(PipelinedUnit):
     exponent : int or None
         Exponent, 1 to 1000, fixed at build time, without a PROM. ``None``: the exponent is a port.
     takes_threshold : bool
-        Whether T is a port in place of the exponent, without a PROM, as for the tables of a `Lobe`.
+        Whether the threshold T is a port in place of the exponent, as for the tables of a `Lobe`. There is
+        then no PROM.
 
     Raises
     ------
@@ -60,8 +62,8 @@ class HighlightGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light. Bit 0 is the first light.
     constants : :py:`In(StructLayout({"halfway": ArrayLayout(..., lights), "exponent": 10}))`
-        Unit vectors H, and as a port the exponent, 1 to 1000, or ``threshold``, T of F bits. All are constant
-        while beats are inside.
+        Unit vectors H; as a port also the exponent, 1 to 1000, or ``threshold``, T of F bits. All are
+        constant while beats are inside.
 
     Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.
     """
@@ -180,7 +182,7 @@ class HighlightGateUnit(PipelinedUnit):
             partial,
             multiply("a_b", a, b, since=partial),
         )
-        # A slack of 0 needs no flag, because the square below reaches 0 in any case.
+        # If w is 0, ``u w`` is 0 and the square reaches it. So the sign of w is enough.
         exceeded = g.register(f"exceeded_{index}", lambda w: w[-1], total)
         slack = g.register(f"slack_{index}", lambda w: w[f + 2 :][:f], total)
 

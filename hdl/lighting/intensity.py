@@ -68,7 +68,7 @@ class IntensityUnit(PipelinedUnit):
     saturation). The initiation interval is 1. Each multiplier has registers of its own for its operands and
     its product, as in `registered_product`. There are six multipliers of 17 by 17 bits for each light.
     Without specular terms there are three for each light, and the latency has ``lights`` in place of
-    ``2 lights``. With one channel there is a third of the multipliers.
+    ``2 lights``. One channel takes a third of the multipliers.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class IntensityUnit(PipelinedUnit):
         )
 
     def _latency_to_sum(self, model: Intensity) -> int:
-        """Registers to the sum of a channel."""
+        """Cycles from the input to the sum of a channel."""
         terms = len(self.kinds) * model.lights
         return 3 + terms.bit_length()
 
@@ -148,7 +148,10 @@ class IntensityUnit(PipelinedUnit):
         return found
 
     def sum_of(self, m, terms, constant, name: str, levels: int = 0) -> FixedValue:
-        """Sum of terms and a constant, or ``None``, by a tree of registers of at least as many levels."""
+        """Sum of terms and a constant in a tree of registers, at least ``levels`` high.
+
+        ``constant`` may be ``None``.
+        """
         # A constant needs no registers that delay it to the other terms.
         terms, level = [*terms, *([] if constant is None else [constant])], 0
         while len(terms) > 1 or level < levels:
@@ -166,10 +169,11 @@ class IntensityUnit(PipelinedUnit):
 class CompactIntensityUnit(wiring.Component):
     """The sum of an `IntensityUnit` on one multiplier of 17 by 17 bits, without the terms that are 0.
 
-    The results are those of `IntensityUnit`. A pixel takes ``c = 3 max(1, T)`` cycles, T the number of its
-    diffuse and specular terms that are not 0 (`Intensity.cycles`). With one light these are 3 cycles without
-    and 6 with a highlight, 3 in the dark. The next pixel is taken c cycles later. The pixel leaves after
-    ``c + 5`` cycles (input, operands, product, sum, rounding, saturation), without cycles of stall.
+    The results are those of `IntensityUnit`. A pixel takes ``c = 3 max(1, T)`` cycles, where T is the number
+    of its diffuse and specular terms that are not 0 (`Intensity.cycles`). With one light a pixel takes 6
+    cycles with a highlight, and 3 cycles without a highlight or in the dark. The next pixel is taken c cycles
+    later. The pixel leaves after ``c + 5`` cycles (input, operands, product, sum, rounding, saturation),
+    without cycles of stall.
 
     Parameters
     ----------
@@ -246,7 +250,7 @@ class CompactIntensityUnit(wiring.Component):
             with m.If(issued.live):
                 m.d.sync += product.eq(factors[0] * factors[1])
             with m.If(multiplied.live):
-                # At most 2 lights + 1 numbers under 2^11 each.
+                # The sum has at most 2 lights + 1 numbers, each under 2^11.
                 m.d.sync += total.eq((FixedValue(total.format, before) + product).wrap(total.format))
             with m.If(added.live & added.last):
                 m.d.sync += rounded.eq(Value.cast(total.round_half_up(fraction_bits)))
@@ -265,11 +269,11 @@ class CompactIntensityUnit(wiring.Component):
         busy : Signal
             Whether there is a product on this cycle.
         channel : Signal
-            Its channel.
+            Channel of the product.
         term : sequence of Value
-            Its operands, the term and its colour.
+            Operands of the product, the term and its colour.
         first, ends_channel : Signal
-            Whether it is the first and the last of its channel.
+            Whether the product is the first of its channel, and whether it is the last.
         """
         terms = [term for kind in self.kinds for term in self.i.payload[kind]]
         colors = [color for kind in self.kinds for color in self.constants[kind]]
@@ -281,8 +285,8 @@ class CompactIntensityUnit(wiring.Component):
         # The lowest term that is left is multiplied. A channel without terms takes a cycle, too.
         chosen, rest = Signal(len(terms), name="chosen"), Signal(len(terms), name="rest")
         ends_channel, ends_pixel = Signal(name="ends_channel"), Signal(name="ends_pixel")
-        # ``free``: not busy, or on a pixel's last cycle. ``ready``: the output moves, too. Both are known a
-        # cycle ahead.
+        # ``free``: the unit is not busy, or on a pixel's last cycle. ``ready``: it is free, and the output
+        # moves. Both are registers, computed a cycle ahead.
         free, ready = (Signal(name=name, init=1) for name in ("free", "ready"))
         following = Signal(name="following")
         m.d.sync += [free.eq(following), ready.eq(following & ~(self.o.valid & ~self.o.ready))]
@@ -324,6 +328,6 @@ def selected(one_hot: Value, words: Sequence[Value]) -> Value:
 
 
 def of_channel(color: data.View, channel: Value) -> Value:
-    """Red, green or blue."""
+    """Word of a channel of a colour: 0 is red, 1 is green, 2 is blue."""
     red, green, blue = (Value.cast(part) for part in color)
     return Mux(channel[1], blue, Mux(channel[0], green, red))

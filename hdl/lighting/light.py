@@ -41,8 +41,8 @@ class SpecularKind(NamedTuple):
         Function of the model and the fixed exponent (or ``None``). It gives the initiation interval at which
         one multiplier is enough.
     slope_unit : callable or None
-        Function of the model that makes the unit of the words that depend on the exponent alone. This unit
-        serves all lights. ``None``: no words depend on the exponent alone.
+        Function of the model. It makes a unit with the words that depend on the exponent alone, which serves
+        all lights. ``None``: no words depend on the exponent alone.
     memory : callable or None
         Function of the model and the number of lights that makes the memory of the lights' tables. ``None``:
         no tables.
@@ -62,7 +62,7 @@ def _specular_unit(model: Specular, **options) -> PipelinedUnit:
 
 
 def _power_unit(model: Power, *, initiation_interval: int, **_) -> PipelinedUnit:
-    """Power unit: the exponent needs no preparation; sequential from an interval of 42 on."""
+    """Power unit: sequential from an interval of 42 on, else pipelined. The exponent needs no slope."""
     return PowerUnit(model, form="sequential" if initiation_interval >= 42 else "pipelined")
 
 
@@ -135,7 +135,7 @@ class LightUnit(wiring.Component):
         Whether there is a highlight gate.
     factor : FactorUnit or None
         Unit that multiplies the specular term by the factor of a light that fades. A unit without a factor
-        only delays the terms by the same two cycles. ``None``: the light has neither.
+        only delays the terms by the same two cycles. ``None``: there is no such unit.
 
     Members
     -------
@@ -145,9 +145,9 @@ class LightUnit(wiring.Component):
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "specular"})))`
         Terms, ``UQ(0, 17)``.
     constants
-        Port of the specular unit: exponent, slope, bank, or none.
+        Port of the specular unit: exponent, slope or bank. Some specular units have no such port.
     table, write
-        Ports as of a `LobeUnit`.
+        Ports of a `LobeUnit`, if the model is a `Lobe`.
 
     Source: docs/theory/models.md#lighting; [T] figure 4.10; [B] 4.
     """
@@ -224,7 +224,7 @@ class LightUnit(wiring.Component):
         for name in self._forwarded:
             wiring.connect(m, wiring.flipped(getattr(self, name)), getattr(specular, name))
         if self.exponent is not None and self._has_constants:
-            # A specular unit that is not built for a fixed exponent.
+            # The light's exponent is fixed, but its specular unit has a port for the exponent.
             m.d.comb += specular.constants.exponent.eq(self.exponent)
         elif "constants" in self.signature.members:
             m.d.comb += copy(specular.constants, self.constants)
@@ -247,7 +247,7 @@ class LightUnit(wiring.Component):
         connect(m, factor.o, wiring.flipped(self.o))
         if self.fades:
             accepted, taken = self.i.valid & self.i.ready, factor.i.valid & factor.i.ready
-            # This is the largest number inside the units, including their outputs.
+            # Largest number of beats inside the units, including their outputs.
             most = self._depth + self._diffuse.latency + 1 if self.skips_dark else self._specular.latency + 1
             word = pass_beside(m, "factors", self.i.payload.factor, accepted, taken, most)
             m.d.comb += copy(factor.i.payload.factor, word)

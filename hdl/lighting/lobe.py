@@ -20,7 +20,7 @@ from blysk.hdl.lighting.specular import highlight_shape, one_minus
 __all__ = ["LobeMemory", "LobeUnit", "lobe_read_signature", "lobe_write_shape"]
 
 _FINE = 2
-"""Bits of the shift that are left to its second stage."""
+"""Low bits of the shift amount. The second stage shifts by them."""
 
 
 def lobe_write_shape() -> data.StructLayout:
@@ -45,9 +45,10 @@ def lobe_read_signature(model: Lobe) -> wiring.Signature:
 class LobeMemory(wiring.Component):
     """Tables of `Lobe` in one memory, with a read port for each served unit.
 
-    There are ``banks (E + 1) M`` words of 35 bits, up to 512 in a block RAM of 512 by 36. If two units, of
-    two lights, read the same written tables, Yosys makes a copy for each port. Tables that are fixed at build
-    time need no copy: up to 1024 words take two block RAMs of 1024 by 18 for both ports.
+    With E octaves of M steps there are ``banks (E + 1) M`` words of 35 bits, up to 512 in a block RAM of 512
+    by 36. If two units, of two lights, read the same written tables, Yosys makes a copy for each port. Tables
+    that are fixed at build time need no copy: up to 1024 words take two block RAMs of 1024 by 18 for both
+    ports.
 
     A write is taken on every cycle. The first write of a table, with ``begins``, tells its bank. The values
     follow in order. Each value but the first makes the word of the value before it. This word is in the
@@ -141,11 +142,11 @@ class LobeUnit(PipelinedUnit):
     `Lobe`, the bit-accurate model, has table, formats and error bounds.
 
     With an initiation interval of 1 the latency is 10 cycles: one minus, saturation, leading one, two for the
-    shift, two for the word, operands, product, sum. With the operand ``place`` it is 8: choice, three for the
-    word, operands, and so on. A longer interval takes 2 cycles more, for a register at the input and for the
-    multiplexers before the multiplier. At every interval there is one multiplier of 18 by 18 bits. A beat
-    that is dark, or whose N·H is not positive, works as if its argument were 0. From one of these beats to
-    the next only the input and the first registers toggle.
+    shift, two for the word, operands, product, sum. With the operand ``place`` it is 8 cycles: two for the
+    choice, three for the word, operands, product, sum. A longer interval takes 2 cycles more, for a register
+    at the input and for the multiplexers before the multiplier. At every interval there is one multiplier of
+    18 by 18 bits. A beat that is dark, or whose N·H is not positive, works as if its argument were 0. From
+    one of these beats to the next only the input and the first registers toggle.
 
     Parameters
     ----------
@@ -175,8 +176,12 @@ class LobeUnit(PipelinedUnit):
     Raises
     ------
     ValueError
-        If the interval is out of range, or tables are given for a memory outside. If there are not as many
-        tables as banks, or a table has another size.
+        In one of these cases:
+
+        - the interval is out of range;
+        - tables are given for a memory outside;
+        - there are not as many tables as banks;
+        - a table has another size.
 
     Source: docs/theory/units.md#lobe.
     """
@@ -302,7 +307,7 @@ class LobeUnit(PipelinedUnit):
         return Cat(self._read.word, register(register(fraction, "fraction_read"), "fraction"))
 
     def _interpolate(self, word: Word, lit: Word) -> Word:
-        """Term of a word and its fraction: ``v + D f``."""
+        """Term ``v + D f`` of a word with value v and difference D, at the fraction f."""
         p, g = self.model, self._graph
         formats = {"value": p.VALUE_FORMAT, "difference": p.DIFFERENCE_FORMAT, "fraction": p.fraction_format}
         parts, first = [], 0

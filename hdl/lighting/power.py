@@ -104,7 +104,7 @@ class PowerUnit(PipelinedUnit):
         for bit in range(p.EXPONENT_BITS):
             is_set = self.constants.exponent[bit]
             if s is None:
-                # The first product is with 1.
+                # s is 0 before the first bit, so the first step needs no product.
                 kept = register(m, x, "s_kept_0")
                 kept = register(m, kept, "s_late_0")
                 next_s = register(m, FixedValue(format, Mux(is_set, Value.cast(kept), 0)[:34]), "s_1")
@@ -119,7 +119,7 @@ class PowerUnit(PipelinedUnit):
         return s
 
     _SUM = UQ(1, 34)
-    """Format of ``p + q - p q``. This is at least 0, and can be slightly above 1, as factors are cut."""
+    """Format of ``p + q - p q``: at least 0, and at most slightly above 1, because factors are cut."""
 
     def _products(self, m, p, q, name):
         """``p + q - p q`` two cycles later, registered, and ``p`` at the same stage."""

@@ -39,14 +39,14 @@ def slope_shape() -> data.StructLayout:
 
 
 def one_minus(model: HighlightOperand, operand: FixedValue) -> FixedValue:
-    """One minus the cosine, exact, of either kind of operand."""
+    """Exact ``1 - cos gamma`` of an operand of either kind."""
     if model.operand == "cosine":
         return FixedValue.constant(ONE_SQUARED.format, ONE_SQUARED.values.item()) - operand
     return operand
 
 
 class SlopeUnit(wiring.Component):
-    """Slope ``k = K 2^s`` and boundary of the cutoff, words of a `SpecularUnit` that the exponent determines.
+    """Slope ``k = K 2^s`` and boundary of the cutoff: words of a `SpecularUnit` for an exponent.
 
     The bit-accurate models are `Specular.scale` and `Specular.boundaries`. ``slope`` follows the exponent
     after two cycles, the boundary after three.
@@ -125,8 +125,9 @@ class SpecularUnit(PipelinedUnit):
     saturation, product, base, square). Each of M products has a multiplier of 17 by 17 bits. Multipliers of
     the chords have 17 by 11 and 14 by 11 bits for ``coscos``, and 13 by 11 for ``exp``. With a longer
     interval the products share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles
-    more, for its operands and the registers around the multiplier (`registered_product`), and the cycles
-    until its slot.
+    interval the products share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles
+    more, for its operands and the registers around the multiplier (`registered_product`). It also waits
+    for its slot.
 
     ============= = ===== == == == == =====================================================
     model         M I = 1 2  3  4  6  beside slope and square
@@ -152,7 +153,7 @@ class SpecularUnit(PipelinedUnit):
         Exponent, 1 to 1000, fixed at build time. There is then no PROM, the shift is constant, and the
         slope's multiplier multiplies by a constant, so M is one less. ``None``: the exponent is a port.
     shares_slope : bool
-        Whether slope and boundary come from a `SlopeUnit` outside. Else, if ``exponent`` is ``None``, the
+        Whether slope and boundary come from a `SlopeUnit` outside. If not, and ``exponent`` is ``None``, the
         unit has a `SlopeUnit` of its own.
 
     Members
@@ -164,8 +165,8 @@ class SpecularUnit(PipelinedUnit):
         Specular term.
     constants : :py:`In(StructLayout({"exponent": 10}))` or :py:`In(slope_shape())`
         Exponent, 1 to 1000, or the output of a `SlopeUnit`. The exponent is constant while beats are inside,
-        the slope from two cycles after the first beat on, the boundary from three. With a fixed exponent
-        there is no port.
+        the slope from two cycles after the first beat on, the boundary from three cycles. With a fixed
+        exponent there is no port.
 
     Raises
     ------
@@ -218,7 +219,7 @@ class SpecularUnit(PipelinedUnit):
         return self._graph.build(m, self, operands)(self._result, self.latency)
 
     def _frame_values(self, m: Module) -> tuple[FixedValue, Value, FixedValue]:
-        """K, s + 1 and the boundary: constants, from outside, or two cycles after the exponent."""
+        """K, s + 1 and the boundary. They are constants, or words of a `SlopeUnit` outside or inside."""
         p = self.model
         if self.exponent is not None:
             (scale, shift), boundary = p.scale(self.exponent), p.boundaries[self.exponent]
@@ -398,5 +399,5 @@ class SpecularUnit(PipelinedUnit):
 
 
 def _cut(value: FixedValue) -> FixedValue:
-    """Cut to 17 fraction bits, as a base and the result have."""
+    """Cut to the 17 fraction bits of a base and of the result."""
     return value.truncate(17)

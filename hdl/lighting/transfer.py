@@ -53,7 +53,7 @@ class TransferUnit(PipelinedUnit):
         self.model = model or Transfer()
         self.channels = channels
         self._graph = g = Dataflow(initiation_interval, spaced=True)
-        # A shared table has the light as operand, so that there is one set of multiplexers before it.
+        # A shared table takes the light itself, so `_placed` exists once, behind the multiplexers.
         shares, bits = initiation_interval > 1, Transfer.OPERAND_FORMAT.width
         shape = unsigned(bits) if shares else unsigned(len(_placed(Const(0, bits))))
         table = g.share("transfer", (shape,), 3 + shares, self._look_up)
@@ -85,7 +85,7 @@ class TransferUnit(PipelinedUnit):
         return result
 
     def _look_up(self, register: Callable[[Any, str], Any], operand: Value) -> Value:
-        """Code of a channel: the word of the part, and the sum of the word and the place."""
+        """Code of a channel: the sum of the part's word and the place in the part."""
         placed = register(_placed(operand), "placed") if self.initiation_interval > 1 else operand
         fraction_bits = Transfer.WORD_FORMAT.fraction_bits
         port = self._table.read_port()
@@ -96,9 +96,9 @@ class TransferUnit(PipelinedUnit):
 
 
 def _placed(light: Value) -> Value:
-    """Place in its part of a channel's light, and above it the address of the part."""
+    """Place of a channel's light within its part. Above these bits is the address of the part."""
     parts, fraction_bits = Transfer.PART_BITS, Transfer.WORD_FORMAT.fraction_bits
-    # Seven minus the leading zeros: 0 where each input is a part of its own.
+    # Seven minus the leading zeros. In octave 0 each input is a part of its own.
     octave = ~leading_zeros(light[parts:])
     shifts = [max(k - 1, 0) for k in range(len(light) - parts + 1)]
     part = select([light[shift : shift + parts] for shift in shifts], octave)

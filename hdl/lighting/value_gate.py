@@ -1,4 +1,4 @@
-"""Value gate unit, which stops spans of ``chord-local`` without a visible highlight, by three values of u."""
+"""Value gate unit: three values of u decide whether a span of ``chord-local`` has a visible highlight."""
 
 from amaranth.hdl import Cat, Const, Mux, Signal, unsigned
 from amaranth.lib import data
@@ -14,7 +14,7 @@ __all__ = ["ValueGateUnit"]
 
 
 class ValueGateUnit(PipelinedUnit):
-    """Whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
+    """Decides whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
 
     `ValueGate` is the bit-accurate model. The latency is 3 cycles, the initiation interval 1. There is no
     multiplier. The PROM, which all lights share, holds 1024 words of 18 bits.
@@ -28,8 +28,8 @@ class ValueGateUnit(PipelinedUnit):
     exponent : int or None
         The exponent, 1 to 1000, fixed at build time, without a PROM. ``None``: the exponent is a port.
     takes_threshold : bool
-        Whether the threshold is a port in place of the exponent, without a PROM, as for the tables of a
-        `Lobe`.
+        Whether the threshold is a port in place of the exponent, as for the tables of a `Lobe`. There is then
+        no PROM.
 
     Members
     -------

@@ -20,7 +20,7 @@ class AngularInterpolatorUnit(InterpolatorUnit, model=AngularInterpolator):
 
     `AngularInterpolator` is the bit-accurate model. All series are equal and have the same input and the same
     ready of the output. So they are in the same state on every cycle, and the handshake of one series stands
-    for all. There are two multipliers a vector, and the multipliers of the angular setup.
+    for all. There are two multipliers for each vector, and the multipliers of the angular setup.
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpola
         return np.maximum(counting[levels], np.r_[0, segments[:-1]])
 
     def source(self, m):
-        """The normaliser's normals, and its flag, on the last pixel of a span."""
+        """The normaliser's normals. Its flag comes on the last pixel of a span."""
         m.submodules.adaptive_normaliser = normaliser = self._normaliser
         m.d.comb += [
             *(normaliser.i.payload[name].eq(word) for name, word in span_words(self.i.payload)),

@@ -1,4 +1,4 @@
-"""Spans of ``chord-local``: differences of three values a span, and accumulators of a pixel's values."""
+"""Spans of ``chord-local``: differences from three values of a span, and accumulators for its pixels."""
 
 from collections.abc import Sequence
 
@@ -30,9 +30,9 @@ _LONG = 3
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
-    """Accumulators of ``N . L`` and u of each light, and of factors, a quadratic each, see `AccumulatorUnit`.
+    """Accumulators of ``N . L`` and u of each light, and of factors: a quadratic each, see `AccumulatorUnit`.
 
-    The words of a span come a cycle after it was accepted.
+    The words of a span come a cycle after the span was accepted.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     lights : int
         Number of lights, at least 1.
     highlights : bool
-        Whether there is u.
+        Whether there is specular light, and so u.
     gated : bool
         Whether a span brings ``lit``, a gate's decision for each light.
     factors : sequence of int
@@ -55,7 +55,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         First values of the span that is taken in, and its differences. With factors also ``factor_start`` and
         ``factors``.
     taken : :py:`Out(1)`
-        High for one cycle while the words of the span accepted before are taken in.
+        High on the cycle on which the words of the accepted span are taken in.
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights, ...)))`
         Operands of the pixels.
 
@@ -94,7 +94,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     @classmethod
     def begin(cls, model, start):
-        """The start. If adding half a step of the result takes an adder, `rounded` adds it."""
+        """The start plus half a step of the result. If this takes an adder, `rounded` adds the half step."""
         return start.extend(model.format) if cls._adds_late(model) else super().begin(model, start)
 
     @classmethod
@@ -140,7 +140,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
 
 class ChordSpansUnit(wiring.Component):
-    """From values of spans to the operands of their pixels, by chord setup and accumulators.
+    """Turns values of spans into operands of pixels, by chord setup and accumulators.
 
     A span of three pixels or more goes through the setup. Its start goes through a memory beside the setup. A
     span of one pixel goes through the memory alone. So short spans take a cycle each, and wait only for the
@@ -156,7 +156,7 @@ class ChordSpansUnit(wiring.Component):
     initiation_interval : int
         Least cycles from a span of three pixels or more to the next.
     highlights : bool
-        Whether there is u.
+        Whether there is specular light, and so u.
     length_bits : int
         Bits of the length.
     gate : ValueGateUnit or None
@@ -167,7 +167,7 @@ class ChordSpansUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(span_operands_shape(lights, highlights, length_bits, len(factors))))`
-        Spans of one pixel, whose first value counts, or of three and more.
+        Spans of one pixel, of which only the first values count, or of three pixels or more.
     long : :py:`In(1)`
         Whether the offered span has more than one pixel. Its source knows this without the length.
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights)))`
@@ -221,19 +221,19 @@ class ChordSpansUnit(wiring.Component):
 
     @property
     def starts_inside(self) -> int:
-        """Depth of the memory of starts, with room for the spans that may follow a span during its setup.
+        """Depth of the memory of starts, a power of two.
 
-        It also has room for the spans before this span. The span's values may take an interval, in which no
-        span comes.
+        While a span is in the setup, spans of one pixel may follow on each cycle. There is also room for an
+        interval of the setup, the latency of the FIFO, and `_LATE` spans.
         """
         needed = self._setup.latency + self._setup.initiation_interval + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
 
     @property
     def differences_inside(self) -> int:
-        """Depth of the memory of differences.
+        """Depth of the memory of differences, a power of two.
 
-        It also has room for the spans inside the setup, which take three cycles each.
+        There is room for the spans inside the setup, of three pixels or more, and for spans behind it.
         """
         needed = -(-self._setup.latency // _LONG) + FIFO_LATENCY + self._LATE
         return 1 << (needed - 1).bit_length()
@@ -294,7 +294,7 @@ class ChordSpansUnit(wiring.Component):
         waits, room = Signal(name="waits"), Signal(name="room", init=1)
         m.d.sync += [
             behind.eq(behind + setup.o.valid - went[1]),
-            # ``behind`` also counts a span that left, so that the new sum is not needed.
+            # ``behind`` still counts a span that left a cycle before. So ``waits`` does not need the new sum.
             waits.eq(setup.o.valid | behind[1:].any() | (behind[0] & ~went[1])),
             room.eq(Cat(is_room).all()),
         ]
@@ -318,7 +318,7 @@ class ChordSpansUnit(wiring.Component):
         with m.If(accumulator.i.valid & accumulator.i.ready):
             m.d.sync += takes_long.eq(lengths.r_data[-1])
         taken = accumulator.taken
-        # This is a cycle late, because the handshake is known late.
+        # Starts and lengths are written a cycle late, because the handshake comes late in a cycle.
         kept, entered = Signal.like(start, name="kept", reset_less=True), Signal(name="entered")
         length = Signal(len(lengths.w_data), name="length", reset_less=True)
         m.d.sync += [

@@ -95,7 +95,7 @@ class InterpolatorUnit(wiring.Component):
         Gate from `gate_inside`, which decides whether a span has no highlight. The operands then have
         ``gated``.
     takes_threshold : bool
-        Whether a threshold tells the end of highlights, in place of the exponent, see
+        Whether a threshold, in place of the exponent, tells where highlights end, see
         `ShadingPipeline.threshold_of`.
     factors : sequence of int
         Indices of the lights that fade, for methods that serve them, see `ShadingPipeline`.
@@ -123,7 +123,7 @@ class InterpolatorUnit(wiring.Component):
     cycles_per_pixel = 1
 
     room_after = 2
-    """Cycles from a span's first pixel until there is room for the prepared span after the next span."""
+    """Cycles from a span's first pixel until there is room for the prepared second span after it."""
 
     DEFAULT_INTERVAL = 4
     """Largest default of `setup_interval`."""
@@ -168,12 +168,12 @@ class InterpolatorUnit(wiring.Component):
         return self.setup_interval
 
     def span_intervals(self, spans: Spans) -> np.ndarray:
-        """Least cycles from the previous span to each of some spans, without stalls; int, shape (spans,)."""
+        """Least cycles from the previous span to each span, without stalls; int array, shape (spans,)."""
         return np.full(len(spans), self.setup_interval)
 
     @property
     def has_begun(self) -> Value | None:
-        """Whether words of the offered span were taken already. Payload and constants then have to stay.
+        """Whether some words of the offered span were taken already. Payload and constants then have to stay.
 
         ``None`` if a unit takes all words of a span at once.
         """
@@ -265,11 +265,11 @@ class InterpolatorUnit(wiring.Component):
 
 
 class NormalInterpolatorUnit(InterpolatorUnit):
-    """A method that finds normals, and their products with L and H of every light.
+    """A method that finds a normal for each pixel, and its products with L and H of every light.
 
-    A subclass describes the part from spans to normals in `source`, and sets `latency` with `product_latency`
-    added. The products have ``ceil(6 lights / product_interval)`` multipliers, half as many without
-    highlights.
+    A subclass describes the part from spans to normals in `source`, and sets `latency`, which includes
+    `product_latency`. The products have ``ceil(6 lights / product_interval)`` multipliers, half as many
+    without highlights.
     """
 
     def __init__(self, model: NormalInterpolator, lights: int, **options):

@@ -38,8 +38,8 @@ def operands_shape(
     gated : bool
         Whether a gate's decision against a highlight comes with the operands.
     factored : bool
-        Whether factors of the lights that fade come with the operands. The factor of another light is 0, and
-        unused.
+        Whether factors of the lights that fade come with the operands. Other lights have the factor 0, which
+        has no use.
     """
     operands = {"cosine": FixedShape(model.COSINE_FORMAT)}
     if highlights:
@@ -55,13 +55,14 @@ class LightProductsUnit(PipelinedUnit):
     """``N . L``, and ``N . H`` or half the squared chord, of a normal with L and H of every light.
 
     `NormalInterpolator.products` is the bit-accurate model. With an initiation interval of 1 the latency is 5
-    cycles (operands, two for the products, two sums), with the chord 8. Six products a light, three without
-    highlights, share ``ceil(6 lights / initiation_interval)`` multipliers of 18 by 18 bits.
+    cycles (operands, two for the products, two sums). With the chord it is 8 cycles. There are six products
+    for each light, or three without highlights. They share ``ceil(6 lights / initiation_interval)``
+    multipliers of 18 by 18 bits, or ``ceil(3 lights / initiation_interval)`` without highlights.
 
     Parameters
     ----------
     model : NormalInterpolator
-        Operand of the specular unit.
+        Bit-accurate model, with the operand of the specular unit.
     lights : int
         Number of lights, at least 1.
     highlights : bool

@@ -47,7 +47,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
         self.latency = sum(unit.latency for unit in units) + SLICE_LATENCY + self.product_latency
 
     def source(self, m):
-        """Difference, its share a pixel, the sums."""
+        """Difference, its share for each pixel, and the sums."""
         m.submodules.difference_setup = setup = self._setup
         m.submodules.difference_accumulator = accumulator = self._accumulator
         span, operands = self.i.payload, setup.i.payload

@@ -1,4 +1,4 @@
-"""The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
+"""The chord method for point lights and a near viewer, from three values of N·L and of the chord."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ __all__ = ["LocalChordInterpolatorUnit"]
 
 
 class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator):
-    """From spans with values to the operands of their pixels, by chord setup and accumulators.
+    """Turns spans with values into the operands of their pixels, by chord setup and accumulators.
 
     `LocalChordInterpolator` is the bit-accurate model. Pixels need no multiplier. The attribute
     ``multipliers`` is the number of the setup's multipliers. A span of two pixels takes two cycles, as two
@@ -58,12 +58,12 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @classmethod
     def setup_intervals(cls, model):
-        """Initiation intervals of the chord setup that save multipliers of one light."""
+        """Initiation intervals of the chord setup that save multipliers with one light."""
         return (1, 2, 3, 6)
 
     @classmethod
     def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, factors=0):
-        """Three values of each operand of each light, of the factors of lights that fade, and the length."""
+        """Three values of each light's operands, three of each factor, and the length."""
         return span_operands_shape(lights, highlights, length_bits, factors)
 
     def __init__(self, model: LocalChordInterpolator, lights: int, **options):
@@ -118,7 +118,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @classmethod
     def gate_inside(cls, design):
-        """The gate by values, which reads the values of the spans here."""
+        """The value gate, which reads the values of the spans here."""
         return ValueGateUnit(
             design.highlight_gate,
             design.lights,
@@ -137,7 +137,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @property
     def light_vectors(self):
-        """None."""
+        """Empty, because the method does not read L and H."""
         return ()
 
     @property

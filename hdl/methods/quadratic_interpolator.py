@@ -62,7 +62,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
             after = self._setup.latency + SLICE_LATENCY + self._accumulator.latency
         else:
             self._evaluator = QuadraticEvaluatorUnit(QuadraticEvaluator(model.form))
-            # With two cycles a pixel an interval of 7 ends between two pixels.
+            # If a pixel takes two cycles, an interval of 7 would end inside a pixel.
             self.setup_interval = 7 if model.form == "direct" else 8
             self.cycles_per_pixel = max(self.cycles_per_pixel, self._evaluator.cycles_per_pixel)
             after = self._evaluator.latency
@@ -72,8 +72,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
         """Coefficients, and the normals of the form."""
         m.submodules.middle_normal = middle = self._middle
         m.submodules.gpq = gpq = self._gpq
-        # The FIFO is never full. Both units hold as many spans, and each unit has one more span at its
-        # output.
+        # The FIFO is never full. Its depth is the most spans inside both units, with one more at each output.
         depth = -(-middle.latency // middle.initiation_interval) + gpq.latency + 2
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=depth)
         length = stream.Signature(self.length_bits).create(path=("length",))
@@ -81,7 +80,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
         differences = self.model.form == "differences"
         curve = self._setup if differences else self._evaluator
         span = self.i.payload
-        # The length is written a cycle late, because the handshake is known late.
+        # The length is written a cycle late, because the handshake comes late in a cycle.
         m.d.sync += [lengths.w_en.eq(self.i.valid & self.i.ready), lengths.w_data.eq(span.length)]
         m.d.comb += [
             self.i.ready.eq(middle.i.ready),

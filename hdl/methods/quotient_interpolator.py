@@ -18,7 +18,7 @@ __all__ = ["QuotientInterpolatorUnit"]
 
 
 class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
-    """From spans of vectors to N·L and places in lobes' tables. `QuotientInterpolator` is the model.
+    """From spans of vectors to N·L and places in lobes' tables. Bit-accurate model: `QuotientInterpolator`.
 
     `QuotientSpansUnit` gives the words of the pixels, and `QuotientUnit` their quotients. A span of one pixel
     takes one cycle. A longer span takes at least three cycles. A span is flagged at its first pixel out of
@@ -27,7 +27,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     Parameters
     ----------
     model : QuotientInterpolator
-        Kind of the highlight.
+        Bit-accurate model, with the kind of highlight.
     lights : int
         Number of lights, at least 1.
     options
@@ -48,7 +48,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
 
     @classmethod
     def span_options(cls, model):
-        """Whether y is multiplied by cos a."""
+        """Whether highlights are those of R·V, for which the span's y is multiplied by cos a."""
         return {"mirror": model.mirror}
 
     room_after = 0
@@ -64,11 +64,11 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
 
     @property
     def has_begun(self):
-        """``begun``."""
+        """The port ``begun``."""
         return self.begun
 
     def further_members(self):
-        """``begun``, for the pipeline."""
+        """The port ``begun``, for the pipeline."""
         return {"begun": Out(1)}
 
     def __init__(self, model: QuotientInterpolator, lights: int, **options):

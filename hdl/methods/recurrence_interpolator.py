@@ -19,8 +19,8 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator)
 
     `RecurrenceInterpolator` is the bit-accurate model. All recurrence units are equal and have the same input
     and the same ready of the output. So they are in the same state on every cycle. There are two multipliers
-    a light, and ``ceil((14 + 32 lights) / setup_interval)`` in the setup. Without highlights the units are
-    the same, and the results of H stay open.
+    for each light, and ``ceil((14 + 32 lights) / setup_interval)`` in the setup. Without highlights the units
+    are the same, and the results of H are not used.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator)
 
     @classmethod
     def setup_intervals(cls, model):
-        """Initiation intervals of the recurrence setup that save multipliers of one light."""
+        """Initiation intervals of the recurrence setup that save multipliers with one light."""
         return range(1, 47)
 
     def __init__(self, model: RecurrenceInterpolator, lights: int, **options):
@@ -47,7 +47,7 @@ class RecurrenceInterpolatorUnit(InterpolatorUnit, model=RecurrenceInterpolator)
         self.latency = self._setup.latency + SLICE_LATENCY + unit.latency
 
     def elaborate(self, platform):
-        """A register slice between the two holds spans, so that short spans after a long one are ready."""
+        """Setup, slice and recurrence units. The slice holds a prepared span, which waits for its turn."""
         m = Module()
         m.submodules.recurrence_setup = setup = self._setup
         m.d.comb += [

@@ -38,7 +38,7 @@ class LineAccumulatorUnit(AccumulatorUnit):
         )
 
     def carried(self, values):
-        """The bit."""
+        """The bit that changes from span to span."""
         yield self.span.span, values.span
 
     def quadratics(self, values):
