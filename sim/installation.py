@@ -1,4 +1,4 @@
-"""The command that installs a missing package, for the running Python and the place of this package."""
+"""Commands that install a missing package for the running Python."""
 
 import importlib.metadata
 import json

@@ -1,4 +1,4 @@
-"""Output files that are whole or not there at all."""
+"""Output files, written whole or not at all."""
 
 import errno
 import json
@@ -59,8 +59,9 @@ def check_writable(path: str | os.PathLike) -> None:
     Raises
     ------
     InputError
-        If the parent is missing, is no folder or may not be written. If the path is a folder, or a file that
-        may not be written, or a file that the run reads (see `RunFiles`).
+        - The parent is missing, is no folder, or may not be written.
+        - The path is a folder, or a file that may not be written.
+        - The path is a file that the run reads (see `RunFiles`).
     """
     writes(path)
     path = Path(path)
@@ -160,7 +161,7 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
     kept = False
     temporary = target.with_name(f".{target.stem[:100]}-{secrets.token_hex(8)}{target.suffix}")
     try:
-        # The mode is cut by the umask, as that of any new file.
+        # The umask limits the mode, as for any new file.
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         if target.exists():
             temporary.chmod(target.stat().st_mode & 0o777)
@@ -172,7 +173,7 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
             pending.append((path, temporary, target))
             kept = True
     except OSError as error:
-        # Errors of the block about another file are its own.
+        # Errors of the block about other files pass unchanged.
         if error.filename is not None and Path(error.filename) not in (temporary, target):
             raise
         raise _unwritable(path, error) from error
@@ -221,7 +222,7 @@ def write_text(path: str | os.PathLike, text: str) -> None:
 
 
 def write_json(path: str | os.PathLike, value: Any) -> None:
-    """Write a value as JSON, indented by two, keys in their own order, whole or not at all.
+    """Write a value as JSON, whole or not at all. Lines are indented by two, and keys keep their order.
 
     JSON has no NaN and no infinity, so both are written as ``null``. NumPy scalars and arrays are written as
     numbers and lists.

@@ -1,4 +1,4 @@
-"""Files of a run. No output replaces a file that the run reads, or a file beside it of another program."""
+"""Files of a run. No output replaces a file that the run reads, or a file that another program wrote."""
 
 import os
 from collections.abc import Iterable, Iterator
@@ -32,7 +32,7 @@ class RunFiles:
         self._written: list[_Path] = []
 
     def reads(self, path: _Path) -> None:
-        """Record a file that is read, or that a read file names. `OutputIsInput` if the file is an output."""
+        """Record a file that the run reads, or may read. `OutputIsInput` if the file is an output."""
         keys = _keys(path)
         self._read |= keys
         for output in self._written:
@@ -40,7 +40,7 @@ class RunFiles:
                 raise OutputIsInput(output)
 
     def writes(self, path: _Path) -> None:
-        """Record an output. `OutputIsInput` if the file is read."""
+        """Record an output. `OutputIsInput` if the run reads the file."""
         if _keys(path) & self._read:
             raise OutputIsInput(path)
         self._written.append(path)
@@ -72,7 +72,7 @@ def _keys(path: _Path) -> set[object]:
     except (OSError, ValueError):
         return keys
     if not os.path.isfile(real):
-        # A pipe or a terminal is read and written.
+        # The run may read and write the same pipe or terminal.
         return set()
     return keys | ({(found.st_dev, found.st_ino)} if found.st_ino else set())
 

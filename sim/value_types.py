@@ -52,7 +52,7 @@ class Value(click.ParamType):
         return self.in_python
 
     def read(self, value: Any) -> Any:
-        """The value of a text of the command line, or of a value of a scene file or of Python.
+        """The checked value, from a text of the command line or from a value of a scene file or of Python.
 
         Raises
         ------
@@ -62,7 +62,7 @@ class Value(click.ParamType):
         return self.check(self.parse(value) if isinstance(value, str) else value)
 
     def parse(self, text: str) -> Any:
-        """Value of a text of the command line, not yet checked. `ValueError` if the text has another form."""
+        """The value that a text stands for, not yet checked. `ValueError` if the text has another form."""
         return text
 
     def check(self, value: Any) -> Any:
@@ -74,7 +74,7 @@ class Value(click.ParamType):
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Checked value of a text. `InputError` with the option and the text if it is not accepted."""
+        """Checked value of a text. `InputError` with option and text if the value is not accepted."""
         try:
             return self.read(value)
         except ValueError as error:
@@ -120,7 +120,7 @@ def shown_key(name: str) -> str:
 
 
 def _finite(value: Any, least: float = -math.inf, most: float = math.inf) -> float:
-    """A number in a range, ends included, up to 1e300, so that squares of thousandths are finite."""
+    """A number in a range, ends included. Its size is at most 1e300, which leaves room for products."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError("not a number")
     # Comparison comes before the conversion, which a huge whole number would overflow.
@@ -130,7 +130,7 @@ def _finite(value: Any, least: float = -math.inf, most: float = math.inf) -> flo
 
 
 def _floats(text: str, reason: str) -> list[float]:
-    """Numbers of a text, separated by commas."""
+    """Numbers that a text holds, separated by commas."""
     try:
         return numbers_of_text(text)
     except ValueError:
@@ -147,7 +147,10 @@ class Whole(Value):
         self.remedy = f"give a whole number from {least} to {most}"
 
     def parse(self, text: str) -> Any:
-        """Number of a text of up to 18 digits, with or without a sign. Other texts stay unchanged."""
+        """The number that a text of up to 18 digits stands for. The text may have a sign.
+
+        Other texts stay unchanged.
+        """
         return int(text) if re.fullmatch(r"[+-]?[0-9]{1,18}", text) else text
 
     def check(self, value: Any) -> Any:
@@ -188,7 +191,7 @@ class Number(Value):
         self.remedy = f"give {least:g} to {most:g}{unit and f' {unit}'}"
 
     def parse(self, text: str) -> Any:
-        """Number of a text, by the rules of Python's `float`."""
+        """The number that a text stands for, by the rules of Python's `float`."""
         return _floats(text, "not a number")[0] if "," not in text else text
 
     def check(self, value: Any) -> Any:
@@ -207,7 +210,7 @@ class Vector(Value):
 
     @property
     def in_python(self) -> str:
-        """Numbers, or the text."""
+        """`remedy` for Python, which also takes a tuple of numbers."""
         return self.remedy.replace(f"give {self.name}", f'give {self.kind} or "{self.name}"', 1)
 
     def parse(self, text: str) -> Any:
@@ -239,7 +242,7 @@ class Color(Value):
 
     @property
     def in_python(self) -> str:
-        """A text in quotes, or numbers."""
+        """`remedy` for Python, with the text in quotes."""
         return self.remedy.replace("#rrggbb", '"#rrggbb"')
 
     def parse(self, text: str) -> Any:

@@ -31,7 +31,7 @@ _ACCESS = {"clear": "a 1 clears its bit"}
 
 
 def documents_of(unit: BusUnit, name: str) -> dict[str, str]:
-    """Texts of the documents by suffix, ``.md``, ``.h`` and ``.svd``, all made of one table of registers.
+    """Texts of the documents by suffix: ``.md``, ``.h`` and ``.svd``. All list the same registers.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def frame_text(core: ShadingPipelineUnit | RendererUnit | GeometryUnit) -> str:
 
 
 def _values(unit: BusUnit, field: Field) -> str:
-    """Number format of a field, and the meaning of its vector."""
+    """Number format of a field. For a vector N/W also the frame of its axes."""
     frame = frame_text(unit.framing.core)
     return f"{field.values}; N/W {frame}" if field.name in _IN_FRAME and frame else field.values
 

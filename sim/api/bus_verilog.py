@@ -61,11 +61,11 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
     of_core : sequence of str
         Lines that describe the core.
     constants : sequence of str
-        Lines of the frame constants, with the addresses of its write port, and of their example.
+        Lines that list the frame constants with their addresses, and lines of the example.
     """
     framing, map = unit.framing, unit.map
     packets, layouts = framing.packets, framing.model
-    # The layouts and the register map describe the words.
+    # Registers take the place of these ports. The list of registers describes them.
     kept = [line for line in of_core if not line.startswith(("status_", "constants_", "before the first"))]
     registers = [
         f"  0x{register.address:03X}  {register.name:<12} {register.text}"

@@ -13,7 +13,7 @@ __all__ = ["Design", "DesignCost"]
 
 @dataclass(frozen=True)
 class DesignCost:
-    """Cost of a pipeline, counted in its netlist; and parts of an FPGA if a placement is committed.
+    """Cost of a pipeline, counted in its netlist; resources of an FPGA if a placement is committed.
 
     Parameters
     ----------
@@ -24,13 +24,13 @@ class DesignCost:
     register_bits, memory_bits : int
         Bits of flip-flops and of memories, before technology mapping.
     cycles_per_pixel : int
-        Cycles of a pixel of a long span.
+        Cycles for each pixel of a long span.
     setup_interval : int
         A span of n pixels takes at most max(``cycles_per_pixel`` n, ``setup_interval``) cycles.
     latency : int
         Cycles from a span to its first pixel.
     luts, flip_flops, block_rams : int or None
-        Parts on ``device`` as placed by ``blysk fpga``; ``None`` if this design is not in `placed.STORE`.
+        Resources of ``device`` that ``blysk fpga`` used; ``None`` if this design is not in `placed.STORE`.
     clock_mhz : float or None
         Median clock rate over the seeds of the placement.
     device, placed_on : str or None
@@ -52,12 +52,12 @@ class DesignCost:
     placed_on: str | None = None
 
     def __str__(self) -> str:
-        """Two lines: the netlist and the times; the placement."""
+        """Two lines: netlist and cycles; placement."""
         widths = ", ".join(f"{n}*{wide}x{narrow}" for (wide, narrow), n in self.multiplier_widths.items())
         netlist = (
             f"{self.multipliers} multipliers ({widths or 'none'}), {self.register_bits:,} register bits, "
-            f"{self.memory_bits:,} memory bits; {self.cycles_per_pixel} a pixel, {self.setup_interval} a "
-            f"span at least, latency {self.latency} cycles"
+            f"{self.memory_bits:,} memory bits; cycles: {self.cycles_per_pixel} a "
+            f"pixel, at least {self.setup_interval} a span, latency {self.latency}"
         )
         if self.luts is None:
             return f"{netlist}\nnot placed; blysk fpga places it"
@@ -68,15 +68,15 @@ class DesignCost:
 
 
 class Design(pipeline.ShadingPipeline):
-    """A design of the golden layer that also has `cost`. It equals the design without `cost`."""
+    """A design of the golden layer that also has the method `cost`. It equals the golden design."""
 
     @classmethod
     def of(cls, design: pipeline.ShadingPipeline) -> "Design":
-        """The same design with a cost."""
+        """The same design as an object with `cost`."""
         return cls(**{field.name: getattr(design, field.name) for field in fields(design)})
 
     def cost(self) -> DesignCost:
-        """Multipliers, bits and cycles from the unit, and parts of an FPGA if they are committed.
+        """Multipliers, bits and cycles of the unit, and resources of an FPGA if a placement is committed.
 
         Each call writes and counts the netlist, which takes seconds.
         """
@@ -98,7 +98,7 @@ class Design(pipeline.ShadingPipeline):
         )
 
     def placed(self) -> dict[str, Any]:
-        """Figures of `DesignCost` from the committed placement of exactly this design; else empty."""
+        """Figures of `DesignCost` from the committed placement of this design; empty if there is none."""
         shading = replace(self, build=self.build.shading)
         for entry in read_store():
             words = design_of(entry["design"])

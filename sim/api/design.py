@@ -1,4 +1,4 @@
-"""Designs by the options of the command line."""
+"""Designs made from the options of the command line."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -34,7 +34,7 @@ def design(
     lights, materials : int
         Numbers of lights and materials that it serves: 1 to 16 and 1 to 1024.
     factors : int
-        How many of the first lights fade, by distance or as spots. ``chord-local`` only.
+        Number of lights that fade, by distance or as spots. They are the first lights. Needs ``chord-local``.
     method : str
         Method of interpolation along a span: one of `METHODS`; by default see `default_method`.
     model : str
@@ -61,7 +61,7 @@ def design(
     try:
         return replace(made, factors=tuple(range(settings["factors"])))
     except ValueError as error:
-        remedy = "use chord-local, and at most as many as lights"
+        remedy = "use chord-local, and at most as many factors as lights"
         raise settings.refuse("factors", str(error), remedy) from None
 
 
@@ -88,7 +88,7 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
         )
         raise settings.refuse("model", f"method {method} finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:
-        raise settings.refuse("gate", f"{method} has no error bound for one", "leave it out", "")
+        raise settings.refuse("gate", f"{method} has no error bound for a gate", "leave it out", "")
     options: dict[str, Any] = {name: settings[name] for name in DESIGN if name not in ("method", "model")}
     try:
         made = costed_design.Design.of(preset(method, settings["model"], lights, **options))
@@ -125,7 +125,7 @@ def _check_parameter(settings: Settings, design: ShadingPipeline) -> None:
 
 
 def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
-    """Build a design by options of `BUILD`. The design's own `Build` has the options that are not given.
+    """Build a design by options of `BUILD`. Options that are not given keep their values in the design.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
     Raises
     ------
     OptionError
-        If a value is not accepted, two options exclude each other, or the design does not serve the core.
+        If a value is not accepted, two options exclude each other, or no such core has this design.
     """
     values = checked(given, BUILD)
     geometry = values.pop("geometry", None)
@@ -146,7 +146,7 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
         values.setdefault("top", "render" if hardware else "shader")
     if hardware and values["top"] == "shader":
         remedy = "leave one of them out"
-        raise OptionError("top", "shader", "it takes spans, and hardware geometry triangles", remedy)
+        raise OptionError("top", "shader", "it takes spans, and hardware geometry takes triangles", remedy)
     if "coarse" in values:
         values["coarse"] = CoarseDepth(*values["coarse"])
     try:
@@ -178,5 +178,5 @@ def refused_counts(design: ShadingPipeline | None) -> Iterator[None]:
         if design is None:
             raise
         raise OptionError(
-            "design", "", str(error), "make another for the scene's lights and materials"
+            "design", "", str(error), "make a design for the scene's lights and materials"
         ) from error

@@ -1,4 +1,4 @@
-"""Options of lights: in a scene file, in Python, and as numbers on the command line."""
+"""Options of lights: tables in a scene file, objects in Python, numbers on the command line."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ class Lights(Value):
     fields : tuple of str
         Fields of `Light` that the numbers fill, in this order.
     remedy : str
-        Text that says which numbers to give instead of refused numbers.
+        Remedy if `Light` refuses the numbers: it says which numbers to give.
     """
 
     name = "lights"
@@ -43,7 +43,7 @@ class Lights(Value):
 
     @property
     def in_python(self) -> str:
-        """One or several lights, in any form."""
+        """`remedy` for Python, with every form of lights."""
         return (
             f'give a Light, a dict with direction or position, numbers, or "{self.numbers.name}"; or a list '
             "of these"
@@ -59,7 +59,7 @@ class Lights(Value):
         return tuple(self._light(entry, f"[{number}]") for number, entry in enumerate(entries, 1))
 
     def light(self, numbers: Sequence[float]) -> Light:
-        """The light of checked numbers; `ValueError` if `Light` refuses a number."""
+        """The light that checked numbers describe; `ValueError` if `Light` refuses a number."""
         parts: dict[str, Any] = {}
         rest = tuple(numbers)
         for field in self.fields:

@@ -28,7 +28,7 @@ class ReflectionOption(Choice):
         return f"[{'|'.join(self.names)}|FILE.csv]"
 
     def check(self, value: Any) -> Any:
-        """The name; or the curve of a file."""
+        """The name, or the curve that the file holds."""
         if isinstance(value, TabulatedModel):
             return value
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
@@ -73,7 +73,7 @@ class Direction(Vector):
 
     @property
     def in_python(self) -> str:
-        """Numbers, the text, or a word."""
+        """`remedy` for Python, which also takes a tuple of numbers."""
         return self.remedy.replace("X,Y,Z", 'three numbers or "X,Y,Z"', 1)
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:

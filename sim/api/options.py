@@ -81,7 +81,7 @@ DOCUMENTS = (".md", ".h", ".svd")
 """Suffixes of the documents that are written beside the Verilog of a core on a bus."""
 
 GEOMETRIES = ("software", "hardware")
-"""Choices of the part that turns triangles into spans."""
+"""Choices of the option ``geometry``: the part that turns triangles into spans."""
 
 
 class Option(NamedTuple):
@@ -106,7 +106,7 @@ class Option(NamedTuple):
 
 
 LIGHTS = ("lights", "point_lights", "spot_lights")
-"""Options of lights. A scene has the lights of the first option first, and so on."""
+"""Options of lights. A scene has the lights of all options, in this order of the options."""
 
 VIEW_WORDS = ("front", "back", "left", "right", "top", "bottom")
 _UP_WORDS: dict[str, str | Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -116,8 +116,8 @@ SCENE: dict[str, Option] = {
     "background": Option(
         Color(),
         "#1a1c20",
-        "Colour of the pixels that show no surface. In every option of a colour #rrggbb is sRGB, and numbers "
-        "are linear light.",
+        "Colour of the pixels that show no surface. A colour is #rrggbb in sRGB, or three numbers or a "
+        "number of linear light.",
         "background",
     ),
     "ambient_light": Option(Color(8), 1.0, "Intensity I_a of the ambient light.", "ambient_light"),
@@ -136,13 +136,15 @@ SCENE: dict[str, Option] = {
     "crease": Option(
         Number(0, 180, "degrees"),
         DEFAULT_CREASE,
-        "In a mesh without normals, edges over this angle are sharp; degrees.",
+        "In a mesh without normals, an edge is sharp if the normals of its faces differ by more than this "
+        "angle, in degrees.",
         "mesh.crease",
     ),
     "materials": Option(
         Choice("source of materials", ("file", "one")),
         "file",
-        "file: colours of the mesh file, unless an option gives them. one: one material, of options only.",
+        "file: materials of the mesh file; options replace their values. one: one material, made from "
+        "options alone.",
         "mesh.materials",
     ),
     "projection": Option(
@@ -179,7 +181,8 @@ SCENE: dict[str, Option] = {
     "viewer": Option(
         Choice("viewer", VIEWERS),
         "distant",
-        "distant: highlights seen from one direction. near: from the camera; needs --method chord-local.",
+        "distant: the viewer has the same direction for all points. near: the viewer is at the camera; needs "
+        "--method chord-local.",
         "camera.viewer",
     ),
     "lights": Option(
@@ -229,7 +232,8 @@ SCENE: dict[str, Option] = {
     "fresnel": Option(
         Color(),
         None,
-        "Reflection F_0 along the normal: Schlick's F_0 + (1 - F_0)(1 - V.H)^5 times k_s.  [default: none]",
+        "Reflection F_0 along the normal. Schlick's F_0 + (1 - F_0)(1 - V.H)^5 then multiplies k_s.  "
+        "[default: none]",
         "material.fresnel",
     ),
 }
@@ -246,8 +250,8 @@ DESIGN: dict[str, Option] = {
     "model": Option(
         ReflectionOption(),
         "blinn",
-        "Reflection model. Every method serves every model, but phong needs quotient. FILE.csv: a curve of "
-        "N.H.",
+        "Reflection model. The method quotient serves all models; other methods serve all but phong. "
+        "FILE.csv: points of a curve over N.H.",
         "pipeline.model",
     ),
     "operand": Option(
@@ -282,7 +286,7 @@ DESIGN: dict[str, Option] = {
         "pipeline.transfer",
     ),
 }
-"""Options of a design, but for its counts; ``setup_interval`` and ``style`` are fields of `Build`."""
+"""Options of a design, without its counts; ``setup_interval`` and ``style`` are fields of `Build`."""
 
 COUNTS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
@@ -290,7 +294,8 @@ COUNTS: dict[str, Option] = {
     "factors": Option(
         Whole(0, MAX_LIGHTS),
         0,
-        "How many of the first lights fade, by distance or as spots. Needs --method chord-local.",
+        "Number of lights that fade, by distance or as spots. They are the first lights. Needs --method "
+        "chord-local.",
     ),
 }
 """Counts of a design, for commands without a scene. A scene has its own counts."""
@@ -308,7 +313,9 @@ BUILD: dict[str, Option] = {
         "Number of pipelines, N. Pipeline k shades the scanlines with y mod N = k.",
         "pipeline.pipes",
     ),
-    "merged": Option(Truth(), False, "With --pipes: one stream of pixels, in the order of the spans."),
+    "merged": Option(
+        Truth(), False, "With --pipes: merge all pixels into a stream, in the order of the spans."
+    ),
     "top": Option(
         Choice("core", TOPS),
         None,
@@ -330,11 +337,11 @@ BUILD: dict[str, Option] = {
     "coarse": Option(
         Size(),
         None,
-        "Build a coarse depth test, which drops hidden spans before shading, for pictures of at most this "
-        "size. Needs a core from triangles to pixels.",
+        "Build a coarse depth test for pictures of at most this size. The test drops hidden spans before "
+        "shading. Needs a core from triangles to pixels.",
     ),
 }
-"""Options of the Verilog of a core. They are fields of `Build`, which `design.built` sets."""
+"""Options of a core's Verilog. `design.built` turns them into fields of `Build`."""
 
 RENDERING: dict[str, Option] = {
     **{name: BUILD[name] for name in ("geometry", "pipes", "setups")},

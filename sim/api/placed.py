@@ -14,7 +14,7 @@ _NAME = re.compile(r"pipeline ([\w-]+), ([\w-]+), 1 light(?:, (cosine|one_minus_
 
 
 def design_of(name: str) -> tuple[str, ...] | None:
-    """Method, model and perhaps operand of a pipeline, from its name in ``blysk fpga``.
+    """Method, model and, if the name has it, operand of a pipeline, from its name in ``blysk fpga``.
 
     ``None`` for several lights, another style, and names that do not belong to a pipeline.
     """

@@ -45,7 +45,7 @@ SPECIALISING = "finding what the scene needs"
 BUILDING = "building the model"
 """Stage of `prepare_rendering` in which the hardware is compiled.
 
-If this takes long, the cause is appended.
+If the build takes long, the cause follows the text.
 """
 
 Progress = Callable[[int, int], object]
@@ -60,7 +60,7 @@ class Rendering:
     loaded : LoadedMesh
         The mesh.
     scenes : tuple of Scene
-        What is drawn.
+        Scenes to be drawn.
     specialisation : Specialisation
         The full pipeline and its reductions. Without a specialisation there are no reductions.
     is_specialised : bool
@@ -70,7 +70,7 @@ class Rendering:
     simulator : FrameSimulator or TriangleSimulator or None
         The hardware's simulator. ``None`` if there is no compiler and no compiler is needed.
     seconds : dict
-        Seconds of loading and building.
+        Seconds of loading the mesh and of building the simulator.
     """
 
     loaded: LoadedMesh
@@ -100,9 +100,9 @@ class Rendering:
         Parameters
         ----------
         progress : callable, optional
-            Called now and then with the number of pixels so far and in all.
+            Called during the simulation with the number of pixels drawn so far and the number of all pixels.
         vcd : str, optional
-            File for the waveforms, of the engine ``"pysim"``.
+            File for the waveforms; needs the engine ``"pysim"``.
         index : int
             Number of the scene; by default the first.
         """
@@ -138,7 +138,7 @@ def prepare_rendering(
     design : Design, optional
         The pipeline, which replaces the pipeline of the settings.
     engine : {"auto", "cxxrtl", "pysim"}
-        If ``"auto"`` finds no compiler, there is a warning, and pictures are at most `SLOW_SIZE`. A given
+        If ``"auto"`` finds no compiler, there is a warning, and the picture shrinks to `SLOW_SIZE`. A given
         scene keeps its size.
     frames : int
         Number of frames of a turntable. 0 stands for a single picture.
@@ -227,12 +227,12 @@ def _simulator(
 
 
 def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
-    """The design as the settings build it.
+    """The design with the build options of the settings.
 
     Raises
     ------
     OptionError
-        If an option needs hardware geometry, or hardware geometry does not serve it or the design.
+        If an option needs hardware geometry, or hardware geometry excludes an option or the design.
     """
     hardware, source = settings["geometry"] == "hardware", settings.source
     if hardware and settings["specialise"]:
@@ -242,7 +242,7 @@ def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
     if given.pop("coarse"):
         given["coarse"] = (source.width, source.height) if isinstance(source, Scene) else settings["size"]
     try:
-        # A design that a caller gives may bring options of its core.
+        # The caller's design may have build options of a core. The settings replace them.
         return built(replace(design, build=design.build.shading), given)
     except OptionError as error:
         if error.option == "geometry" or (error.option == "pipes" and not hardware):
@@ -260,9 +260,9 @@ def _check_scene(scene: Scene, design: ShadingPipeline, settings: Settings) -> N
     Raises
     ------
     OptionError
-        If the materials have more lobes than the pipeline has tables, or other lobes than its fixed ones.
+        If the materials have more lobes than the pipeline has tables, or a lobe that no fixed table has.
     ValueError
-        As `constants_of` does, for other reasons.
+        If `constants_of` refuses the scene for another reason.
     """
     try:
         constants_of(scene, design)
@@ -287,7 +287,7 @@ def _design(settings: Settings) -> ShadingPipeline:
 
 
 def _serves_local(settings: Settings) -> bool:
-    """Whether the method of the settings serves lights with a position, or may become one that does."""
+    """Whether the method serves lights with a position, or may still become ``chord-local``."""
     if settings["geometry"] == "hardware" or settings["model"] in MIRROR_LOBES:
         return False
     if "method" in settings.given:
@@ -302,7 +302,7 @@ def _specialised(scenes: Sequence[Scene], design: ShadingPipeline, settings: Set
 
 
 def _shrink(settings: Settings, error: CompilerMissing) -> None:
-    """Reduce the picture to the size of the engine pysim, with a warning. A given scene keeps its size."""
+    """Reduce the picture to `SLOW_SIZE` for pysim, with a warning. A given scene keeps its size."""
     if isinstance(settings.source, Scene):
         warnings.warn(f"pysim instead of cxxrtl, {error}", RuntimeWarning, stacklevel=4)
         return
@@ -322,7 +322,7 @@ def prepared(
     vcd: str | os.PathLike[str] | None = None,
     frames: int = 0,
 ) -> Rendering:
-    """`prepare_rendering` from the arguments of `render`; ``frames`` is the length of a turntable."""
+    """`prepare_rendering` with the arguments of `render`, for a picture or ``frames`` of a turntable."""
     if design is not None:
         for name in DESIGN.keys() & options.keys():
             raise OptionError(name, "", "the design has its own", "leave out one of them")
@@ -343,8 +343,8 @@ def render(
 ) -> RenderedFrame:
     """Draw a mesh or a scene by a simulated pipeline.
 
-    The simulation is checked. For a sample a new model must give the pixels of the bit-accurate model. The
-    frame must have no lost or doubled pixel.
+    The simulation is checked. Before its first frame, a new simulation model must draw a sample of the spans
+    like the bit-accurate model. No pixel of the frame may be lost or doubled.
 
     Parameters
     ----------
@@ -359,7 +359,7 @@ def render(
     vcd : path, optional
         File for the waveforms; it sets the engine to ``"pysim"`` and the default size to 160 x 120.
     progress : callable, optional
-        Called now and then with the number of pixels so far and in all.
+        Called during the simulation with the number of pixels drawn so far and the number of all pixels.
     **options
         The options below, by the names of the command line. Each also takes the text of the command line:
         ``size="640x480"``, ``lights="0,1,1"``. ``None`` counts as not given.

@@ -43,7 +43,8 @@ class RenderedFrame:
     name : str
         Name of the mesh.
     details : dict
-        ``ignored`` and ``counts`` of `LoadedMesh`, ``seconds`` of its parts, perhaps ``specialisation``.
+        ``ignored`` and ``counts`` of `LoadedMesh`, ``seconds`` of `Rendering`, and ``specialisation`` if
+        there is a specialisation.
     files : RunFiles
         Files that were read. `save` does not replace them.
     """
@@ -70,9 +71,10 @@ class RenderedFrame:
 
     @property
     def total_error(self) -> FrameErrors:
-        """Errors against exact shading by the exact model: a lobe's own, or Blinn's power (`target_of`).
+        """Errors against exact shading with the model that the design stands for, see `target_of`.
 
-        This includes the error of the reflection model. With a lobe it equals `error`.
+        For a lobe from a table this is the lobe's own model, and the errors equal `error`. For other models
+        it is Blinn's power, and the errors include the error of the reflection model.
         """
         return self.comparison.total_error
 
@@ -142,7 +144,7 @@ class RenderedFrame:
             write_image(path, self.image)
 
     def save_comparison(self, path: str | os.PathLike[str]) -> None:
-        """Write one picture of the simulated frame, the golden frame and the error map; see `save`."""
+        """Write a picture that shows simulated frame, golden frame and error map side by side; see `save`."""
         parameter = self.design.highlight_parameter(self.scene.materials[0])
         name = self.design.specular.reflection.PARAMETER if self.design.specular else "exponent"
         highlight = "" if name is None else f", {name} {parameter:.4g}"

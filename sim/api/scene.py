@@ -1,4 +1,4 @@
-"""Scenes with a default for everything."""
+"""Scenes with a default for every option."""
 
 import math
 import os
@@ -50,7 +50,8 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     triangles : int
         Approximate number of triangles of the teapot; by default 10,000.
     crease : float
-        Edges over this angle are sharp in a mesh file without normals; degrees, by default 40.
+        In a mesh without normals, an edge is sharp if the normals of its faces differ by more than this
+        angle. In degrees; by default 40.
     materials : {"file", "one"}
         Use the mesh file's materials and colours, or one material for all faces; by default ``"file"``.
     projection : {"perspective", "orthographic"}
@@ -59,7 +60,7 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         Direction from the mesh to the viewer, or ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"``,
         ``"bottom"``. The camera shows the whole mesh. The default is (0.4, 0.5, 1) along right, up and front.
         Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z. Right is the cross product of up and front. If no
-        option of the camera is given, a glTF file's own camera serves.
+        option of the camera is given, the camera of a glTF file is used.
     position, target : three floats
         Position of the camera, which replaces ``view``, and the point in the middle of its picture. The
         default of ``target`` is the middle of the mesh. Both are in the mesh's units.
@@ -98,7 +99,7 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
 
 
 def warn_of_ignored(loaded: LoadedMesh) -> None:
-    """Warn the caller's caller of contents of a mesh that are not drawn."""
+    """Warn of contents of a mesh that are not drawn. The warning names the line of the caller's caller."""
     if loaded.ignored:
         text = f"{loaded.name} is drawn without: {'; '.join(loaded.ignored)}"
         warnings.warn(text, RuntimeWarning, stacklevel=3)
@@ -109,21 +110,21 @@ def load(
 ) -> LoadedMesh:
     """The mesh of a scene, with its materials.
 
-    Lights of a file become those of the settings, unless an option names lights. If one of them has a
-    position, the default method is ``chord-local``. The mesh has a camera of the file, unless an option names
-    the camera.
+    The settings take the lights of the mesh file, unless an option names lights. If a light has a position,
+    the default method is ``chord-local``. The result has the camera of the file, unless an option sets the
+    camera.
 
     Parameters
     ----------
     settings : Settings
         All options of `scene`.
     lights : int
-        Most lights of a file.
+        Largest number of lights that a file may have.
     local : bool
         Whether lights of a file may have positions.
     albedo : bool
-        Whether pixels may have colours of vertices and textures. If not, the mesh lacks them, and ``ignored``
-        says so.
+        Whether pixels may have vertex colours and textures. If not, the mesh lacks them, and ``ignored``
+        names them.
 
     Raises
     ------
@@ -157,7 +158,10 @@ def load(
 
 
 def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
-    """Whether a triangle is not beyond one side of the picture, or nearer than the near plane."""
+    """Whether a triangle may be in the picture.
+
+    It is not if all its corners are beyond the same border, or all are nearer than the near plane.
+    """
     width, height = size
     with np.errstate(over="ignore", invalid="ignore"):
         x, y, weight, depth = np.moveaxis(camera.homogeneous(mesh.vertices, width, height), -1, 0)
@@ -166,7 +170,7 @@ def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
 
 
 def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
-    """A mesh without colours of vertices and textures, which are told."""
+    """The mesh without vertex colours and textures; ``ignored`` names them."""
     materials, mesh = loaded.materials, loaded.mesh
     told = ["vertex colours"] if len(mesh.colors) else []
     textures = len({id(material.texture) for material in materials if material.texture is not None})
@@ -243,7 +247,7 @@ def _materials(loaded: LoadedMesh, settings: Settings) -> tuple[Material, ...]:
 def _cameras(
     vertices: np.ndarray, shift: int, settings: Settings, count: int, of_file: Camera | None
 ) -> list[Camera]:
-    """Cameras of a mesh whose unit has been multiplied by ``2**shift``."""
+    """Cameras of a mesh whose vertices have been multiplied by ``2**shift``."""
     by_position = settings["position"] is not None
     if of_file is not None and settings["viewer"] == "near" and of_file.projection != "perspective":
         remedy = "give a view, or a distant viewer"
@@ -272,13 +276,13 @@ def _framing(vertices: np.ndarray, settings: Settings, count: int) -> list[Camer
 
 
 def _shifted(point: ArrayLike, shift: int = 0) -> Triple:
-    """A point in a mesh whose unit has been multiplied by ``2**shift``."""
+    """A point times ``2**shift``, as the vertices of the mesh."""
     x, y, z = np.asarray(point, dtype=np.float64).tolist()
     return math.ldexp(x, shift), math.ldexp(y, shift), math.ldexp(z, shift)
 
 
 def _placed(vertices: np.ndarray, shift: int, settings: Settings) -> Camera:
-    """The camera at its position."""
+    """The camera at the position that the settings give."""
     position = _shifted(settings["position"], shift)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     target = _shifted(low + (high - low) / 2)

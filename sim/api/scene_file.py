@@ -23,7 +23,7 @@ MAX_BYTES = 100_000
 """Largest scene file, in bytes. A scene file holds no mesh."""
 
 _MAX_DOTS = 256
-"""Most dots in a line.
+"""Largest number of dots in a line.
 
 The memory that `tomllib` takes grows with the square of the number of parts of a key.
 """
@@ -39,7 +39,7 @@ class SceneFile:
         The file.
     values : dict
         Values that the file sets, by the names of the options and in their types. ``mesh`` is ``teapot`` or a
-        path; a relative path of the file is joined to the folder of the scene file.
+        path. A relative path is joined to the folder of the scene file.
     keys : dict
         The key of each value, for messages: ``material.exponent``.
     """
@@ -97,7 +97,7 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
         color = [1, 1, 1]                   # or "#rrggbb"; may exceed 1
         # attenuation = [1, 0, 0]           # of a point light: 1/(k0 + k1 d + k2 d^2), at most 1; d: distance
         # spot = [0, -1, 0]                 # a point light that shines along this
-        # cone = [20, 30]                   # degrees: in full up to the first, not at all from the second
+        # cone = [20, 30]                   # degrees: full light up to the first, none from the second on
 
         [material]
         ambient = [0.08, 0.05, 0.03]        # colours, as background
@@ -228,7 +228,7 @@ class _MeshFile(Value):
 
 
 def _schema() -> dict[str, Any]:
-    """Tables of keys, nested as in a file: the option's name and type of each key."""
+    """Tables of keys, nested as in a file. Each key has the name and the type of its option."""
     schema: dict[str, Any] = {}
     options = {**SCENE, **DESIGN, **RENDERING}
     keys = {"mesh": (_MeshFile(), "mesh.file")} | {

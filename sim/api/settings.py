@@ -60,7 +60,7 @@ class Settings:
         return tuple(light for light in self["lights"] if light.is_on)
 
     def use_lights(self, lights: tuple[Light, ...]) -> None:
-        """Take lights in place of the default. With a position they get a method that serves them."""
+        """Use these lights in place of the default light, and choose a default method that serves them."""
         self.values["lights"] = lights
         if "method" in self.values and "method" not in self.given:
             self.values["method"] = _method(self.source, self.values)
@@ -159,7 +159,7 @@ def read_settings(
 
 
 def _method(source: Source | Scene, values: Mapping[str, Any]) -> str:
-    """The method of settings that name none."""
+    """The method of settings that name no method."""
     if isinstance(source, Scene):
         local = source.lit.local
     else:
@@ -192,7 +192,7 @@ def check_engine(engine: str) -> None:
     Raises
     ------
     OptionError
-        If there is no option of that name.
+        If there is no engine of that name.
     """
     checked({"engine": engine}, {"engine": Option(Choice("engine", get_args(Engine)), "auto", "")})
 
@@ -249,7 +249,7 @@ def _triple(vector: np.ndarray) -> Triple:
 
 
 _INSTEAD = {"view": ("position", "target"), "position": ("view", "target")}
-"""Options of a scene file that a caller's option replaces, besides the option of the same name."""
+"""Options of a scene file that an option of the caller replaces, besides the option of its own name."""
 
 
 def _check_pairs(settings: Settings) -> None:
@@ -267,4 +267,4 @@ def _check_pairs(settings: Settings) -> None:
     if "triangles" in given and not (isinstance(settings.source, str) and settings.source == "teapot"):
         raise settings.refuse("triangles", "only the teapot is tessellated", "leave it out for a file")
     if settings.values.get("viewer") == "near" and settings["projection"] != "perspective":
-        raise settings.refuse("viewer", "an orthographic camera is distant", "use a perspective one")
+        raise settings.refuse("viewer", "an orthographic camera is distant", "use a perspective camera")

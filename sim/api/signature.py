@@ -17,7 +17,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def in_python(text: str) -> str:
-    """A help text of the command line in the words of Python: ``--method chord-local`` is a keyword there."""
+    """A help text of the command line in the words of Python: ``--method chord-local`` becomes a keyword."""
     text = re.sub(r"--([a-z][a-z-]*) ([a-z][a-z-]+)\b", lambda m: f'{_name(m[1])}="{m[2]}"', text)
     return re.sub(r"--([a-z][a-z-]*)", lambda m: _name(m[1]), text)
 

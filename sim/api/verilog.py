@@ -38,7 +38,7 @@ ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 
 
 def header_of(unit: ShadingUnit) -> list[str]:
-    """Description of a pipeline, in lines: version, design and cycles; of several, also their streams."""
+    """Description of one or several pipelines, in lines: version, design, cycles, streams."""
     model = unit.model
     several = model if isinstance(model, PixelPipelines) else None
     made = model.design if isinstance(model, PixelPipelines) else model
@@ -113,7 +113,7 @@ def _render_header(unit: RendererUnit) -> list[str]:
 
 
 def _axes_lines(renderer: Renderer) -> list[str]:
-    """Lines on the axes of further lights, and on the length of a normal."""
+    """Lines about the axes of further lights, and about the length of a normal."""
     if not renderer.axes:
         return []
     return [
@@ -195,8 +195,8 @@ def verilog(
     Raises
     ------
     InputError
-        If the name is not a Verilog identifier, the method takes values of a span but the core triangles, the
-        design cannot have this number of pipelines, or the bus does not serve the core.
+        If the name is not a Verilog identifier, or an option does not suit the design or the core, see
+        `built`.
     """
     return verilog_and_unit(built(default_design() if design is None else design, options), name)[0]
 
@@ -204,7 +204,7 @@ def verilog(
 def verilog_and_unit(
     design: ShadingPipeline, name: str
 ) -> tuple[str, ShadingUnit | RendererUnit | GeometryUnit | BusUnit]:
-    """Verilog of the core that the design's `Build` asks for, and the unit that it was made from.
+    """Verilog of the core that the design's `Build` asks for, and the unit from which it was made.
 
     Raises
     ------

@@ -22,13 +22,13 @@ _PER_LINE = 8
 
 
 def example_of(design: ShadingPipeline, renderer: Renderer | None = None) -> list[str]:
-    """Lines: all writes for a grey surface and white light along the viewer, in decimal.
+    """Lines: all writes for a grey surface, and for white light from the direction of the viewer, in decimal.
 
     Parameters
     ----------
     design : Design
-        The pipeline. The example has its exponent if that is fixed at build time; there are no lines if its
-        tables are fixed for other lobes.
+        The pipeline. If its exponent is fixed at build time, the example has this exponent. If its tables are
+        fixed for other lobes, there are no lines.
     renderer : Renderer, optional
         Core that sends triangles to the pipeline. The example then also writes the axes of further lights.
     """
@@ -41,7 +41,7 @@ def example_of(design: ShadingPipeline, renderer: Renderer | None = None) -> lis
     try:
         first, *more = triangle_constants(scene, renderer) if renderer else constants_of(scene, design)
     except ValueError:
-        # A table that is fixed is of its own parameter.
+        # The tables are fixed for lobes with other parameters.
         return []
     writes = first.writes(0 if more else None)
     pairs = list(zip(writes["address"].tolist(), writes["data"].tolist(), strict=True))

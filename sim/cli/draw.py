@@ -43,7 +43,7 @@ def draw_frame(
     Parameters
     ----------
     settings : Settings
-        Of `rendering_settings`.
+        Result of `rendering_settings`.
     engine : str
         As for `prepare_rendering`.
     output, comparison, figures, vcd : str or None
@@ -147,7 +147,7 @@ def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
 
 
 def _show_stage(bar: tqdm, text: str) -> None:
-    """Show a stage of the work. Print the time of a long stage, also without a terminal."""
+    """Show a stage of the work. For a long stage also print a line, which says how long the stage takes."""
     bar.set_description_str(text)
     if text == SPECIALISING:
         print(_SPECIALISE, flush=True)

@@ -8,7 +8,7 @@ __all__ = ["LazyCommand"]
 
 
 class LazyCommand(click.Command):
-    """A command that stands in another file.
+    """A command whose module is imported when the command runs.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ def _installed() -> dict[str, "EntryPoint"]:
 def _command(name: str) -> click.Command | None:
     """A command of this folder or of an installed package.
 
-    It may not be loaded yet. ``None`` if there is none.
+    The command may not be loaded yet. ``None`` if no command has this name.
     """
     if name in _COMMANDS:
         return _COMMANDS[name]
@@ -89,7 +89,7 @@ def cli():
         os.getcwd()
     except OSError as error:
         reason = f"cannot be used ({error.strerror})"
-        raise InputError("the current folder", reason, "change to one that exists") from error
+        raise InputError("the current folder", reason, "change to a folder that exists") from error
 
 
 def _run(arguments: list[str]) -> int:

@@ -59,7 +59,7 @@ def given_options(context: click.Context, names: Iterable[str]) -> dict[str, Any
     Raises
     ------
     InputError
-        If `Light` refuses a number.
+        If `Light` refuses the numbers of a light.
     """
     return {
         name: _values(context, name)

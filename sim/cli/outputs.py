@@ -40,16 +40,16 @@ def check_outputs(
 
 
 def animation_paths(output: str, count: int, others: Mapping[str, str | None]) -> tuple[list[str], str]:
-    """Names of the files of a turntable's frames, PNG, and of the animation, GIF.
+    """Names of a turntable's files: PNG files of the frames, and a GIF file of the animation.
 
     Parameters
     ----------
     output : str
-        Name from which the names are made.
+        Output that the user names. Its suffix gives way to a number and ``.png``, and to ``.gif``.
     count : int
         Number of frames.
     others : dict
-        Output files of options that only a single frame has, by option.
+        Output files of options that serve a single frame alone, by option.
 
     Raises
     ------
@@ -61,5 +61,7 @@ def animation_paths(output: str, count: int, others: Mapping[str, str | None]) -
             raise InputError(f"{option} {path}", "is for one frame", f"leave out {option} or --frames")
     stem, suffix = os.path.splitext(output)
     if suffix.lower() not in (".gif", ".png"):
-        raise InputError(output, "the frames are PNG, the animation GIF", "use .gif or .png")
+        raise InputError(
+            output, "the frames are PNG files, and the animation is a GIF file", "use .gif or .png"
+        )
     return [f"{stem}-{number:04}.png" for number in range(1, count + 1)], f"{stem}.gif"

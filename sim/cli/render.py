@@ -62,8 +62,8 @@ Keys of a scene file (only mesh.file is required):
     type=Choice("engine", get_args(Engine)),
     default="auto",
     show_default=True,
-    help="cxxrtl is compiled; pysim is Amaranth's own. auto: cxxrtl; without a C++ compiler pysim at a "
-    "smaller size.",
+    help="Simulator. cxxrtl: compiled. pysim: Amaranth's own. auto: cxxrtl, or pysim at a smaller size if no "
+    "C++ compiler works.",
 )
 @click.option(
     "-o",
@@ -96,7 +96,7 @@ Keys of a scene file (only mesh.file is required):
     metavar="ADDRESS",
     help="Dask scheduler whose workers draw the frames: tcp://host:8786.",
 )
-@click.option("-v", "--verbose", is_flag=True, help="Print every figure, not only the main ones.")
+@click.option("-v", "--verbose", is_flag=True, help="Print every figure.")
 @click.pass_context
 def command(context, mesh, engine, output, comparison, figures, vcd, frames, jobs, address, verbose, **_):
     """Render a mesh or a scene file. Users see the text `_HELP`."""

@@ -102,7 +102,7 @@ def test_folder_that_is_gone(tmp_path):
         "import os, sys; os.rmdir(os.getcwd()); os.execv(sys.argv[1], sys.argv[1:])",
     ]
     status, _, errors = blysk(*RENDER, folder=gone, launcher=remove, HOME=str(tmp_path))
-    reason = "cannot be used (No such file or directory); change to one that exists"
+    reason = "cannot be used (No such file or directory); change to a folder that exists"
     assert (status, errors) == (2, [f"blysk: the current folder: {reason}"])
 
 

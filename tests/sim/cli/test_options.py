@@ -94,7 +94,7 @@ def test_bad_option(refused, options, thing, says):
 def test_design_that_cannot_be(refused, command):
     says = "finds N.H, not R.V; use method quotient; or phong_coplanar, "
     refused(*command, "--method", "linear", "--model", "phong", thing="--model phong", says=says)
-    says = "quotient has no error bound for one; leave it out"
+    says = "quotient has no error bound for a gate; leave it out"
     refused(*command, "--gate", "--model", "phong", thing="--gate", says=says)
     says = "method angular finds no normals"
     refused(*command, "--method", "angular", "--operand", "cosine", thing="--operand cosine", says=says)
@@ -103,7 +103,7 @@ def test_design_that_cannot_be(refused, command):
     if command[0] == "verilog":
         refused(*command, "--factors", "1", thing="--factors 1", says="need values of spans, of chord-local")
         local = ["--method", "chord-local", "--factors", "2"]
-        refused(*command, *local, thing="--factors 2", says="and at most as many as lights")
+        refused(*command, *local, thing="--factors 2", says="and at most as many factors as lights")
 
 
 @pytest.mark.parametrize(
