@@ -87,7 +87,7 @@ class RenderedFrame:
     def cycles(self) -> int:
         """Cycles from the first write of a constant to the last pixel.
 
-        A frame of triangles counts until all are drawn.
+        A frame of triangles counts from the first triangle until the hardware is empty.
         """
         return self.simulated.cycles
 

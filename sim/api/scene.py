@@ -89,7 +89,7 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     Warns
     -----
     RuntimeWarning
-        If the mesh file has contents that change the picture but are not read; see `LoadedMesh`.
+        If the mesh file has contents that belong to the picture but are not drawn; see `LoadedMesh`.
     """
     settings = read_settings(source, options, SCENE)
     with settings.located():

@@ -39,16 +39,16 @@ def dtype_of(layout) -> np.dtype:
     Returns
     -------
     dtype
-        A structured type with the layout's field names; a nested structure is a nested type, an array a
-        subarray, and a leaf the smallest of ``int8`` to ``int64`` or ``uint8`` to ``uint64`` that holds
-        its codes. A plain shape gives a plain type.
+        A structured type with the layout's field names. A nested structure is a nested type, an array a
+        subarray. A plain shape is the smallest of ``int8`` to ``int64`` or ``uint8`` to ``uint64`` that
+        holds its codes.
 
     Raises
     ------
     ValueError
         If a field has more than 64 bits.
     TypeError
-        If the layout has anything but structures, arrays and plain shapes, such as a union.
+        If the layout has parts other than structures, arrays and plain shapes, for example a union.
     """
     shape = _resolve(layout)
     if isinstance(shape, StructLayout):
@@ -66,7 +66,7 @@ def word_count(layout) -> int:
 
 
 def _leaves(layout, path: tuple = (), offset: int = 0) -> Iterator[tuple[tuple, int, Shape]]:
-    """Path (names and indices), bit offset and plain shape of every leaf."""
+    """Path (names and indices), bit offset and shape of every leaf. A leaf is a field with a plain shape."""
     shape = _resolve(layout)
     if isinstance(shape, Layout):
         for key, field in shape:
@@ -126,8 +126,8 @@ def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
     Raises
     ------
     ValueError
-        If a field is missing, unknown, of the wrong length or without integers, or a code outgrows its field.
-        The message names the field and the beat. No code wraps.
+        If a field is missing, unknown, of the wrong length or without integers, or a code does not fit its
+        field. The message names the field and the beat. No code wraps.
     """
     if not isinstance(beats, Mapping):
         beats = np.asarray(beats)
@@ -137,7 +137,7 @@ def pack(layout, beats: np.ndarray | Mapping) -> np.ndarray:
         counts = {len(array) for array in arrays}
         if len(counts) > 1:
             raise ValueError(
-                f"every field must have as many beats, not {' and '.join(map(str, sorted(counts)))}"
+                f"all fields must have equally many beats, not {' and '.join(map(str, sorted(counts)))}"
             )
         count = counts.pop()
     else:

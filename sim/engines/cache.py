@@ -73,18 +73,18 @@ def _unwritable(folder: Path) -> str | None:
 
 @functools.cache
 def provide_caches() -> None:
-    """Give the started tools a private cache folder, if the user's cannot be written.
+    """Give the started tools a private cache folder, if the user's cache folder cannot be written.
 
     Yosys (as WebAssembly), nextpnr, Zig and Matplotlib each have a cache below the user's cache or home
-    folder. Some end with an error if it cannot be written. The private folder is set in environment
-    variables, once in a process: in ``XDG_CACHE_HOME``, and in a tool's own variable if it is unset. A
-    warning says that models and tools are compiled again. If only the home folder cannot be written,
+    folder. Some tools end with an error if their cache cannot be written. The private folder is set in
+    environment variables, once in a process: in ``XDG_CACHE_HOME``, and in a tool's own variable if it is
+    unset. A warning says that models and tools are compiled again. If only the home folder cannot be written,
     Matplotlib alone gets the private folder, without a warning.
 
     Raises
     ------
     InputError
-        If the temporary folder cannot be used, too.
+        If the temporary folder cannot be used either.
     """
     folder = Path("of the user")
     try:
@@ -114,9 +114,9 @@ def provide_caches() -> None:
 def cache_folder() -> Path:
     """Folder of the compiled models, ``$BLYSK_CACHE``, or the user's cache folder.
 
-    A model is code that is executed. So a folder is not used if it belongs to another user, if others can
-    write it, or if it cannot be made or written. A warning says so, and a private temporary folder keeps the
-    models until the process ends.
+    A model is code that is executed. So a folder is not used if it belongs to another user, if other users
+    can write to it, or if it cannot be made or written. A warning says so, and a private temporary folder
+    keeps the models until the process ends.
 
     Returns
     -------

@@ -185,7 +185,7 @@ def _netlist_of(component: Component) -> str:
 class _Origin(pickle.Pickler):
     """A pickler that refuses classes and functions of packages that `code_version` does not cover.
 
-    Pickle stores these by name alone.
+    Pickle stores classes and functions by name alone, so a change of their code would go unnoticed.
     """
 
     def reducer_override(self, value: Any) -> Any:
@@ -413,7 +413,7 @@ class Compiled:
     def _check(self, drive: Drive) -> None:
         component, target, entry = self._unchecked
         write, after = drive.write, drive.write_after
-        # For the writes of 1024 materials pysim needs half of the time of a build.
+        # Pysim would take half of the time of a build for all writes of 1024 materials.
         if len(write) > 2 * _CHECK_WRITES:
             kept = np.r_[:_CHECK_WRITES, len(write) - _CHECK_WRITES : len(write)]
             write, after = write[kept], None if after is None else after[kept]

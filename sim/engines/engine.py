@@ -111,12 +111,12 @@ class Drive:
     input_stalls, output_stalls : bool array
         Stall patterns, repeated; shape (1,) and ``False`` without stalls.
     count : int or None
-        Expected number of output beats; ``None`` for as many as come.
+        Expected number of output beats; ``None`` for any number.
     idle_timeout : int
         Cycles without a transfer after which the run ends. It ends as ``DONE`` if ``count`` is ``None`` and
         all input is taken, else as ``STUCK``.
     settle : int
-        Cycles to go on after the last transfer of a complete run, at most ``idle_timeout``.
+        Cycles that a complete run goes on after its last transfer, at most ``idle_timeout``.
     limit : int or None
         Number of cycles after which every run ends (``LIMIT``).
     write_after : int64 array, shape (writes,), or None

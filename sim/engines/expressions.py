@@ -42,14 +42,14 @@ class Unreadable(Exception):
 class Expression(NamedTuple):
     """C++ of an expression, and what is known of its value.
 
-    If ``variable``, ``code`` is a variable's name. Else it is a word below 2^width for up to 64 bits, and a
-    ``value`` for more bits. The other fields are empty if they do not apply:
+    If ``variable``, ``code`` is a variable's name. Else ``code`` gives a word below 2^width, or a CXXRTL
+    ``value`` for more than 64 bits. The other fields are empty if they do not apply:
 
     - ``low``: simpler C++ of a word with the lowest 64 bits.
-    - ``among``: a word and a mask. The expression is not 0 if, and only if, the word is a constant whose bit
-      is set in the mask.
-    - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits. If
-      it has 1 bit and there are several bits, it is 1 if any of the bits is 1.
+    - ``among``: a word and a mask. The expression is not 0 if, and only if, bit k of the mask is set, where k
+      is the value of the word.
+    - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits.
+      An expression of 1 bit that has several bits here is 1 if any of these bits is 1.
     - ``zeros``: a variable, last and first bit, and a number. The expression is the count of leading zeros of
       these bits plus the number.
     """

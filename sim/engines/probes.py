@@ -89,7 +89,7 @@ class ObservedPipeline(Component):
 
     def __init__(self, design: ShadingPipeline):
         if design.lights != 1:
-            raise ValueError("a pipeline with one light is observed")
+            raise ValueError("only a pipeline with one light can be observed")
         self.design = design
         self.unit = ShadingPipelineUnit(design)
         members = dict(self.unit.signature.members)
@@ -199,7 +199,7 @@ def _ages(fragment: Fragment, operands: Value) -> dict[str, int]:
 
 _SPECULAR_WORDS = {
     "argument": ("1 − N·H, limited", "one_minus_cosine", float(ONE_SQUARED.values)),
-    "product": ("slope times it", "product", 1.0),
+    "product": ("slope times 1 − N·H", "product", 1.0),
     "base": ("base", "base", 1.0),
     **{
         name: (f"base to the power {power}", f"base_{power}", 1.0)

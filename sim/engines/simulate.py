@@ -207,7 +207,7 @@ def simulate(
         from being ready. At least one value must be ``False``.
     idle_timeout : int
         Cycles without a transfer, at least 1, after which the component counts as stuck. If ``count`` is
-        ``None`` and all input is taken, the run then ends.
+        ``None`` and all input is taken, the run ends then, without an error.
     settle : int
         Cycles after the last transfer in which a surplus output beat is an error. At most ``idle_timeout``,
         unless ``count`` is ``None``.
@@ -224,9 +224,10 @@ def simulate(
     Raises
     ------
     SimulationError
-        If the component withdraws or changes a beat that waits for ready, gives a surplus output beat, or
-        gets stuck. The message names the clock. If the engines differ in the first cycles of a newly built
-        model, or the compiled engine cannot translate the component.
+        - The component withdraws or changes a beat that waits for ready, gives a surplus output beat, or gets
+          stuck. The message names the clock.
+        - The engines differ in the first cycles of a newly built model.
+        - The compiled engine cannot translate the component.
     CompilerMissing
         If there is no working C++ compiler for ``"cxxrtl"``.
     ValueError, TypeError

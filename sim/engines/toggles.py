@@ -18,7 +18,7 @@ _WORD = 32
 
 
 class ToggleCounter(Component):
-    """A component with a counter for each of its submodules, of toggles of register bits since reset.
+    """A component that counts the toggles of its register bits since reset. Each submodule has a counter.
 
     A toggle is one bit that differs from its value in the cycle before. The bits of registers and of the
     registered read data of memories are counted. Bits stored in a memory, and bits of combinational signals,
@@ -35,7 +35,7 @@ class ToggleCounter(Component):
     i, o, constants, write
         Those of the component.
     status : :py:`Out(StructLayout({path: 48, ...}))`
-        Counts, by the path of the submodule, names with dots between them. ``top`` is for the component's own
+        Counts, by the path of the submodule: names with dots between them. ``top`` counts the component's own
         registers. Submodules without registers have no count.
     """
 
@@ -49,7 +49,7 @@ class ToggleCounter(Component):
     def elaborate(self, platform):
         """The component, the previous values of its registers, and the counters."""
         m = Module()
-        # Elaborated here, so that its registers can be found.
+        # The component is elaborated here, so that its registers can be found.
         m.submodules.component = fragment = Fragment.get(self._component, platform)
         for name in self.signature.members:
             inner, outer = getattr(self._component, name, None), getattr(self, name)
@@ -64,8 +64,8 @@ class ToggleCounter(Component):
                 ]
             else:
                 m.d.comb += copy(inner, outer)
-        # Registers that never change: an AND with a constant would be written bit by bit, and take minutes
-        # to compile.
+        # The masks are registers that never change. An AND with a constant would become a statement for each
+        # bit, which takes minutes to compile.
         masks = [Signal(_WORD, init=mask, name=f"mask_{step}") for step, mask in enumerate(_Ones.MASKS)]
         m.d.sync += [mask.eq(mask) for mask in masks]
         for number, (path, registers) in enumerate(_registers(fragment).items()):
@@ -127,7 +127,7 @@ def _init(register: Value) -> int:
 
 
 def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
-    """Words of 32 register bits, fewer in the last one, and their values after reset.
+    """Words of 32 register bits, fewer in the last word, and their values after reset.
 
     An engine computes with such a word in one operation; one word of all bits would take minutes to compile.
     """
@@ -147,9 +147,9 @@ def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
 
 
 class _Ones(Elaboratable):
-    """Number of bits of a word that differ from the cycle before: for each byte of the word, in that byte.
+    """Number of bits of a word that differ from the cycle before, counted for each byte, and in its place.
 
-    A module of its own, so that an event-driven engine has little to evaluate again after a change.
+    It is a module of its own, so that an event-driven engine evaluates little again after a change.
     """
 
     # Neighbouring fields of 1, then 2, then 4 bits are added.

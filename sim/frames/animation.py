@@ -45,7 +45,7 @@ __all__ = [
 
 
 def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
-    """A vector in equal steps of one turn about an axis, counter-clockwise as seen from the axis' tip.
+    """A vector at equal steps of a full turn about an axis. The turn is counter-clockwise, seen from its tip.
 
     Step k is ``v cos a + (u x v) sin a + u (u·v) (1 - cos a)`` (Rodrigues). Here u is the axis' unit vector,
     and ``a = 2 pi k / count``. Step 0 is the vector itself, to the bit.
@@ -91,7 +91,7 @@ def turntable(camera: Camera, count: int) -> list[Camera]:
 
 
 def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
-    """Cameras of `Camera.framing` with one target, moved to the largest of their distances.
+    """Cameras of `Camera.framing` with the same target, moved to the largest of their distances.
 
     Without this move a turntable would come nearer at angles where the mesh is narrow. All cameras get the
     largest height of picture and the nearest near plane among them.
@@ -124,8 +124,8 @@ class Animation:
     engine : str
         ``"cxxrtl"`` or ``"pysim"``.
     full : ShadingPipeline, optional
-        The pipeline that ``design`` is a specialisation of. The frames' errors are relative to its method and
-        model. ``None``: ``design`` itself.
+        The full pipeline, if ``design`` is its specialisation. The errors of frames refer to the method and
+        model of the full pipeline. By default ``design``.
     """
 
     scene: Scene
@@ -184,10 +184,7 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
 
 
 def _begin(animation: Animation) -> None:
-    """First call in a process of the pool.
-
-    It receives the animation, which is then not sent with every frame.
-    """
+    """First call in a process of the pool. The process keeps the animation for all of its frames."""
     global _animation
     _animation = animation
 
@@ -262,7 +259,8 @@ def dask_executor(animation: Animation, address: str) -> Iterator[FrameExecutor]
 def render_frames(executor: FrameExecutor, cameras: Sequence[Camera]) -> Iterator[tuple[int, AnimationFrame]]:
     """Render a frame for each camera, and yield pairs of index and frame in order of completion.
 
-    At most two frames a worker are submitted at a time, so that finished frames do not fill the memory.
+    At most two frames for each worker are submitted at a time, so that finished frames do not fill the
+    memory.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ class OneClock(wiring.Component):
         Bits of the lanes in four cycles: for each cycle two bits of lane 0, two of lane 1, and so on. The
         sink must be ready in every cycle.
     status : :py:`Out(...)`
-        The top's counters.
+        Counters of the top module.
 
     Raises
     ------
@@ -56,7 +56,9 @@ class OneClock(wiring.Component):
     def __init__(self, top: wiring.Component, rate: Fraction):
         self.top, self.rate = top, Fraction(rate)
         if not 0 < self.rate <= 1:
-            raise ValueError("the drawing clock is not faster than the serial clock")
+            raise ValueError(
+                "the rate of the drawing clock must be over 0, and at most that of the serial clock"
+            )
         members = top.signature.members
         buttons = members["buttons"].shape if "buttons" in members else 1
         super().__init__(
@@ -111,9 +113,9 @@ class Shown:
     Parameters
     ----------
     frames : uint8 array, shape (n, height, width, 3)
-        Decoded from the lanes.
+        Frames that a display decodes from the bits of the lanes.
     status : dict
-        Counters of the top after the run, by name.
+        Counters of the top module after the run, by name.
     cycles : int
         Cycles of the serial clock.
     """
@@ -131,12 +133,12 @@ def show(
     engine: str = "cxxrtl",
     progress: Callable[[int], object] | None = None,
 ) -> Shown:
-    """Simulate a top for some frames of its display, and decode the bits of its lanes.
+    """Simulate a top module for some frames of its display, and decode the bits of its lanes.
 
     Parameters
     ----------
     top : OneClock
-        The top.
+        The top module.
     mode : DisplayMode
         Mode of its display.
     count : int

@@ -112,7 +112,7 @@ def triangle_figures(
 
 
 def sharp_lobes(scene: Scene, design: ShadingPipeline) -> int:
-    """Number of lobes that are over 0.25 LSB off between two entries of a table of ``quotient``."""
+    """Number of lobes for which the table of ``quotient`` is over 0.25 LSB off between two entries."""
     if design.specular is None:
         return 0
     return sum(map(design.specular.is_sharp, set(map(design.highlight_parameter, scene.materials))))
@@ -172,8 +172,8 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     Parameters
     ----------
     frames : sequence of dict
-        Figures of `frame_figures` or `triangle_figures`, all of one scene and pipeline. ``triangles`` of the
-        result is the largest number of a frame.
+        Figures of `frame_figures` or `triangle_figures`, all for the same scene and pipeline. ``triangles``
+        of the result is the largest number of triangles in a frame.
     """
     same = ("method", "model", "exponent", "roughness", "lights", "materials", "style", "gate", "engine")
     same += ("width", "height", "target", "transfer", "border", "step_lsb")

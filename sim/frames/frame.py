@@ -123,7 +123,7 @@ def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 class FrameSimulator:
-    """A pipeline, or several, built once, that renders any number of frames.
+    """Simulator of one or several pipelines. It is built once, and renders any number of frames.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class FrameSimulator:
     engine : str
         The engine in use: ``"cxxrtl"`` or ``"pysim"``.
     build_seconds : float
-        Seconds to build or load the model, its check included.
+        Seconds to build or load the model, and to check it.
 
     Raises
     ------
@@ -195,14 +195,14 @@ class FrameSimulator:
         scene : Scene
             The scene, with at most as many lights as the design has.
         progress : callable, optional
-            Called now and then with the number of pixels so far and in all.
+            Called during the run with the number of pixels drawn so far and the number of all pixels.
         vcd : str, optional
             File for the waveforms. Only for the engine ``"pysim"``.
 
         Raises
         ------
         SimulationError
-            If the pipeline breaks the stream's rules, stops, or gives pixels at wrong coordinates.
+            If the pipeline breaks the rules of streams, stops, or gives pixels at wrong coordinates.
         ValueError
             If the scene has more lights or other materials than the design, or a term is brighter than 8.
         """
@@ -217,7 +217,9 @@ class FrameSimulator:
         assert run.status is not None
         pixel = beats["y"].astype(np.int64) * scene.width + beats["x"]
         if not np.array_equal(pixel, raster.pixel):
-            raise SimulationError("the simulated pipeline answered with other pixels than it was asked for")
+            raise SimulationError(
+                "the simulated pipeline gave pixels at other coordinates than its spans have"
+            )
         return SimulatedFrame(
             image=frame_buffer(scene, raster, _colors(beats), self.design.transfer),
             prepared=prepared,
@@ -251,7 +253,8 @@ def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
     members = span_shape(design).members
     if "step" in members:
         ends = rng.normal(size=(2, len(length), members["step"].length))
-        # A span of two pixels has no step that fits. An empty span has no step.
+        # The ends are random. So the step of a span of two pixels would not fit its word. An empty span has
+        # no step.
         vectors = SpanVectors.quantise(*ends, np.where(length > 2, length, 1))
         spans = replace(spans, vectors=vectors)
     if "values" in members:
@@ -265,7 +268,7 @@ def _sample(design: ShadingPipeline) -> tuple[Spans, list[FrameConstants]]:
 
 
 def sample_attributes(albedo: Albedo, length: np.ndarray, rng: np.random.Generator) -> SpanAttributes:
-    """Attributes of some spans, to check a new model with: any colours, and places over some images."""
+    """Random attributes of some spans, to check a new model with: colours and texture coordinates."""
     shape = (2, len(length), albedo.spans.attributes)
     ends = rng.random(shape)
     ends[:, :, 3 * albedo.colors :] = rng.uniform(-40, 40, ends[:, :, 3 * albedo.colors :].shape)

@@ -172,7 +172,7 @@ def _without_equal_materials(
             material.two_sided,
             material.tinted,
             material.texture,
-            # With an albedo it is not part of the ambient colour.
+            # With an albedo the emission is not a part of the ambient colour.
             material.emission if scenes[0].has_albedo else None,
         )
         for of, material in zip(_constants(scenes[0], None, full.mirror), scenes[0].materials, strict=True)
@@ -191,7 +191,7 @@ def _without_equal_materials(
         for scene in scenes
     )
     what = "no memory of materials" if len(used) == 1 else "a smaller memory of materials"
-    reason = f"{what}: {len(used)} of {full.materials} differ"
+    reason = f"{what}: {len(used)} of {full.materials} are distinct"
     return scenes, [Reduction(reason, {"materials": len(used)})]
 
 
@@ -242,7 +242,7 @@ def _with_fixed_values(
 
 
 def _with_fewer_bits(full: ShadingPipeline, scene: Scene, longest: int) -> list[Reduction]:
-    """Reductions: fewer bits of coordinates by the picture's size, fewer bits of lengths by the spans."""
+    """Reductions of words: coordinates to the picture's size, lengths to the longest span."""
     found = []
     for name, side, what in (("x_bits", scene.width, "columns"), ("y_bits", scene.height, "rows")):
         bits = max(int(side - 1).bit_length(), 1)

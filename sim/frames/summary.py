@@ -233,7 +233,7 @@ def _remedy(key: str) -> str:
 
 
 def _ignored_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """One line that names everything in a mesh file that changes the picture but was not read."""
+    """A line that names the contents of a mesh file that are not drawn, though they belong to the picture."""
     if figures.get("ignored"):
         yield _line("ignored", "; ".join(figures["ignored"]))
 

@@ -116,7 +116,7 @@ def vectors(unit: ShadingPipelineUnit | MergedPipelinesUnit) -> dict[str, dict[s
     -------
     dict of dict of int arrays
         For each of ``writes``, ``spans``, ``pixels`` and ``status``: a column of codes for each port, all of
-        one length. See `teapot_frame`.
+        the same length. See `teapot_frame`.
     """
     several = isinstance(unit.model, PixelPipelines)
     spans, constants, pixels = teapot_frame(unit.model.design if several else unit.model)
@@ -185,7 +185,7 @@ def write_testbench(
     unit : ShadingPipelineUnit or MergedPipelinesUnit
         The pipeline, or several with one stream of pixels.
     name, text : str
-        Name of its top module, and its Verilog.
+        Name of the top module, and Verilog of the pipeline.
     about : sequence of str
         Lines of README.md that describe the pipeline.
 

@@ -149,7 +149,7 @@ class TriangleSimulator:
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
     angle : float, optional
-        Widest piece of a span in degrees, by default `SPAN_ANGLE`.
+        Largest angle of a piece of a span in degrees, by default `SPAN_ANGLE`.
 
     Raises
     ------
@@ -212,15 +212,15 @@ class TriangleSimulator:
         scene : Scene
             The scene, of the simulator's size.
         progress : callable, optional
-            Called now and then during the run. Both arguments are the number of pixels written so far,
-            because the total is unknown.
+            Called during the run. Both arguments are the number of pixels written so far, because the number
+            of all pixels is unknown.
         vcd : str, optional
             File for the waveforms. Only for the engine ``"pysim"``.
 
         Raises
         ------
         SimulationError
-            If the hardware breaks the stream's rules or stops.
+            If the hardware breaks the rules of streams, or stops.
         ValueError
             If the scene has another size, point lights or a near viewer, or does not fit the design.
         """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["check_address", "cluster_client", "cluster_executor", "local_executor", "processors"]
 
 _CONNECT_SECONDS = 10
-_START = "start one with `dask scheduler`, and give its address, as tcp://host:8786"
+_START = "start a scheduler with `dask scheduler`, and give its address, as tcp://host:8786"
 
 
 def processors() -> int:
@@ -61,7 +61,7 @@ def local_executor(
     InputError
         If a process dies.
     """
-    with warnings.catch_warnings():  # It is said where a model is built.
+    with warnings.catch_warnings():  # The warning comes where a model is built.
         warnings.simplefilter("ignore", RuntimeWarning)
         cache = str(cache_folder())
     # Other threads run in this process, so processes are not forked.
@@ -73,7 +73,7 @@ def local_executor(
         executor.shutdown()
     except BrokenProcessPool:
         reason = "a process died, perhaps because memory ran out"
-        raise InputError(f"--jobs {jobs}", reason, "use fewer, or smaller pictures") from None
+        raise InputError(f"--jobs {jobs}", reason, "use fewer jobs, or smaller pictures") from None
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
         for child in set(multiprocessing.active_children()) - before:
@@ -194,7 +194,7 @@ def cluster_executor(address: str) -> Iterator[Executor]:
 @contextmanager
 def _quiet_dask() -> Iterator[None]:
     """Keep Dask's log of a lost connection off the terminal. Our own message has one line."""
-    # The second has a level of its own.
+    # The second logger has a level of its own.
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

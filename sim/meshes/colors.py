@@ -7,19 +7,20 @@ from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused
 
 __all__ = ["vertex_colors"]
 
-# How far over full light a number may lie by rounding, as a part of it.
+# Rounding may put a number above full light by this part of full light.
 _ROUNDED = 1e-6
 
 
 def vertex_colors(channels: np.ndarray, whole: float | None = None) -> np.ndarray:
-    """Colours in linear light of channels by the curve of sRGB.
+    """Colours in linear light, from channels encoded by the curve of sRGB.
 
     Parameters
     ----------
     channels : array, shape (V, 3)
         Numbers of a file.
     whole : float, optional
-        The number of full light. ``None``: 255 if all numbers are whole and one is over 1, else 1.
+        The number that stands for full light. By default 255 if all numbers are whole and a number is over 1,
+        else 1.
 
     Returns
     -------

@@ -27,7 +27,7 @@ __all__ = [
     "tell_contents",
 ]
 
-# Extensions that are read, those that change nothing that is read, and those that a picture does without.
+# Extensions: read; without effect on the parts that are read; left out of the picture, and listed.
 _READ = {"KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 _UNLIT, _STRENGTH = "KHR_materials_unlit", "KHR_materials_emissive_strength"
 _READ |= {"KHR_node_visibility", "KHR_texture_transform", "EXT_texture_webp", GLOSSY, _UNLIT, _STRENGTH}
@@ -49,7 +49,7 @@ _TOLD |= {
         *("specular", "transmission", "volume", "volume_scatter"),
     )
 }
-# Keys that are read, those of what is counted, and those that say nothing of the look.
+# Known keys: of parts that are read or counted, and keys that say nothing of the look.
 _ANY = {"name", "extensions", "extras"}
 _KNOWN = {
     "document": {"asset", "scene", "scenes", "nodes", "meshes", "materials", "accessors", "bufferViews"}
@@ -87,7 +87,7 @@ def gltf_document(data: bytes, suffix: str, found: Found) -> dict:
         raise Refused("its JSON is not a glTF document")
     asset = document.get("asset")
     asset = asset if isinstance(asset, dict) else {}
-    # The first version has its parts by name, and before it was finished, no asset.
+    # Version 1 stores its parts by name. Drafts of version 1 have no asset.
     old = any(isinstance(document.get(name), dict) for name in ("accessors", "meshes", "nodes", "buffers"))
     version = asset.get("minVersion", asset.get("version", "1.0" if old else "2.0"))
     if str(version).split(".")[0] != "2" or str(asset.get("minVersion", "2.0")) not in ("2", "2.0"):
@@ -129,7 +129,7 @@ def check_gltf(document: dict) -> None:
 
 
 def _check_nodes(document: dict) -> None:
-    """Refuse nodes that form no trees: trimesh would draw one of several places, or none, or never end."""
+    """Refuse nodes that form no trees. trimesh would draw them at some of their places only, or never end."""
     nodes = document.get("nodes", [])
     children = [node.get("children", []) for node in nodes]
     roots = [scene.get("nodes", []) for scene in document.get("scenes", [])]
@@ -198,7 +198,7 @@ def find_gltf_materials(
 def _gltf_material(
     text: dict, name: str, given_name: str, textures: GltfTextures, found: Found
 ) -> FileMaterial:
-    """A material of a glTF document; what else changes its look is told.
+    """A material of a glTF document. Properties of its look that are not read are recorded in ``found``.
 
     Missing factors are 1, as glTF defines. Factors that a texture multiplies do not count if the texture is
     not read: metallic factor and roughness, specular factor and glossiness, emission.
@@ -237,13 +237,13 @@ def _color(look: dict, key: str, count: int, name: str) -> Triple:
 
 
 def _are_numbers(given: Any, count: int) -> bool:
-    """Whether there is a list of so many numbers."""
+    """Whether a value is a list of ``count`` numbers."""
     kinds = [type(number) in (int, float) for number in given] if isinstance(given, list) else []
     return len(kinds) == count and all(kinds)
 
 
 def _emission(text: dict, name: str) -> Triple | None:
-    """Light of a material itself; ``None`` if there is none."""
+    """Light that a material emits; ``None`` if it emits none."""
     given, strength = text.get("emissiveFactor", [0, 0, 0]), extension_of(text, _STRENGTH)
     factor = strength.get("emissiveStrength", 1)
     for key, value, numbers in (
@@ -260,7 +260,7 @@ def _emission(text: dict, name: str) -> Triple | None:
 
 
 def _tell_look(text: dict, look: dict, info: dict | None, alpha: float, found: Found) -> None:
-    """Tell what changes the look of a material and is not read."""
+    """Record the properties that change the look of a material and are not read."""
     if has_extension(text, GLOSSY):
         # The other factors are for programs that do not know the extension.
         text = {key: value for key, value in text.items() if key != "pbrMetallicRoughness"}
@@ -280,7 +280,7 @@ def _tell_look(text: dict, look: dict, info: dict | None, alpha: float, found: F
 
 
 def _parts(part: Any) -> Iterator[dict]:
-    """A part of a document and all parts in it, but for what an application adds for itself."""
+    """A part of a document and all parts in it, without ``extras``, which belong to applications."""
     if isinstance(part, dict):
         yield part
         part = [value for key, value in part.items() if key != "extras"]
@@ -299,7 +299,7 @@ def _extension_names(part: Any) -> Iterator[str]:
 
 
 def _factor(look: dict, key: str, name: str) -> float:
-    """A factor of a material; `Refused` if it is no number from 0 to 1."""
+    """A factor of a material; `Refused` if the factor is not a number from 0 to 1."""
     value = look.get(key, 1)
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
         raise Refused(
@@ -309,7 +309,7 @@ def _factor(look: dict, key: str, name: str) -> float:
 
 
 def tell_contents(document: dict, found: Found) -> None:
-    """Tell contents of a document, without its materials, that change the picture and are not read.
+    """Record contents of a document that belong to the picture and are not read. Materials are left out here.
 
     Skins, and morph targets with a weight other than 0, are counted. The mesh is drawn without them.
     """
@@ -334,9 +334,9 @@ def tell_contents(document: dict, found: Found) -> None:
 
 
 def plain_gltf(document: dict) -> bytes:
-    """The text of a document of meshes and nodes alone.
+    """The text of a document with meshes and nodes alone.
 
-    trimesh would lose the nodes below a camera.
+    Cameras are removed, because trimesh would lose the nodes below a camera.
     """
     for node in document["nodes"]:
         for name in ("camera", "skin", "weights", "extensions", "extras"):

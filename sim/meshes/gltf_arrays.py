@@ -28,7 +28,7 @@ _MAX_INSTANCES = 100_000
 _DRACO = "KHR_draco_mesh_compression"
 _LINES, _STRIP, _FAN, _MODES = 3, 5, 6, 7
 _READ = ("POSITION", "NORMAL")
-# Types of numbers of COLOR_0 and of texture coordinates, the latter with KHR_mesh_quantization.
+# Types of numbers of COLOR_0, and of texture coordinates, also with KHR_mesh_quantization.
 _COLORS, _COORDINATES = (5121, 5123, _FLOAT), (5120, 5121, 5122, 5123, _FLOAT)
 
 
@@ -72,7 +72,7 @@ def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list
         if uri is None and any(
             buffer.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT
         ):
-            # It stands for what the decoder would make.
+            # Such a buffer has no bytes. It stands for the result of the decoder.
             found, length = b"", 0
         elif uri is None and number == 0 and suffix == ".glb":
             found = _glb_chunk(data)
@@ -111,7 +111,7 @@ def _glb_chunk(data: bytes) -> bytes:
 
 
 def _normalised(values: np.ndarray, kind: np.dtype) -> np.ndarray:
-    """Whole numbers of a kind as glTF scales them, to 1 at most."""
+    """Whole numbers scaled as in glTF: over the largest number of their type, and at least -1."""
     scaled: np.ndarray = np.maximum(values / np.iinfo(kind).max, -1.0)
     return scaled
 
@@ -124,7 +124,7 @@ class _Arrays:
         self.stored: list[np.ndarray] = []
 
     def read(self, index: int) -> np.ndarray:
-        """Values of an accessor, float64 or whole; normalised ones between -1 and 1 as glTF defines them."""
+        """Values of an accessor, float64 or whole numbers. Normalised values are -1 to 1, as glTF defines."""
         accessor = self.document["accessors"][index]
         kind, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
         count = accessor["count"]
@@ -157,7 +157,7 @@ class _Arrays:
         return np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
 
     def decoded(self, primitive: dict) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Attributes and corners of Draco-compressed data; `Refused` if its decoder refuses it."""
+        """Attributes and corners of Draco-compressed data; `Refused` if the decoder fails."""
         import DracoPy
 
         compressed = primitive["extensions"][_DRACO]
@@ -169,12 +169,12 @@ class _Arrays:
             names = {number: name for name, number in compressed["attributes"].items()}
             found = {names.get(each["unique_id"]): np.array(each["data"]) for each in mesh.attributes}
             return found, np.array(mesh.faces).astype(np.int64).ravel()
-        # The decoder raises whatever it trips over.
+        # The decoder may raise any exception.
         except Exception as error:
             raise Refused("its Draco-compressed data is damaged", REEXPORT) from error
 
     def add(self, values: np.ndarray) -> int:
-        """Add an array, float32 vectors or 32-bit indices; the number of its new accessor."""
+        """Add an array of float32 vectors or 32-bit indices, and return the number of its new accessor."""
         self.stored.append(np.ascontiguousarray(values, dtype="<f4" if values.dtype.kind == "f" else "<u4"))
         return len(self.stored) - 1
 
@@ -204,7 +204,7 @@ class _Arrays:
         return values
 
     def look(self, index: int, name: str, decoded: dict[str, np.ndarray]) -> np.ndarray:
-        """Values of COLOR_0, 0 to 1 if they are whole numbers, or of texture coordinates."""
+        """Values of COLOR_0 or of texture coordinates. Normalised whole numbers become -1 to 1."""
         accessor = self.document["accessors"][index]
         kind, shape = accessor["componentType"], accessor["type"]
         of_colors = name == "COLOR_0"
@@ -248,7 +248,7 @@ def plain_arrays(
     Each primitive has a material of its own, with the primitive's number as name.
 
     By itself trimesh scales no normalised whole numbers, reads no sparse arrays, leaves out triangle fans,
-    and draws only one of a node's instances. Parts of points and lines are told.
+    and draws only one of a node's instances. Parts of points and lines are recorded as not read.
 
     Parameters
     ----------
@@ -257,17 +257,17 @@ def plain_arrays(
     buffers : list of bytes
         From `gltf_buffers`.
     materials : list of dict or None
-        Materials of the document. ``None``: they do not count, and colours of vertices do not either.
+        Materials of the document. ``None``: neither materials nor colours of vertices are read.
     found : Found
         Takes the contents that are left out.
 
     Returns
     -------
     buffer : bytes
-        The one buffer.
+        Bytes of the new document's only buffer.
     looks : list of dict
-        Of each primitive: ``"material"``, the number of its material from 1, 0 for none; ``"colors"`` and
-        ``"coordinates"``, float64 arrays of colours and texture coordinates of its vertices, or ``None``.
+        A dict for each primitive. ``"material"`` is the number of its material from 1, or 0 for none.
+        ``"colors"`` and ``"coordinates"`` are float64 arrays of its vertices, or ``None``.
     """
     arrays = _Arrays(document, buffers)
     looks: list[dict[str, Any]] = []
@@ -285,7 +285,7 @@ def plain_arrays(
             looks.append(look)
     _plain_instances(document, arrays)
     for node in document["nodes"]:
-        # trimesh would lose the nodes below.
+        # trimesh would lose the nodes below a node with an empty mesh.
         if "mesh" in node and not document["meshes"][node["mesh"]]["primitives"]:
             del node["mesh"]
     parts, buffer = arrays.document_parts()
@@ -373,7 +373,7 @@ def _looks(
 
 
 def _plain_instances(document: dict, arrays: _Arrays) -> None:
-    """Give a node with instances a child for each of them."""
+    """Give each node with instances a child for each instance."""
     nodes = document.get("nodes", [])
     total = 0
     for node in list(nodes):

@@ -10,7 +10,7 @@ from blysk.sim.meshes.refusal import REEXPORT, Refused, shown
 __all__ = ["MESHOPT", "data_of_uri", "extension_of", "has_extension", "listed", "view_bytes", "whole"]
 
 MESHOPT = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
-"""Extensions of compressed views without a decoder. A view is read if the plain data is there, too."""
+"""Extensions that compress views, and have no decoder here. A view is read if its plain data is there."""
 
 
 def has_extension(part: dict, name: str) -> bool:
@@ -20,13 +20,13 @@ def has_extension(part: dict, name: str) -> bool:
 
 
 def extension_of(part: dict, name: str) -> dict:
-    """An extension of a part of a document; empty if it has none."""
+    """An extension of a part of a document; empty if the part does not have the extension."""
     extension = part["extensions"][name] if has_extension(part, name) else {}
     return extension if isinstance(extension, dict) else {}
 
 
 def listed(document: dict, name: str) -> list[dict]:
-    """An array of objects of a document; `Refused` if it is none."""
+    """A list of objects of a document; `Refused` if the value is not a list of objects."""
     rows = document.get(name, [])
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise Refused(f"its {name} are not a list of objects")
@@ -34,7 +34,7 @@ def listed(document: dict, name: str) -> list[dict]:
 
 
 def whole(value: Any, what: str, below: float = math.inf, remedy: str = REEXPORT) -> int:
-    """A whole number from 0; `Refused` if it is none, as Python would count a negative index from the end."""
+    """A whole number from 0. Other values are `Refused`: Python counts a negative index from the end."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
         raise Refused(f"it has {what} {shown(str(value))}, not a whole number from 0", remedy)
     if value >= below:
@@ -43,7 +43,7 @@ def whole(value: Any, what: str, below: float = math.inf, remedy: str = REEXPORT
 
 
 def data_of_uri(uri: str, what: str, remedy: str = REEXPORT) -> bytes:
-    """Bytes in the text of a reference; `Refused` if it is not base64."""
+    """Bytes that the text of a reference holds; `Refused` if the text is not base64."""
     try:
         return base64.b64decode(uri.partition("base64,")[2])
     except (binascii.Error, ValueError):

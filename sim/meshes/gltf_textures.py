@@ -24,7 +24,7 @@ from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, inside, shown
 __all__ = ["GLOSSY", "GltfTextures", "color_texture", "texture_coordinates", "texture_set"]
 
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
-"""Extension with other factors than metallic and roughness."""
+"""Extension with specular and glossiness factors in place of metallic and roughness factors."""
 
 _TRANSFORM = "KHR_texture_transform"
 _WRAPS = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
@@ -53,7 +53,7 @@ def color_texture(material: dict) -> dict | None:
     Raises
     ------
     Refused
-        If it is no object.
+        If this part is not an object.
     """
     key, look = "baseColorTexture", material.get("pbrMetallicRoughness", {})
     if has_extension(material, GLOSSY):
@@ -129,7 +129,7 @@ class GltfTextures:
     folder : Path
         Folder of the file.
     found : Found
-        Is told what is not read.
+        Records contents that are not read.
     """
 
     def __init__(self, document: dict, buffers: list[bytes], folder: Path, found: Found):
@@ -139,7 +139,7 @@ class GltfTextures:
         self._made: dict[tuple[Any, ...], Texture | None] = {}
 
     def read(self, info: dict, opaque: bool) -> Texture | None:
-        """The texture that a part of a material means; ``None``, and told, if its image is not there.
+        """The texture to which a part of a material refers. ``None`` if its image is missing.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class GltfTextures:
         Raises
         ------
         Refused
-            If it refers to what is not there, or the image or a number is not usable.
+            If a reference leads nowhere, or the image or a number is not usable.
         """
         transform = extension_of(info, _TRANSFORM)
         for name, part in (("texture infos", info), (_TRANSFORM, transform)):
@@ -211,7 +211,7 @@ class GltfTextures:
         return load_texture(data, name, self._found, opaque=opaque, **options)
 
     def _target(self, uri: str) -> Path | None:
-        """The file of an image; ``None``, and told, if it is not there."""
+        """The file of an image. ``None`` if the file is missing or outside the folder, which is recorded."""
         why = OUTSIDE
         try:
             target = inside(self._folder, uri, unquote(uri))
@@ -225,7 +225,7 @@ class GltfTextures:
 
 
 def _chosen(sampler: dict, key: str, of: dict[int, Any], default: int) -> Any:
-    """What a code of a sampler means."""
+    """The value for which a code of a sampler stands."""
     value = sampler.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or value not in of:
         codes = ", ".join(map(str, of))

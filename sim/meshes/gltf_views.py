@@ -42,7 +42,7 @@ class GltfViews(NamedTuple):
 
     lights: list[GltfLight]
     cameras: list[tuple[np.ndarray, Any]]
-    """Matrix into the world, and text, of each camera."""
+    """Matrix into the world, and JSON object, of each camera."""
 
 
 def gltf_views(document: dict, lights: bool, camera: bool, found: Found) -> GltfViews:
@@ -53,9 +53,9 @@ def gltf_views(document: dict, lights: bool, camera: bool, found: Found) -> Gltf
     document : dict
         After `complete_scene`.
     lights, camera : bool
-        Whether to read them. If not, none is found, and nothing is told.
+        Whether to read lights, and cameras. If not, the result has none, and nothing is recorded.
     found : Found
-        Is told which lights are damaged.
+        Records damaged lights.
     """
     cameras, texts = document.get("cameras"), extension_of(document, _LIGHTS).get("lights")
     views = GltfViews([], [])
@@ -107,7 +107,7 @@ def _matrix(node: dict) -> np.ndarray:
 
 
 def _light(text: dict, matrix: np.ndarray) -> GltfLight:
-    """A light; one of several exceptions if it is damaged."""
+    """A light. A damaged light raises one of several exceptions."""
     kind, spot = text["type"], text.get("spot", {})
     if kind not in ("directional", "point", "spot"):
         raise ValueError
@@ -126,10 +126,10 @@ def placed_lights(
 ) -> tuple[Light, ...]:
     """Lights in our unit of brightness: the brightest counts 1.
 
-    Lux and candela have no largest value. So the illuminance of each light is found at the distance r that a
-    quarter of the vertices is nearer: ``E = I`` of a directional light, else ``E = I / r^2``. A range R
-    multiplies this by ``1 - (r/R)^4``. The largest E of any channel becomes 1. A point light counts
-    ``(r/d)^2`` at the distance d, at most 1.
+    Lux and candela have no largest value. So lights are compared by their illuminance E. It is ``E = I`` for
+    a directional light, and ``E = I / r^2`` for a point light. A quarter of the vertices is nearer to the
+    light than r. A range R multiplies E by ``1 - (r/R)^4``. The largest E of any channel becomes 1. At
+    distance d a point light is multiplied by ``(r/d)^2``, limited to 1.
 
     Parameters
     ----------
@@ -138,12 +138,12 @@ def placed_lights(
     vertices : float64 array, shape (V, 3)
         The mesh.
     most : int
-        Most lights; the brightest are taken.
+        Largest number of lights. Of more lights the brightest are taken.
     local : bool
         Whether to take lights with a position.
     found : Found
-        Is told that the brightness has another unit, that a range counts at one distance only, and how many
-        lights are left out.
+        Records that the brightness has another unit, that a range has its effect at the distance r only, and
+        the number of lights that are left out.
 
     Returns
     -------
@@ -186,18 +186,18 @@ def _made(placed: tuple[np.ndarray, GltfLight, float], brightest: float) -> Ligh
 
 
 def placed_camera(cameras: list[tuple[np.ndarray, Any]], vertices: np.ndarray, found: Found) -> Camera | None:
-    """The first camera, in the mesh's unit; ``None`` if there is none, or if it is damaged.
+    """The first camera, in the mesh's unit; ``None`` if there is no camera, or the first is damaged.
 
-    Its target is the point on its axis that is as deep as the middle of the mesh.
+    Its target is the point on its axis at the depth of the middle of the mesh.
 
     Parameters
     ----------
     cameras : list of array and object
-        Matrix into the world, and text, of each camera.
+        Matrix into the world, and JSON object, of each camera.
     vertices : float64 array, shape (V, 3)
         The mesh.
     found : Found
-        Is told of further cameras, and of a damaged one.
+        Records further cameras, and a damaged first camera.
     """
     if not cameras:
         return None
@@ -213,7 +213,7 @@ def placed_camera(cameras: list[tuple[np.ndarray, Any]], vertices: np.ndarray, f
 
 
 def _camera(text: dict, matrix: np.ndarray, middle: np.ndarray, size: float) -> Camera:
-    """A camera; one of several exceptions if it is damaged."""
+    """A camera. A damaged camera raises one of several exceptions."""
     kind = text["type"]
     values = text[kind]
     position, forward, up = matrix[:3, 3], normalise(-matrix[:3, 2]), normalise(matrix[:3, 1])

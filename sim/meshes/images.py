@@ -1,4 +1,4 @@
-"""Images of mesh files: bytes of a picture file to a texture in linear light."""
+"""Images of mesh files: from the bytes of a picture file to a texture in linear light."""
 
 import io
 import os
@@ -40,11 +40,11 @@ def load_texture(
 ) -> Texture:
     """Texture of an image: PNG, JPEG, WebP, BMP or TGA.
 
-    Codes of 8 bits are read by the curve of sRGB. Colour profiles and orientations (EXIF) do not count.
+    Codes of 8 bits are decoded by the curve of sRGB. Colour profiles and orientations (EXIF) are not read.
 
     A side that is no power of two, or over `LARGEST_TEXTURE`, is resampled in linear light. Its new size is
-    the power of two with the nearest logarithm. The sizes of resampled images are told. Alpha is told, too,
-    and so are frames after the first.
+    the power of two with the nearest logarithm. The sizes of resampled images, alpha, and frames after the
+    first are recorded as not read.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ def load_texture(
     name : str
         Its name in messages.
     found : Found
-        Is told what is not read.
+        Records contents that are not read.
     wrap, filter, mipmapped
         See `Texture`. The texels that a resampled border needs follow from ``wrap``. An image for ``nearest``
-        is resampled without colours between neighbours where the size grows.
+        is enlarged without mixing the colours of neighbours.
     opaque : bool
-        Whether the material leaves out the alpha anyway, which then is not told.
+        Whether the material has no use for alpha. Then alpha is not recorded.
 
     Raises
     ------
@@ -92,8 +92,8 @@ def load_texture(
 def find_image(name: str, folder: Path, beside: Path | None = None) -> tuple[Path | None, str]:
     """The file of an image that a mesh file, or a file beside it, names.
 
-    Of a name in another folder, as of another machine, the last part is looked for, too. A name may end in a
-    comment, after ``#``.
+    If a name has folders, perhaps those of another machine, its last part is looked for, too. A comment
+    after ``#`` may follow a name.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def find_image(name: str, folder: Path, beside: Path | None = None) -> tuple[Pat
     Returns
     -------
     tuple of Path or None, and str
-        ``None``, and `NOT_THERE` or `OUTSIDE`, if there is no file.
+        The file and an empty text. If there is no file: ``None``, and `NOT_THERE` or `OUTSIDE`.
     """
     plain = name.strip().strip('"').replace("\\", "/")
     bare = plain.partition(" #")[0].strip()
@@ -124,7 +124,7 @@ def find_image(name: str, folder: Path, beside: Path | None = None) -> tuple[Pat
 
 
 def read_texture(path: Path, found: Found, name: str | None = None, **options: Any) -> Texture:
-    """Texture of a file, as `load_texture` with its options. The name is by default that of the file."""
+    """Texture of a file; ``options`` are those of `load_texture`. By default ``name`` is the file's name."""
     reads(path)
     try:
         data = path.read_bytes()
@@ -135,7 +135,7 @@ def read_texture(path: Path, found: Found, name: str | None = None, **options: A
 
 
 def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
-    """The image as RGB, by Pillow, and what else it has. Pillow's warnings stay away from the user."""
+    """The image as RGB, and the contents that are not read. The user does not see Pillow's warnings."""
     unread = []
     kinds = ", ".join(_FORMATS)
     many = Refused(f"{what} has over {MAX_PIXELS:,} pixels", _REMEDY)
@@ -153,7 +153,7 @@ def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
                 raise Refused(f"{what} has 16 bits a channel, and only 8 are read", _REMEDY)
             if image.mode not in ("1", "L", "LA", "P", "PA", "RGB", "RGBA"):
                 raise Refused(f"{what} has colours of the kind {image.mode}, not RGB", _REMEDY)
-            # Checksums, after which the image has to be opened again.
+            # This reads the checksums. Afterwards the image has to be opened again.
             image.verify()
             image = Image.open(io.BytesIO(data), formats=_FORMATS)
             if getattr(image, "n_frames", 1) > 1:
@@ -169,7 +169,7 @@ def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
             raise many from None
         except UnidentifiedImageError:
             raise Refused(f"{what} is damaged, or none of the kinds {kinds}", _REMEDY) from None
-        # Pillow raises whatever a damaged image makes it trip over.
+        # A damaged image may make Pillow raise any exception.
         except Exception as error:
             said = f" ({shown(str(error))})" if str(error) else ""
             raise Refused(f"{what} is damaged{said}", _REMEDY) from error
@@ -178,7 +178,7 @@ def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
 def _resampled(
     channel: np.ndarray, light: np.ndarray, size: tuple[int, ...], wrap: tuple[str, str], filter: str
 ) -> np.ndarray:
-    """A channel of codes in linear light at another size. A whole ratio takes means, as levels do."""
+    """A channel of codes, resampled in linear light. If sizes have a whole ratio, texels become means."""
     old = channel.shape[::-1]
     # Twice as many texels as a filter reaches beyond the border.
     pad = [2 + 2 * -(-before // after) for before, after in zip(old, size, strict=True)]

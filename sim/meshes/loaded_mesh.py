@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LoadedMesh", "assembled", "finished", "merged"]
 
-# How far from 0 to 1 a colour may lie by rounding.
+# Rounding may put a colour outside 0 to 1 by this much.
 _ROUNDED = 1e-6
 
 
@@ -39,16 +39,16 @@ class LoadedMesh:
         Stored vertex normals that were zero, not finite, or more than 1/256 off unit length, or that the
         file refers to but does not hold.
     dropped_faces : int
-        Dropped triangles without area: two corners are at one position, or no triangle shares a side. Other
-        triangles without area stay, because they close the seam between a side and its parts.
+        Dropped triangles without area: two corners are at the same position, or no triangle shares a side.
+        Other triangles without area stay, because they close the seam between a side and its parts.
     opposed_faces : int
-        Triangles whose stored normals all point against their winding. Their light falls on the other side.
+        Triangles whose stored normals all point against their winding. Light falls on their other side.
     materials : tuple of FileMaterial
         Materials that the mesh's ``material`` refers to, at least one. Each is used by a face, and any two
         differ in more than the name.
     ignored : tuple of str
-        Contents or references of the file that change a picture and are not read: alpha, textures other than
-        those of the colour, a missing image or material file, and the names that a reader does not know.
+        Contents or references of the file that belong to the picture and are not read: alpha, textures other
+        than those of the colour, a missing image or material file, and the names that a reader does not know.
     lights : tuple of Light
         Lights of a glTF file, in its unit of length; the brightest counts 1, see `placed_lights`.
     camera : Camera or None
@@ -76,9 +76,9 @@ def assembled(
 ) -> LoadedMesh:
     """All triangles of a scene in world coordinates, as one mesh.
 
-    If it is ``painted``, a part's metadata have the number of its ``"material"``. They may have ``"colors"``,
-    a float64 array of shape (V, 3), linear, and ``"coordinates"``, a float64 array of shape (V, 2), with v
-    from the top of the image.
+    If the scene is ``painted``, a part's metadata have the number of its ``"material"``. They may have
+    ``"colors"``, a float64 array of shape (V, 3), linear, and ``"coordinates"``, a float64 array of shape (V,
+    2), with v from the top of the image.
     """
     import trimesh
 
@@ -102,7 +102,7 @@ def assembled(
             wrong = triangles.min() if triangles.min() < 0 else triangles.max()
             raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {len(part)}")
         stored = np.full(part.shape, np.nan)
-        # Only the cache tells a stored normal from a computed one; asking for the property computes it.
+        # Only the cache shows whether normals were stored. Reading the property would compute them.
         has_normals = "vertex_normals" in geometry._cache
         if has_normals:
             stored = np.array(geometry.vertex_normals)
@@ -110,7 +110,8 @@ def assembled(
             lost += len(np.unique(triangles))
         if not np.array_equal(matrix, np.eye(4)):
             rotation = np.array(matrix[:3, :3])
-            # The cofactors are the inverse transpose times the determinant, and exist if it is 0.
+            # The cofactors are the inverse transpose times the determinant. They exist for determinant 0,
+            # too.
             cofactors = np.cross(np.roll(rotation, -1, axis=0), np.roll(rotation, -2, axis=0))
             mirrored = np.linalg.det(rotation) < 0
             part = part @ rotation.T + matrix[:3, 3]
@@ -141,7 +142,7 @@ def assembled(
 
 
 def _colors(given: np.ndarray | None, faces: np.ndarray, found: Found) -> np.ndarray | None:
-    """Colours of a part's vertices, 0 to 1; colours over 1 are told."""
+    """Colours of a part's vertices, 0 to 1. Colours over 1 are limited and recorded."""
     if given is None:
         return None
     used = np.unique(faces)
@@ -173,7 +174,7 @@ def _coordinates(given: np.ndarray | None, faces: np.ndarray) -> np.ndarray | No
 
 
 def _joined(parts: list[np.ndarray | None], vertices: list[np.ndarray], other: np.ndarray) -> np.ndarray:
-    """Values of all vertices, with another value where a part has none; no rows if no part has any."""
+    """Values of all vertices. A part without values gets ``other``. No rows if no part has values."""
     if all(part is None for part in parts):
         return other[:0]
     return np.concatenate(
@@ -185,7 +186,7 @@ def _joined(parts: list[np.ndarray | None], vertices: list[np.ndarray], other: n
 
 
 def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
-    """Matrix into the world, and name, of the geometry of every node that has one.
+    """Matrix into the world, and name, of the geometry of every node that has a geometry.
 
     The time of trimesh's own function grows with the cube of a node's depth in the tree.
     """
@@ -201,17 +202,17 @@ def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
 
 
 def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
-    """The mesh with the materials that its faces use, numbered from 0, equal ones merged.
+    """The mesh with the materials that its faces use, numbered from 0. Equal materials are merged.
 
-    The faces have four times the number of their material in the file, plus 2 if their vertices have colours,
-    plus 1 if these have texture coordinates.
+    The faces of ``loaded`` have four times the number of their material in the file, plus 2 if their vertices
+    have colours, plus 1 if the vertices have texture coordinates.
     """
     used = np.unique(loaded.mesh.material).tolist()
     read = {number: found.read(number) for number in sorted({kind // 4 for kind in used})}
     materials = {}
     for kind in used:
         material = read[kind // 4]
-        # White vertices are white, and not of the colour of a default.
+        # White vertices stay white. They do not take the default's diffuse colour.
         colored = kind & 2 > 0 and (len(loaded.mesh.colors) > 0 or material.diffuse is None)
         material = replace(material, colored=colored)
         if material.texture is not None and not kind & 1:
@@ -228,12 +229,14 @@ def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
 
 
 def merged(loaded: LoadedMesh, of: Mapping[int, FileMaterial]) -> LoadedMesh:
-    """A mesh with materials numbered from 0, equal ones merged; its faces have the keys of these materials.
+    """A mesh with materials numbered from 0. Equal materials are merged.
+
+    The faces of ``loaded`` have keys of ``of``, the materials.
 
     Raises
     ------
     Refused
-        If there are more than 1024.
+        If there are more than 1024 materials.
     """
     used, of_face = np.unique(loaded.mesh.material, return_inverse=True)
     places: dict[FileMaterial, int] = {}
@@ -268,9 +271,9 @@ def finished(
     lost: int,
     crease_angle: float,
 ) -> LoadedMesh:
-    """Mend stored normals, compute the others; materials keep the file's numbers.
+    """Make a mesh: mend stored normals, compute missing normals. Materials keep the file's numbers.
 
-    Faces without area stay where their sides join others, and are dropped where they join none.
+    A face without area stays if its sides join other faces, else it is dropped.
     """
     used = np.unique(faces)
     broken = len(used) - np.isfinite(vertices[used]).all(axis=1).sum()

@@ -9,15 +9,15 @@ from blysk.sim.meshes.refusal import ONE_MATERIAL, Refused, shown
 
 __all__ = ["FileMaterial", "Found", "color_of", "surfaces"]
 
-# k_a of a material whose k_d is the file's: most MTL files have a Ka of 1, which would wash the picture out.
+# k_a as a part of the file's k_d. Most MTL files have Ka 1, which would wash the picture out.
 _AMBIENT_SHARE = 0.1
-# From this metallic factor on, colours of vertices and texels are those of a metal.
+# From this metallic factor on, the albedo multiplies highlights, too, as of a metal.
 _TINTED = 0.5
-# Names of a kind in the list of what is not read; the others are counted.
+# Largest number of names of a kind in `Found.ignored`. Further names are counted.
 _MOST_NAMES = 12
 
 _SAID = ("ambient", "diffuse", "specular", "exponent", "roughness", "fresnel")
-# What a file says of the second does not count where the first is given.
+# If an option gives the first value of a pair, the file's second value has no effect.
 _INSTEAD = (("diffuse", "ambient"), ("exponent", "roughness"), ("specular", "fresnel"))
 
 
@@ -36,17 +36,17 @@ class FileMaterial:
     roughness : float or None
         Roughness, for the reflection models that have one in place of an exponent.
     fresnel, ambient : three floats or None
-        F_0 of `Material`, and k_a. ``None`` of k_a: a share of the diffuse colour.
+        F_0 of `Material`, and k_a. If k_a is ``None``, a tenth of the diffuse colour takes its place.
     two_sided : bool
         Whether its faces are seen from behind, too.
     texture : Texture or None
         Image that multiplies the diffuse colour.
     emission : three floats or None
-        Light of the surface itself, 0 or more.
+        Light that the surface emits, 0 or more.
     unlit : bool
         Whether the surface shows its diffuse colour, whatever the lights.
     metallic : float or None
-        Metallic factor, 0 to 1. The other values hold its effect on a surface of one colour.
+        Metallic factor, 0 to 1. The other values already have its effect on a surface of a single colour.
     colored : bool
         Whether colours of the vertices multiply the diffuse colour.
     """
@@ -69,7 +69,7 @@ class FileMaterial:
     def of_metallic_roughness(
         cls, name: str, base: Triple, metallic: float, roughness: float, two_sided: bool = False
     ) -> "FileMaterial":
-        """A material of glTF's factors, 0 to 1 each, see `Material.of_metallic_roughness`."""
+        """A material from glTF's factors, each 0 to 1, see `Material.of_metallic_roughness`."""
         made = Material.of_metallic_roughness(base, metallic, roughness, _AMBIENT_SHARE)
         return replace(cls._of(name, made, two_sided), metallic=float(metallic))
 
@@ -77,7 +77,7 @@ class FileMaterial:
     def of_specular_glossiness(
         cls, name: str, diffuse: Triple, specular: Triple, glossiness: float, two_sided: bool = False
     ) -> "FileMaterial":
-        """A material of an extension's factors, 0 to 1 each, see `Material.of_specular_glossiness`."""
+        """A material from specular and glossiness, each 0 to 1, see `Material.of_specular_glossiness`."""
         made = Material.of_specular_glossiness(diffuse, specular, glossiness, _AMBIENT_SHARE)
         return cls._of(name, made, two_sided)
 
@@ -93,15 +93,17 @@ class FileMaterial:
 
 @dataclass
 class Found:
-    """A file's materials, number 0 for faces without a material, and its contents that are not read.
+    """A file's materials, and a record of its contents that are not read.
+
+    Material number 0 is for faces without a material.
 
     Parameters
     ----------
     names : list of str
         Names of the materials.
     readers : list of callable or None
-        A function for each material that returns it, called if a face uses it. ``None`` if the file lacks the
-        material.
+        A function for each material, which returns the material. It is called if a face uses the material.
+        ``None`` if the file lacks the material.
     """
 
     names: list[str] = field(default_factory=lambda: [""])
@@ -110,17 +112,17 @@ class Found:
     _listed: dict[str, dict[str, None]] = field(default_factory=dict)
 
     def read(self, number: int) -> FileMaterial:
-        """One material."""
+        """The material with a number."""
         reader = self.readers[number]
         return FileMaterial(shown(self.names[number])) if reader is None else reader()
 
     def tell(self, what: str, many: str = "", count: int = 1) -> None:
-        """Tell contents that are not read, in words, or as a number if there is a plural."""
+        """Record contents that are not read: in words, and, if ``many`` has the plural, by their number."""
         if count:
             self._counts[what, many] = self._counts.get((what, many), 0) + count
 
     def tell_names(self, kind: str, names: Iterable[str], known: Container[str] = ()) -> None:
-        """Tell names of a kind that a reader does not know. Every reader lists the names that it knows."""
+        """Record the names of a kind that are not among the ``known`` names of a reader."""
         for name in names:
             if name not in known:
                 self._listed.setdefault(kind, {})[shown(name)] = None
@@ -158,16 +160,16 @@ def surfaces(
     If ``fixed`` has the exponent, the file's roughness does not count. In the same way the specular colour
     excludes the file's F_0, and the diffuse colour its k_a.
 
-    Colours of vertices and textures stay, and multiply the diffuse colour, also that of an option. A material
-    that has them and no diffuse colour gets white. They multiply highlights, too, if the metallic factor is
-    1/2 or more. An emission over 1 counts as 1, which already gives the brightest pixel.
+    Colours of vertices and textures multiply the diffuse colour, also if an option gives it. If a material
+    has them, and no diffuse colour, its diffuse colour is white. They multiply highlights, too, if the
+    metallic factor is 1/2 or more. An emission over 1 counts as 1, which already gives the brightest pixel.
 
     Parameters
     ----------
     materials : sequence of FileMaterial
         Materials of `load_mesh`.
     default : Material
-        Coefficients that the file does not give.
+        Coefficients for materials whose file does not give them.
     fixed : collection of str
         Fields of ``default`` that replace the values of all materials: ``"diffuse"`` and so on.
     """

@@ -1,4 +1,4 @@
-"""Meshes by file or by name, with unit vertex normals and materials. Every flaw is counted or reported."""
+"""Meshes from files, objects and arrays, with unit vertex normals and materials. Flaws are counted."""
 
 import io
 import logging
@@ -74,12 +74,12 @@ def load_mesh(
       the vertex.
 
     *Geometry.* All meshes of a scene are put together in world coordinates: vertices by the node's matrix
-    ``M``, normals by its inverse transpose. A mirroring node (``det M < 0``) turns the triangles round.
+    ``M``, normals by its inverse transpose. A mirroring node (``det M < 0``) reverses the order of corners.
     Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
     cover them and keep all their corners, concave polygons by ear clipping. Strips of PLY and glTF are drawn.
     Quantised and sparse arrays of glTF are read, and all instances of a node drawn. Morph weights and skins
     are not applied. A glTF file without scenes shows its root nodes. Invisible nodes (KHR_node_visibility)
-    are left out. Texts may begin with a byte order mark, and have any ends of lines.
+    are left out. Text files may begin with a byte order mark, and may have any line ends.
 
     *Materials.* Of a GLB or glTF file these are read:
 
@@ -93,15 +93,15 @@ def load_mesh(
       KHR_texture_transform, and its image in the buffer, in the text or in a file of the folder;
     - colours of vertices, COLOR_0, without alpha.
 
-    A sampler's filter for enlarging serves both ways. Levels are chosen, not blended.
+    A sampler's filter for enlarging also serves for reducing. Levels are chosen, not blended.
 
     Of an OBJ file these are read from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded,
     at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``; ``Ke``, ``illum 0``. The factors of
     glTF are linear, as k_d is. So they are used without conversion, and Kd, too. If a material file is
-    missing, or lacks a name, the colours are ``None``. Materials of no face are left out, and equal materials
-    merged.
+    missing, or lacks a name, the colours are ``None``. Materials that no face uses are left out, and equal
+    materials are merged.
 
-    *Colours of other formats* are read by the curve of sRGB:
+    *Colours of other formats* are decoded by the curve of sRGB:
 
     - of OBJ red, green and blue behind a position, and the image of ``map_Kd`` with ``-s``, ``-o`` and
       ``-clamp``;
@@ -115,10 +115,11 @@ def load_mesh(
     camera.
 
     *Looks.* In a mesh with colours of vertices other vertices are white. Colours over 1 count as 1, and are
-    told. Corners of equal normal are welded only if their colours and texture coordinates are equal, too. A
-    part without texture coordinates is drawn without its texture, and so is a part whose image is not there.
+    listed in ``ignored``. Corners of equal normal are welded only if their colours and texture coordinates
+    are equal, too. A part without texture coordinates is drawn without its texture, and so is a part whose
+    image is not there.
 
-    Contents that change a picture and are not read are in ``ignored``: other textures, alpha, ``illum``,
+    Contents that belong to the picture and are not read are in ``ignored``: other textures, alpha, ``illum``,
     smoothing groups, animations. Each reader has a list of the statements, keywords, properties, keys and
     extensions that it knows. Others are in ``ignored`` by their names.
 
@@ -134,7 +135,7 @@ def load_mesh(
     materials : bool
         Whether to read the file's materials and colours. If not, all faces have one material without values.
     lights : int
-        Most lights to read from a file: the brightest. 0: none.
+        Largest number of lights to read from a file. Of more lights the brightest are taken.
     local : bool
         Whether to read lights with a position.
     camera : bool
@@ -154,7 +155,7 @@ def load_mesh(
         - the file is missing, empty, of unknown type or damaged;
         - it refers to buffers outside its folder;
         - it needs a decoder that is not installed, or a glTF extension that is not supported;
-        - it has numbers in another form than the format's;
+        - its numbers are not written as the format demands;
         - it holds no triangle, a vertex that is not finite, an index out of range, nodes that form no trees,
           or more than 20 million triangles;
         - a used material has a colour that is not three numbers from 0 to 1, or an exponent over 1000;
@@ -173,7 +174,7 @@ def load_mesh(
         data = _read(path)
         with _quiet_trimesh():
             scene, found, views = _load_scene(path, data, materials, lights > 0, camera)
-        # Overflow and NaN are looked for, and reported, in what comes out.
+        # The results are checked for overflow and NaN.
         with np.errstate(over="ignore", invalid="ignore"):
             loaded = assembled(scene, found, path, data, crease_angle, materials)
             places = loaded.mesh.vertices
@@ -189,20 +190,20 @@ def load_mesh(
         raise
     except RecursionError as error:
         raise InputError(source, "is nested too deeply", REEXPORT) from error
-    # The loaders raise whatever a damaged file makes them trip over.
+    # A damaged file may make a loader raise any exception.
     except Exception as error:
         raise InputError(source, _fault(error), REEXPORT) from error
 
 
 def given_mesh(source: object, crease_angle: float = DEFAULT_CREASE) -> LoadedMesh:
-    """A mesh of another library, or of arrays, with its flaws mended as for a file.
+    """A mesh from trimesh or from arrays. Its flaws are mended as for a file.
 
     Parameters
     ----------
     source : trimesh.Trimesh or trimesh.Scene or sequence of arrays
-        Arrays are vertices, shape (V, 3), faces, shape (F, 3), from 0 and anticlockwise seen from outside,
-        and perhaps normals, one a vertex. Of trimesh's objects stored normals are kept. All faces have one
-        material.
+        Arrays are vertices, shape (V, 3), faces, shape (F, 3), and, if known, a normal for each vertex, shape
+        (V, 3). Faces count vertices from 0, anticlockwise seen from outside. Stored normals of trimesh's
+        objects are kept. All faces have the same material.
     crease_angle : float
         As for `load_mesh`, for a mesh without normals.
 
@@ -288,7 +289,7 @@ def _fault(error: Exception) -> str:
 
 @contextmanager
 def _quiet_trimesh():
-    """Keep trimesh's log off the terminal, and make NumPy's note on half-read numbers an error."""
+    """Keep trimesh's log off the terminal, and make NumPy's warning of half-read numbers an error."""
     logger = logging.getLogger("trimesh")
     level = logger.level
     logger.setLevel(logging.CRITICAL + 1)
@@ -319,7 +320,7 @@ def _read(path: Path) -> bytes:
 def _load_scene(
     path: Path, data: bytes, materials: bool, lights: bool, camera: bool
 ) -> "tuple[trimesh.Scene, Found, GltfViews]":
-    """A scene of trimesh, glTF by trimesh's loader; no file is opened that was not checked."""
+    """A scene of trimesh. Only glTF is read by trimesh's loader. No file is opened that was not checked."""
     none = GltfViews([], [])
     suffix, found = path.suffix.lower(), Found()
     if suffix == ".obj":
@@ -352,7 +353,7 @@ def _load_scene(
     views = gltf_views(document, lights, camera, found)
     arrays, looks = plain_arrays(document, buffers, texts, found)
     data = plain_gltf(document)
-    # Its import takes longer than to draw a small picture; only a file needs it.
+    # The import takes longer than drawing a small picture, and only a file needs it.
     import trimesh
 
     scene = trimesh.load_scene(io.BytesIO(data), file_type="gltf", resolver={"0": arrays}, process=False)

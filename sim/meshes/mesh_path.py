@@ -17,7 +17,7 @@ def check_mesh_path(path: Path) -> None:
     Raises
     ------
     Refused
-        If it does not.
+        If there is no such file, or its suffix is not known.
     OSError
         If the system refuses the path.
     """

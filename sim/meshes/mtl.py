@@ -22,9 +22,9 @@ from blysk.sim.run_files import reads
 
 __all__ = ["ObjImage", "find_obj_materials", "plain_lines"]
 
-# Keywords of materials that are read, and those that count only together with others that are told.
+# Keywords that are read, and keywords that have an effect only beside keywords of `_UNREAD`.
 _KNOWN = {"Kd", "Ks", "Ke", "Ns", "Pr", "Pm", "Ni", "sharpness", "Pcr", "anisor", "map_aat"}
-# Others, each with its meaning, and with the number that changes nothing.
+# Keywords that are not read: the meaning, and the number that changes nothing.
 _UNREAD = {
     "d": ("alpha", 1),
     "Tr": ("alpha", 0),
@@ -35,7 +35,7 @@ _UNREAD = {
     "aniso": ("anisotropy", 0),
     "illum": ("", 2),
 }
-# Bytes of a material file; 100,000 materials take less.
+# Largest material file in bytes; 100,000 materials take less.
 _MAX_LIBRARY = 16_000_000
 _IMAGE = re.compile(
     r"^[ \t]*(?:map_\w+|norm|bump|disp|decal|refl)[ \t]+(\S.*)$", re.MULTILINE | re.IGNORECASE
@@ -60,9 +60,9 @@ class ObjImage(NamedTuple):
 
     name: str
     target: Path | None
-    """``None`` if it is not read."""
+    """``None`` if the image is not read."""
     reason: str
-    """Why it is not read."""
+    """Why the image is not read."""
     scale: tuple[float, float]
     offset: tuple[float, float]
     wrap: str
@@ -70,7 +70,7 @@ class ObjImage(NamedTuple):
     """Options that are not read."""
 
     def placed(self, coordinates: np.ndarray) -> np.ndarray:
-        """Texture coordinates of `Texture`, of those of the file, whose v is 0 at the lower border."""
+        """Texture coordinates for `Texture`, from those of the file, where v is 0 at the lower border."""
         placed: np.ndarray = coordinates * self.scale + self.offset
         return np.column_stack([placed[:, 0], 1 - placed[:, 1]])
 
@@ -78,7 +78,7 @@ class ObjImage(NamedTuple):
 def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> dict[int, ObjImage]:
     """Find the materials' definitions in the material files, and the images of materials.
 
-    A definition, and an image, is read if a face uses it.
+    Definitions and images are read only if a face uses them.
     """
     blocks, commented = {}, {}
     for target in dict.fromkeys(file for name in libraries for file in _library_files(name, folder, found)):
@@ -113,7 +113,7 @@ def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> dict
     return images
 
 
-# Options of an image: the number of their values, at least and at most, and values that change nothing.
+# Options of an image: least and largest number of values, and a pattern of values that change nothing.
 _OPTIONS = {
     **{"-s": (1, 3, None), "-o": (1, 3, None), "-clamp": (1, 1, None), "-t": (1, 3, r"[0.\s]+")},
     **{"-mm": (2, 2, r"0(\.0*)?\s+1(\.0*)?"), "-blendu": (1, 1, "on"), "-blendv": (1, 1, "on")},
@@ -165,7 +165,7 @@ def _texture(
 
 
 def _library_files(name: str, folder: Path, found: Found) -> list[Path]:
-    """Files that a statement names, as a name with spaces, or as several names; others are told."""
+    """Files that a statement names: a name with spaces, or several names. Missing files are recorded."""
     bare = name.partition(" #")[0].strip()
     files, reasons = [], {}
     for part in dict.fromkeys([name, bare, *bare.split()]):
@@ -192,10 +192,10 @@ def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], f
     """A material of a material file.
 
     Texels of map_Kd multiply Kd, which is white if it is missing. Ke, without an image of its own, is light
-    of the surface itself. With illum 0 the surface shows Kd, whatever the lights.
+    that the surface emits. With illum 0 the surface shows Kd, whatever the lights.
 
     If the material has a roughness Pr or a metallic factor Pm, these replace Ks and Ns. A missing Pr is then
-    1, a missing Pm 0, and a missing Kd white. What else changes its look is told.
+    1, a missing Pm 0, and a missing Kd white. Other statements that change the look are recorded as not read.
     """
     values: dict[str, list[str]] = {}
     maps: dict[str, list[str]] = {}
@@ -204,7 +204,7 @@ def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], f
         is_map = re.match("map_|norm$|bump$|disp$|decal$|refl$", keyword.lower()) and keyword != "map_aat"
         if keyword:
             (maps if is_map else values)[keyword.lower() if is_map else keyword] = words
-    # Texels of map_Kd multiply ambient light, too.
+    # Texels of map_Kd multiply ambient light, too. So map_Ka with the same image counts as read.
     drawn = maps.pop("map_kd", None)
     others = [words for keyword, words in maps.items() if keyword != "map_ka" or words != drawn]
     found.tell("texture", "textures", len(others))
@@ -243,7 +243,7 @@ def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], f
 
 
 def _emission(words: list[str], name: str) -> Triple | None:
-    """Light of a material itself; ``None`` if it is 0."""
+    """Light that a material emits; ``None`` if it is 0."""
     numbers = [_float(word) for word in (words * 3 if len(words) == 1 else words)]
     if len(numbers) != 3 or not all(0 <= number < math.inf for number in numbers):
         raise Refused(
@@ -254,7 +254,7 @@ def _emission(words: list[str], name: str) -> Triple | None:
 
 
 def _unread(values: dict[str, list[str]]) -> Iterator[str]:
-    """Keywords of a material that change its look and are not read, with what they mean."""
+    """Keywords of a material that change its look and are not read, with their meanings."""
     for keyword, words in values.items():
         numbers = [_float(word) for word in words]
         meaning, neutral = _UNREAD.get(keyword, ("", math.nan))
@@ -263,7 +263,7 @@ def _unread(values: dict[str, list[str]]) -> Iterator[str]:
         if keyword == "Tr" and "d" in values:
             continue
         if keyword == "illum":
-            # 0 is without light, and 1 without a highlight.
+            # illum 0 is without lights, and illum 1 without a highlight.
             if words == ["0"] or (numbers == [1] and not any(map(_float, values.get("Ks", ["1"])))):
                 continue
             yield " ".join([keyword, *words])

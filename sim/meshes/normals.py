@@ -16,7 +16,7 @@ __all__ = [
 DEFAULT_CREASE = 40.0
 """Angle between faces, in degrees, over which an edge is sharp, for meshes without normals."""
 
-# The largest error of a stored normal's length that counts as rounding, itself stored in float32.
+# The largest error of a stored normal's length that counts as rounding; 1e-6 is for float32.
 _LENGTH_TOLERANCE = 1 / 256 + 1e-6
 # A triangle whose height is below this part of the largest coordinate is rounding only: 32 units of 2**-53.
 _FLAT = 2.0**-48
@@ -27,8 +27,9 @@ _COSINE_SLACK = 1e-6
 def face_directions(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit face normals, with flags. A face without area takes the normal of a neighbour.
 
-    The neighbour across its longest side goes first. So a face over corners on a straight side belongs to the
-    polygon of this side. A face with two corners at one position, or without a neighbour, has no normal.
+    The neighbour across its longest side goes first. So a face between corners of a straight side takes the
+    normal of the polygon at this side. A face with two corners at the same position, or without a neighbour,
+    has no normal.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def _places(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _shared_sides(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of sides between the same two places; side 3 f + k goes from corner k of face f to the next."""
+    """Pairs of sides between the same two places; side 3 f + k starts at corner k of face f."""
     start, end = places.ravel(), np.roll(places, -1, axis=1).ravel()
     edge = np.minimum(start, end) * (places.max() + 1) + np.maximum(start, end)
     order = np.argsort(edge, kind="stable")
@@ -91,7 +92,10 @@ def _shared_sides(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def weighted_normals(
     vertices: np.ndarray, faces: np.ndarray, face_normals: np.ndarray, owner: np.ndarray, owners: int
 ) -> np.ndarray:
-    """Angle-weighted unit sums of the unit face normals over the corners of each ``owner`` (F, 3)."""
+    """Unit sums of face normals, weighted by the angles of corners, for each owner.
+
+    ``owner``, shape (F, 3), has the owner of each corner, 0 to ``owners - 1``. Face normals have length 1.
+    """
     corners = vertices[faces]
     sides = np.roll(corners, -1, axis=1) - corners
     back = -np.roll(sides, 1, axis=1)
@@ -99,7 +103,7 @@ def weighted_normals(
     weighted = (face_normals[:, np.newaxis] * angles[..., np.newaxis]).reshape(-1, 3)
     flat = owner.ravel()
     total = np.stack([np.bincount(flat, weights=weighted[:, i], minlength=owners) for i in range(3)], axis=-1)
-    # Faces back to back cancel but for rounding, 1e-12 at most; one is as good as the other.
+    # Normals of faces back to back cancel, except for rounding up to 1e-12. Then either normal serves.
     cancelled = np.linalg.norm(total, axis=1) < 1e-12
     if cancelled.any():
         one = np.zeros(owners, dtype=np.int64)
@@ -111,7 +115,10 @@ def weighted_normals(
 def repaired_normals(
     vertices: np.ndarray, faces: np.ndarray, directions: np.ndarray, normals: np.ndarray, own: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Unit stored normals of vertices ``own``, and the number of mended normals; directions are of faces."""
+    """Unit stored normals of vertices ``own``, and the number of mended normals.
+
+    ``directions`` are the unit normals of the faces.
+    """
     stored = normals[own]
     usable = np.isfinite(stored).all(axis=1) & stored.any(axis=1)
     # The largest component bounds the length without overflow.
@@ -155,7 +162,7 @@ def crease_normals(
     smooth = cosine >= np.cos(np.radians(crease_angle)) - _COSINE_SLACK
     first, second = first[smooth], second[smooth]
 
-    # Their import takes longer than to draw a small picture.
+    # The imports take longer than drawing a small picture.
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

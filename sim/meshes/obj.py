@@ -19,11 +19,12 @@ _STATEMENTS = {"usemtl", "mtllib", "o", "g", "s", "vt"}
 
 
 def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
-    """An OBJ file with an object for each material, named by its number, and the names of its material files.
+    """An OBJ text with an object for each material, and the names of material files.
 
-    Statements of positions, normals, texture coordinates, faces and the objects stay, a line for each.
-    Statements of other kinds are told. A backslash at the end of a line continues the line, but not in a
-    comment. The text after ``#`` is part of a material's name, as in ``usemtl Material #25``, and no comment.
+    An object's name is the number of its material. Statements of positions, normals, texture coordinates,
+    faces and objects stay, a line for each. Statements of other kinds are recorded as not read. A backslash
+    at the end of a line continues the line, but not in a comment. The text after ``#`` is part of a
+    material's name, as in ``usemtl Material #25``, and no comment.
     """
     numbers = {"": 0}
     libraries = []
@@ -51,7 +52,7 @@ def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
     return data, libraries
 
 
-# Possessive: a line is looked at once.
+# Possessive quantifiers, so that a line is scanned once.
 _NUMBER = rb"[-+]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++|[nN][aA][nN]|[iI][nN][fF])(?:[eE][-+]?[0-9]++)?"
 _THREE = rb"%b(?:[ \t]++%b){2}+" % (_NUMBER, _NUMBER)
 _CORNER = rb"-?[0-9]++(?:/-?[0-9]*+){0,2}+"
@@ -59,14 +60,14 @@ _END = rb"[ \t]*+\r?$"
 
 
 def read_obj(data: bytes, found: Found, images: Mapping[int, ObjImage], painted: bool) -> list[Part]:
-    """Triangles of a text of `split_obj`.
+    """Triangles of a text from `split_obj`.
 
     Parameters
     ----------
     data : bytes
         The text.
     found : Found
-        Is told what is not read.
+        Records contents that are not read.
     images : mapping of int to ObjImage
         Images of materials. Texture coordinates of other materials are left out.
     painted : bool
@@ -75,8 +76,9 @@ def read_obj(data: bytes, found: Found, images: Mapping[int, ObjImage], painted:
     Raises
     ------
     Refused
-        If a number has another form than C's, or a position has a weight other than 1. If a face has fewer
-        than 3 corners, or an index of what is not there. If a colour is out of range.
+        - A number is not written as in C, or a position has a weight other than 1.
+        - A face has fewer than 3 corners, or an index without a vertex, normal or texture coordinates.
+        - A colour is out of range.
     """
     if re.search(rb"^(?:[ \t]++(?:v[nt]?|f)[ \t]|(?:v[nt]?|f)(?:\t| [ \t]))", data, re.MULTILINE):
         data = re.sub(rb"^[ \t]*(v[nt]?|f)[ \t]+", rb"\1 ", data, flags=re.MULTILINE)
@@ -131,13 +133,13 @@ def read_obj(data: bytes, found: Found, images: Mapping[int, ObjImage], painted:
 
 
 def _rows(data: bytes, keyword: bytes) -> np.ndarray:
-    """Three numbers of each statement."""
+    """The three numbers of each statement with a keyword."""
     numbers = b" ".join(re.findall(rb"^%b ([^\n]*)" % keyword, data, re.MULTILINE)).split()
     return np.array(numbers).astype(np.float64).reshape(-1, 3)
 
 
 def _coordinates(data: bytes) -> np.ndarray:
-    """Texture coordinates, two of each statement, v from below. A missing v is 0."""
+    """Texture coordinates, two of each statement; v is 0 at the lower border. A missing v is 0."""
     wrong = rb"^vt (?!%b(?:[ \t]++%b){0,2}+%b)([^\n]*)" % (_NUMBER, _NUMBER, _END)
     if bad := re.search(wrong, data, re.MULTILINE):
         raise Refused(f"texture coordinates are {shown(bad[1].decode().strip())!r}, not 1 to 3 numbers")
@@ -185,7 +187,7 @@ def _triangles(
 
 
 def _absolute(data: bytes) -> bytes:
-    """The text with absolute indices, in place of those that count back from their line."""
+    """The text with absolute indices, in place of indices that count back from their line."""
     counts = {b"v": 0, b"vt": 0, b"vn": 0}
 
     def absolute(corner):
@@ -213,8 +215,13 @@ def _absolute(data: bytes) -> bytes:
 def _positions(data: bytes, found: Found, painted: bool) -> tuple[bytes, np.ndarray | None]:
     """The text with three numbers for each position, and the colours behind positions, if there are any.
 
-    The numbers behind x, y, z are a weight; red, green, blue; these and alpha; or a weight and these. Of four
-    numbers the first is the weight if it is always 1 and the last is not.
+    The numbers behind x, y, z are, by their count:
+
+    - 1: a weight;
+    - 3: red, green, blue;
+    - 4: red, green, blue, alpha, or a weight, red, green, blue. The first is the weight if it is always 1
+      and the last is not;
+    - 5: a weight, red, green, blue, alpha.
     """
     wrong = rb"^(?:v (?!%b(?:[ \t]++%b){0,5}+%b)|vn (?!%b%b))([^\n]*)" % (_THREE, _NUMBER, _END, _THREE, _END)
     if bad := re.search(wrong, data, re.MULTILINE):

@@ -15,7 +15,7 @@ class Part(NamedTuple):
     """Triangles of one material. ``None``: the file has no values, or they are not used."""
 
     number: int
-    """Of the material."""
+    """Number of the material."""
     vertices: np.ndarray
     """Shape (V, 3)."""
     faces: np.ndarray
@@ -29,7 +29,7 @@ class Part(NamedTuple):
 
 
 def scene_of(parts: Iterable[Part]) -> "trimesh.Scene":
-    """A scene with a geometry for each part, with number, colours and coordinates as metadata."""
+    """A scene with a geometry for each part. Number, colours and coordinates are its metadata."""
     import trimesh
 
     scene = trimesh.Scene()

@@ -25,7 +25,7 @@ _TYPES = {
     **{f"{'u' * (kind[0] == 'u')}int{8 * int(kind[1])}": kind for kind in _KINDS.values()},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
-# Properties that are read, and those that say nothing of the look, or only where textures do.
+# Properties that are read, and properties that change nothing, or only the look of textures.
 _KNOWN = {
     "vertex": {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "texture_v"}
     | {"texture_s", "texture_t", "confidence", "intensity", "quality", "value", "flags", "radius"},
@@ -56,7 +56,7 @@ class _Element(NamedTuple):
 
 
 class _List(NamedTuple):
-    """A list of each row: the values of all lists, joined, and the length of each list."""
+    """A property with a list in each row: the values of all lists, joined, and the length of each list."""
 
     values: np.ndarray
     counts: np.ndarray
@@ -76,7 +76,7 @@ def read_ply(data: bytes, found: Found, painted: bool) -> tuple[list[Part], list
     data : bytes
         The file.
     found : Found
-        Is told what is not read.
+        Records contents that are not read.
     painted : bool
         Whether to read colours and texture coordinates.
 
@@ -89,8 +89,10 @@ def read_ply(data: bytes, found: Found, painted: bool) -> tuple[list[Part], list
     Raises
     ------
     Refused
-        If the header is damaged, or rows or bytes are missing. If a list has another length than its count,
-        or a face has fewer than 3 corners or a missing corner. If a colour is out of range.
+        - The header is damaged, or rows or bytes are missing.
+        - A list has another length than its count.
+        - A face has fewer than 3 corners, or a corner without a vertex.
+        - A colour is out of range.
     """
     order, elements, images, body = _header(data)
     columns: dict[str, _Columns] = {}
@@ -222,7 +224,7 @@ def _colors(vertex: _Columns, elements: list[_Element]) -> np.ndarray | None:
 
 
 def _tell(element: _Element, columns: _Columns, found: Found, painted: bool) -> None:
-    """Tell an element, or those of its properties, that change the look and are not read."""
+    """Record an unknown element, or its properties that may change the look and are not read."""
     if element.name not in _KNOWN:
         found.tell_names("elements", [element.name])
         return
@@ -240,7 +242,7 @@ def _tell(element: _Element, columns: _Columns, found: Found, painted: bool) -> 
 
 
 def _indices(columns: _Columns) -> _List | None:
-    """The list of vertices of an element: of the usual name, or the only list."""
+    """The list of vertices of an element: the list with the usual name, or the only list."""
     lists = {name: column for name, column in columns.items() if isinstance(column, _List)}
     name = next((name for name in ("vertex_indices", "vertex_index") if name in lists), None)
     if name is None and len(lists) != 1:
@@ -284,7 +286,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
         raise Refused("it is not a PLY file")
     for line in lines[1:]:
         words = line.split()
-        # A comment of several lines: some programs forget the word before the second.
+        # Some programs write a comment of several lines without the word comment on later lines.
         if not words or words[0] not in ("format", "element", "property"):
             if [word.lower() for word in words[:2]] == ["comment", "texturefile"] and len(words) > 2:
                 images.append(line.split(maxsplit=2)[2])
@@ -363,7 +365,7 @@ def _binary(element: _Element, body: bytes, start: int, order: str) -> tuple[_Co
                 raise Refused("a list has a wrong count")
             cursor += kind.itemsize
         cursor += np.dtype(each.kind).itemsize * (counts[-1] if each.count else 1)
-    # Most files have lists of one length only, of which one row's type tells all.
+    # In most files all lists of a property have the same length, and all rows the type of the first row.
     remaining = iter(counts)
     row = []
     for each in element.properties:

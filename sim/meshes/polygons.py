@@ -1,4 +1,4 @@
-"""Triangles of polygons, concave ones included."""
+"""Triangles of polygons, also of concave polygons."""
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -10,9 +10,9 @@ from blysk.sim.meshes.refusal import Refused
 
 __all__ = ["check_corners", "cut_polygons", "triangulated"]
 
-# Twice the area of a triangle that counts as none, over that of its polygon: rounding only.
+# A triangle counts as without area if its area over that of its polygon is at most this: rounding only.
 _FLAT = 2.0**-40
-# First corners that are tried for a fan.
+# Largest number of corners that are tried as the centre of a fan.
 _FANS = 16
 
 
@@ -26,7 +26,7 @@ def check_corners(corners: np.ndarray, vertices: int) -> None:
 def cut_polygons(
     vertices: np.ndarray, corners: np.ndarray, counts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cut polygons of any counts of corners into triangles, see `triangulated`.
+    """Cut polygons with any numbers of corners into triangles, see `triangulated`.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray
     fan = np.array([(0, k, k + 1) for k in range(1, sides - 1)])
     if sides == 3:
         return np.repeat(fan, count, axis=0), np.arange(count)
-    # Relative to a corner, so that a polygon far from the origin loses nothing; of a size near 1.
+    # Places count from a corner, so that a polygon far from the origin loses no bits. Their size is near 1.
     places = vertices[polygons] - vertices[polygons[:, :1]]
     largest = np.abs(places).max(axis=(1, 2), keepdims=True)
     places = np.divide(places, largest, out=np.zeros_like(places), where=np.isfinite(largest) & (largest > 0))
@@ -128,7 +128,7 @@ def _ears(places: np.ndarray, area: np.ndarray) -> np.ndarray:
         triangles = triangles[:, ::-1]
     whole = _completed(triangles.tolist(), len(flat))
     if not _keeps_sides(whole, len(flat)):
-        # Of a polygon that crosses itself.
+        # The polygon crosses itself.
         whole = [[0, k, k + 1] for k in range(1, len(flat) - 1)]
     return _improved(flat, whole, _FLAT * np.linalg.norm(area))
 
@@ -146,7 +146,7 @@ def _sides(triangle: Sequence[int]) -> Iterator[tuple[int, int]]:
 
 
 def _completed(triangles: list[list[int]], count: int) -> list[list[int]]:
-    """Triangles of earcut, and those with the corners and the parts that earcut left out.
+    """Triangles of earcut, and triangles of the corners and parts that earcut left out.
 
     earcut leaves out corners on straight sides, spikes, and what it cannot cut. The missing parts are loops
     of sides of the polygon and of sides of triangles; each is cut as a fan.
@@ -175,7 +175,7 @@ def _completed(triangles: list[list[int]], count: int) -> list[list[int]]:
 
 
 def _keeps_sides(triangles: list[list[int]], count: int) -> bool:
-    """Whether the sides that no other triangle shares are those of the polygon, each once."""
+    """Whether the sides that no other triangle shares are the sides of the polygon, each once."""
     taken = {side for triangle in triangles for side in _sides(triangle)}
     alone = {(a, b) for a, b in taken if (b, a) not in taken}
     once = len(taken) == 3 * len(triangles) == 3 * (count - 2)
@@ -183,7 +183,7 @@ def _keeps_sides(triangles: list[list[int]], count: int) -> bool:
 
 
 def _improved(flat: np.ndarray, triangles: list[list[int]], least: float) -> np.ndarray:
-    """Triangles of one polygon; those without area exchange a side if two with area come of it."""
+    """Triangles of a polygon. One without area exchanges a side with a neighbour if both get an area."""
     result = np.array(triangles)
     across = {side: (k, c) for k, t in enumerate(triangles) for side, c in zip(_sides(t), t, strict=True)}
     waiting = np.flatnonzero(_doubled_areas(flat, result) <= least).tolist()

@@ -17,7 +17,7 @@ ONE_MATERIAL = "mend it, or shade the mesh with one material"
 
 
 class Refused(Exception):
-    """A file is refused. It has reason and remedy, and the caller adds the file's name."""
+    """A file is refused. The exception has reason and remedy, and the caller adds the file's name."""
 
     def __init__(self, reason: str, remedy: str = REEXPORT):
         super().__init__(reason)
@@ -40,7 +40,7 @@ def refers(folder: Path, *names: str) -> None:
 def inside(folder: Path, reference: str, name: str | None = None) -> Path:
     """The file that a reference means, in the folder or below; `Refused` if outside. It need not exist."""
     name = reference if name is None else name
-    # Of a name that is too long, or links in a circle, `Path` has exceptions to tell.
+    # For a name that is too long, and for links in a circle, `Path.resolve` may raise exceptions.
     target = Path(os.path.realpath(folder / name))
     outside = re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", reference) or reference.startswith(("/", "\\"))
     if outside or ".." in Path(name).parts or not target.is_relative_to(folder.resolve()):

@@ -13,34 +13,34 @@ from blysk.sim.meshes.refusal import Refused, shown
 
 __all__ = ["read_stl"]
 
-# First words of lines of a text.
+# Known first words of lines in a text file.
 _KNOWN = {"solid", "endsolid", "facet", "endfacet", "normal", "outer", "loop", "endloop", "vertex", "end"}
 
 
 def read_stl(data: bytes, found: Found, painted: bool) -> Part:
     """Triangles of an STL file, each with vertices of its own. Facet normals follow from the vertices.
 
-    Facets of a binary file may have colours, 5 bits a channel, by the curve of sRGB:
+    Facets of a binary file may have colours, 5 bits a channel, encoded by the curve of sRGB:
 
     - Red has the highest bits. Bit 15 says that there is a colour. (VisCAM, SolidView)
     - If the header has ``COLOR=`` with the colour of the solid, red has the lowest bits. Bit 15 says that the
-      facet has the colour of the solid. If all attributes are 0, all facets have it. (Materialise)
+      facet has the colour of the solid. If all attributes are 0, all facets have this colour. (Materialise)
 
     Parameters
     ----------
     data : bytes
         The file.
     found : Found
-        Is told what is not read.
+        Records contents that are not read.
     painted : bool
         Whether to read colours.
 
     Raises
     ------
     Refused
-        If the file is cut short, or a facet of a text has other than three vertices of three numbers.
+        If the file is cut short, or a facet of a text does not have three vertices of three numbers.
     """
-    # The count of a binary file holds a byte of 0, unless it is of 17 million triangles.
+    # The count in a binary file has a byte 0, unless the file has about 17 million triangles or more.
     text = is_wide(data) or b"\0" not in data.rstrip(b"\0")
     if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
         text = False

@@ -6,7 +6,7 @@ __all__ = ["strip_triangles"]
 
 
 def strip_triangles(corners: np.ndarray) -> np.ndarray:
-    """Triangles of strips. Number i of a strip has its corners i, i + 1, i + 2, turned round if i is odd.
+    """Triangles of strips. Triangle i has the corners i, i + 1, i + 2, in reverse order if i is odd.
 
     Triangles with a corner twice, which join strips, are left out.
 

@@ -69,7 +69,7 @@ def _surface(segments: int) -> tuple[np.ndarray, np.ndarray]:
         return _contract(along_v, rows.transpose(2, 1, 0, 3)).transpose(1, 2, 0, 3)
 
     points, du, dv = evaluate(basis, basis), evaluate(slope, basis), evaluate(basis, slope)
-    # On a row that is one point dS/dv is 0; its limit direction as u goes to 0 is d2S/dudv.
+    # On a row that is one point, dS/dv is 0. As u goes to 0, its direction goes to that of d2S/dudv.
     collapsed = (np.ptp(control_points()[:, 0], axis=1) == 0).all(axis=-1)
     points[collapsed, 0] = control_points()[collapsed, 0, :1]
     dv[collapsed, 0] = evaluate(slope[:, :1], slope)[collapsed, 0]
@@ -88,8 +88,8 @@ def teapot(triangles: int = 10_000) -> Mesh:
     Parameters
     ----------
     triangles : int
-        Wanted number of triangles, 64 to 4,000,000. The made number is the ``64 n^2 - 8 n`` nearest to it, at
-        most ``8 sqrt(triangles) + 32`` away. ``len(mesh.faces)`` tells it.
+        Wanted number of triangles, 64 to 4,000,000. The mesh has the nearest number of the form
+        ``64 n^2 - 8 n``, at most ``8 sqrt(triangles) + 32`` away.
 
     Returns
     -------
@@ -125,13 +125,14 @@ def teapot(triangles: int = 10_000) -> Mesh:
     border = np.ones(points.shape[1:3], dtype=bool)
     border[1:-1, 1:-1] = False
     border = index[:, border].ravel()
-    # Handle and body touch in a vertex: same point, other normal, so the normal is part of the key.
+    # Handle and body touch in a vertex with two normals. So the normal is part of the key.
     key = np.hstack([vertices[border], np.round(normals[border], 6) + 0.0])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     target = index.ravel().copy()
     target[border] = border[first][group.ravel()]
     faces = target[faces]
-    # A corner met twice at the knob and the bottom; three corners in a line at the spout's lip for n = 1.
+    # Drop triangles without area. At the knob and the bottom a corner occurs twice. At the spout's lip three
+    # corners are in a line if n = 1.
     corner = vertices[faces[:, 0]]
     faces = faces[np.cross(vertices[faces[:, 1]] - corner, vertices[faces[:, 2]] - corner).any(axis=1)]
 

@@ -15,7 +15,7 @@ def main() -> int:
     """Build the model, run the test; 0 if it passes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--simulator", choices=("icarus", "verilator"), default="icarus")
-    parser.add_argument("--seed", type=int, default=1, help="of the random pauses")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the random pauses")
     parser.add_argument("--waves", action="store_true", help="write waveforms into sim_build")
     options = parser.parse_args()
 

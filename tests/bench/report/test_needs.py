@@ -26,7 +26,7 @@ WHY = {
     "matt teapot, k_s = 0": "no specular path: every k_s is 0",
     "teapot in ambient light": "no light path",
     "grey teapot": "one channel of three",
-    "three materials alike": "no memory of materials: 1 of 3 differ",
+    "three materials alike": "no memory of materials: 1 of 3 are distinct",
     "one of two lights is off": "1 of 2 lights",
     "floor lit from behind, exponent 500": "the gate proves that no span holds a highlight",
     "steel ring, two lights": "exponent fixed at 120",

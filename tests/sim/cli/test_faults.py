@@ -227,7 +227,7 @@ def measured(number, mark):
 
 def test_killed_worker_of_a_sweep(cache, tmp_path):
     tasks = [Task(measured, {"number": number, "mark": str(tmp_path / "mark")}) for number in range(6)]
-    reason = "^--jobs 1: a process died, perhaps because memory ran out; use fewer, or smaller pictures$"
+    reason = "^--jobs 1: a process died, perhaps because memory ran out; use fewer jobs, or smaller pictures$"
     with pytest.raises(InputError, match=reason), local_executor(1) as executor:
         results_of(tasks, executor)
     kept = {path: path.read_bytes() for path in (cache / "results").iterdir()}
@@ -256,7 +256,7 @@ def test_killed_worker_of_a_command(cache):
     os.kill(int(worker), signal.SIGKILL)
     output, errors = process.communicate(timeout=60)
     assert (process.returncode, output) == (2, "")
-    reason = "a process died, perhaps because memory ran out; use fewer, or smaller pictures"
+    reason = "a process died, perhaps because memory ran out; use fewer jobs, or smaller pictures"
     told = [line for line in errors.splitlines() if "measurements]" not in line]
     assert told == [f"blysk: --jobs 2: {reason}"]
     kept = {path: path.stat().st_mtime_ns for path in left_in(cache / "results")}

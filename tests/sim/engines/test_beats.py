@@ -171,7 +171,7 @@ def test_wrong_fields():
         ({"x": [1], "n": [[0, 0, 0]]}, r"n must be an array of 2 elements a beat"),
         ({"x": [1], "n": [0]}, r"n must be an array of 2 elements a beat"),
         ({"x": [[1]], "n": [[0, 0]]}, r"x must be one integer a beat, not an array of shape \(1, 1\)"),
-        ({"x": [1, 2], "n": [[0, 0]]}, "every field must have as many beats, not 1 and 2"),
+        ({"x": [1, 2], "n": [[0, 0]]}, "all fields must have equally many beats, not 1 and 2"),
     ):
         with pytest.raises(ValueError, match=f"^{message}$"):
             pack(LAYOUT, beats)

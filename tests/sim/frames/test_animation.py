@@ -206,7 +206,7 @@ def test_a_process_that_dies(animation, cameras):
             list(render_frames(executor, cameras))
 
     children = set(multiprocessing.active_children())
-    with pytest.raises(InputError, match=r"--jobs 1: a process died, .*; use fewer"):
+    with pytest.raises(InputError, match=r"--jobs 1: a process died, .*; use fewer jobs"):
         killed()
     # The pool itself reaps what was killed while it was being told.
     deadline = time.monotonic() + 20
@@ -258,7 +258,9 @@ def test_nobody_at_the_address(animation, monkeypatch):
     pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     monkeypatch.setattr("blysk.sim.frames.workers._CONNECT_SECONDS", 1)
     with (
-        pytest.raises(InputError, match=r"no Dask scheduler answers \(.*; start one with `dask scheduler`"),
+        pytest.raises(
+            InputError, match=r"no Dask scheduler answers \(.*; start a scheduler with `dask scheduler`"
+        ),
         dask_executor(animation, "tcp://127.0.0.1:1"),
     ):
         pass

@@ -236,7 +236,7 @@ def test_simulation_that_is_not_the_model(monkeypatch):
 
 def test_pixels_that_were_not_asked_for(simulator, monkeypatch):
     changed(monkeypatch, "x")
-    with pytest.raises(SimulationError, match="answered with other pixels"):
+    with pytest.raises(SimulationError, match="gave pixels at other coordinates"):
         simulator.render(scene_of("240", (24, 18)))
 
 

@@ -141,10 +141,10 @@ def test_equal_materials():
     other = replace(CLAY, diffuse=(0.1, 0.2, 0.3))
     scene = scene_of((CLAY, other, CLAY), mesh=mesh)
     special = fitted(scene, full_of(scene))
-    assert reasons(special)["materials"] == "a smaller memory of materials: 2 of 3 differ"
+    assert reasons(special)["materials"] == "a smaller memory of materials: 2 of 3 are distinct"
     scene = scene_of((CLAY, CLAY, CLAY), mesh=mesh)
     special = fitted(scene, full_of(scene))
-    assert reasons(special)["materials"] == "no memory of materials: 1 of 3 differ"
+    assert reasons(special)["materials"] == "no memory of materials: 1 of 3 are distinct"
     assert (special.design.materials, special.design.build.exponent) == (1, 50)
     full = cost_of(ShadingPipelineUnit(special.full))
     assert cost_of(ShadingPipelineUnit(special.design)).ram_bits < full.ram_bits
