@@ -30,11 +30,11 @@ class AngularSetupUnit(PipelinedUnit):
 
     `AngularSetup`, the bit-accurate model, has equations, tables, formats and the error bound.
 
-    A beat needs 26 multiplications: five dot products of three, six of the half chord, two more
-    interpolations, x, y and the step. With the initiation interval I they share ``ceil(26/I)`` multipliers
-    (`dataflow`). With ``angle="arccos"`` the pipelined arccos unit, which has two multipliers, takes the
-    place of the half chord. One multiplication, which converts psi to turns, takes the place of six. There
-    are then ``2 + ceil(21/I)`` multipliers. Results are the same for every I.
+    A beat needs 26 multiplications: three for each of five dot products, six for the half chord, two for
+    further interpolations, and one each for x, y and the step. With the initiation interval I they share
+    ``ceil(26/I)`` multipliers (`dataflow`). With ``angle="arccos"`` the pipelined arccos unit takes the place
+    of the half chord. It has two multipliers of its own. One multiplication from radians to turns takes the
+    place of six. There are then ``2 + ceil(21/I)`` multipliers. Results are the same for every I.
 
     =================== == == == == == ==
     initiation interval 1  2  3  4  5  6
@@ -176,7 +176,7 @@ class AngularSetupUnit(PipelinedUnit):
         g, p = self._graph, self.model
 
         def exact(cross):
-            # The square of the code of length 1 is 2^-16 under 1.
+            # The square of the code of length 1 is less than 1 by 2^-16.
             code = Value.cast(cross)
             return FixedValue(cross.format, (code + (code >> 16))[: len(code)].as_signed())
 
@@ -204,7 +204,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register("turns", lambda turns: Value.cast(turns.extend(p.ANGLE_FORMAT)), turns)
 
     def _looked_up(self, name: str, table, address: Word, fraction: Word, sign: int, format) -> Word:
-        """Interpolated word of a table, rounded to a format: seven cycles at least."""
+        """Interpolated word of a table, rounded to a format. It takes at least seven cycles."""
         g = self._graph
         values, changes = table
         width = changes.format.width
@@ -229,7 +229,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register(f"{name}_result", lambda rounded: rounded.saturate(format), rounded)
 
     def _address(self, name: str, bits: Word, width: int) -> tuple[Word, Word]:
-        """Address of a table, from the leading bits, and the fraction that follows it."""
+        """Address of a table, from the leading bits, and the fraction, from the bits below."""
         g, p = self._graph, self.model
         below = width - p.ADDRESS_BITS
         return (
@@ -304,7 +304,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register("step", lambda step, shift: (step >> shift[:3])[:40], step, step_shift)
 
     def _polar(self, x: Word, y: Word, obtuse: Word) -> tuple[Word, Word]:
-        """Words of cos beta and of the direction, by one step of CORDIC a cycle."""
+        """Words of cos beta and of the direction, by CORDIC with one step on each cycle."""
         g, p = self._graph, self.model
         width, direction_width = p.ROTATED_FORMAT.width, p.DIRECTION_FORMAT.width
         first, second = (
@@ -317,7 +317,7 @@ class AngularSetupUnit(PipelinedUnit):
         def negated(value, x):
             return Mux(x[-1], -value, value)[:width].as_signed()
 
-        # Half a turn where x is negative.
+        # If x is negative, the vector is turned by half a turn.
         y = g.register("cordic_y", negated, second, first)
         x = g.register("cordic_x", negated, first, first)
         direction = g.register(

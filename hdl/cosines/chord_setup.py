@@ -1,4 +1,4 @@
-"""Chord setup unit: forward differences of N·L and of half the squared chord, from three values a span."""
+"""Chord setup unit: forward differences of N·L and half the squared chord, from three values of a span."""
 
 from amaranth.hdl import Cat, Const, Signal, Value, unsigned
 from amaranth.lib import data
@@ -30,7 +30,7 @@ def light_values_shape(lights: int, *, highlights: bool = True) -> data.ArrayLay
     lights : int
         Number of lights.
     highlights : bool
-        Whether there is u.
+        Whether there is specular light, and so u.
     """
     light = {"diffuse": FixedShape(ChordSetup.DIFFUSE_FORMAT)}
     if highlights:
@@ -47,14 +47,14 @@ def span_values_shape(lights: int, highlights: bool = True) -> data.ArrayLayout:
 
 
 def span_factors_shape(factors: int) -> data.ArrayLayout:
-    """Shape of the factors of fading lights, at the same three pixels, in the format of N·L."""
+    """Shape of the factors of fading lights at the same three places, in the format of N·L."""
     return data.ArrayLayout(data.ArrayLayout(FixedShape(ChordSetup.DIFFUSE_FORMAT), 3), factors)
 
 
 def span_operands_shape(
     lights: int, highlights: bool = True, length_bits: int = LENGTH_BITS, factors: int = 0
 ) -> data.StructLayout:
-    """Shape of a span: `span_values_shape`, with factors `span_factors_shape`, and the length."""
+    """Shape of a span: `span_values_shape`, with factors also `span_factors_shape`, and the length."""
     members: dict = {"values": span_values_shape(lights, highlights)}
     if factors:
         members["factors"] = span_factors_shape(factors)
@@ -64,7 +64,7 @@ def span_operands_shape(
 def chord_differences_shape(
     lights: int, highlights: bool = True, model: ChordSetup | None = None, factors: int = 0
 ) -> data.StructLayout:
-    """Shape of a span's differences, of N·L and u for each light and of the factors, and ``out_of_range``."""
+    """Shape of a span's differences for N·L and u of each light and for factors, and ``out_of_range``."""
     format = (model or ChordSetup()).format
     names = ("diffuse", "highlight") if highlights else ("diffuse",)
     differences = data.StructLayout({"first": FixedShape(format), "second": FixedShape(format)})
@@ -80,10 +80,10 @@ class ChordSetupUnit(PipelinedUnit):
     `ChordSetup`, the bit-accurate model, has formats and error bounds.
 
     A span has one product for its step, 3 for each u (with highlights), 2 for each f and 2 for each factor.
-    They share multipliers of 18x18 bits, 2 for one light and an initiation interval of 3. The attribute
-    ``multipliers`` is their number. Beats may come any number of cycles apart, at least the interval. A table
-    of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The attribute ``latency`` depends on
-    how the products share the multipliers.
+    The products share multipliers of 18x18 bits. For one light and an initiation interval of 3 there are 2
+    multipliers. The attribute ``multipliers`` is their number. Beats may come any number of cycles apart,
+    from the interval on. A table of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals. The
+    attribute ``latency`` depends on how the products share the multipliers.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ class ChordSetupUnit(PipelinedUnit):
         return slope, curvature
 
     def _flag(self, name: str, exact: Word, format: Format) -> Word:
-        """Whether a signed format of the same fraction bits does not hold a value."""
+        """Whether a value is outside a signed format with the same fraction bits."""
 
         def exceeds(value):
             above = value.as_value()[format.width - 1 :]
@@ -248,7 +248,7 @@ def step_words(
     graph : Dataflow
         Graph that gets the words.
     length : Word
-        Pixels, 1 or more.
+        Length of the span, 1 or more.
     length_bits : int
         Bits of the length, 2 to 12.
 

@@ -46,7 +46,7 @@ class HalfChordUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"chord_squared": UQ(2, 34), "supplement": 1})))`
-        ``|N_r - N_l|^2`` and 0. Beyond 90 degrees ``|N_r + N_l|^2`` and 1.
+        ``|N_r - N_l|^2`` and 0. For an angle over 90 degrees ``|N_r + N_l|^2`` and 1.
     o : :py:`Out(stream.Signature(UQ(0, 36)))`
         Angle in turns, 0 to 1/2.
 

@@ -103,7 +103,7 @@ class HighlightCosineUnit(wiring.Component):
             for name in carried:
                 carried[name] = register(m, carried[name], f"{name}_{stage}")
 
-        # Inverted bits take the place of the negative, which needs a carry. The error is 2^-40 turns.
+        # Inverted bits replace the negative, which would need a carry. The error is 2^-40 turns.
         magnitude = Mux(theta[39], ~theta, theta)[:39]
         angle = register(m, Mux(magnitude[38], ~magnitude, magnitude)[:38], "angle_2")
         carried["back"] = magnitude[38]

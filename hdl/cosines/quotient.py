@@ -1,4 +1,4 @@
-"""Quotient unit: N·L and the place of the squared sine, by one reciprocal root a pixel."""
+"""Quotient unit: N·L and the place of the squared sine, by one reciprocal root for each pixel."""
 
 from amaranth.hdl import Cat, Const, Mux, Signal, Value
 from amaranth.lib import data
@@ -23,6 +23,8 @@ __all__ = ["QuotientUnit", "pixel_words_shape", "quotients_shape"]
 def pixel_words_shape(spans: QuotientSpans) -> data.StructLayout:
     """Shape of the words of a pixel: m, w, l and ``z < 0``, and a bit that alternates from span to span.
 
+    `QuotientSpans` defines m, w, l and z.
+
     Parameters
     ----------
     spans : QuotientSpans
@@ -38,7 +40,7 @@ def pixel_words_shape(spans: QuotientSpans) -> data.StructLayout:
 
 
 def quotients_shape(model: Quotient) -> data.StructLayout:
-    """Shape of N·L and a place for each light, ``out_of_range``, and the bit that passes.
+    """Shape of N·L and a place for each light, ``out_of_range``, and ``span``, the bit of the pixel.
 
     Parameters
     ----------
@@ -57,12 +59,13 @@ class QuotientUnit(PipelinedUnit):
 
     `Quotient`, the bit-accurate model, has formats, table and error bounds.
 
-    One product makes r from the table, and one makes r^2. Each light has a product for N·L and a product for
-    s. Without highlights there is no r^2, and no s. With an initiation interval of 1 each product has a
-    multiplier. With a longer interval the products share ``ceil((2 + 2 lights) / initiation_interval)``
-    multipliers, without highlights ``ceil((1 + lights) / initiation_interval)``. The latency follows from the
-    graph. At intervals of 1 to 5 it is 16, 22, 21, 24, 25 cycles with one light, and 16, 22, 22, 23, 21 with
-    two. Without highlights it is 10 at an interval of 1.
+    One product makes the reciprocal root r from the table, and one makes r^2. Each light has a product for
+    N·L and a product for s. Without highlights there is no r^2, and no s. With an initiation interval of 1
+    each product has a multiplier. With a longer interval the products share
+    ``ceil((2 + 2 lights) / initiation_interval)`` multipliers, without highlights
+    ``ceil((1 + lights) / initiation_interval)``. The latency follows from the graph. At intervals of 1 to 5
+    it is 16, 22, 21, 24, 25 cycles with one light, and 16, 22, 22, 23, 21 with two. Without highlights it is
+    10 at an interval of 1.
 
     Parameters
     ----------
@@ -158,7 +161,7 @@ class QuotientUnit(PipelinedUnit):
             if not spans.mirror:
                 marks[f"second_{k}"] = compared[-1][1]
                 marks[f"away_{k}"] = g.input(f"away_{k}", lambda operands, k=k: operands.away[k], "z < 0")
-        # All bits that wait for the end wait in one word.
+        # All bits that are needed at the end wait together in one word.
         together = g.register("marks", lambda *bits: Cat(bits), *marks.values())
         marks = {
             name: g.wire(f"mark_{name}", lambda bits, place=place: bits[place], together)
@@ -241,7 +244,7 @@ class QuotientUnit(PipelinedUnit):
         return chosen, second
 
     def _place(self, light: int, chosen: Word, shift: Word, square_root: Word, marks: list[Word]) -> Word:
-        """Word of the place of a light. Except for R·V it has marks: the part, and ``z < 0``."""
+        """Word of the place of a light. ``marks`` are the part and ``z < 0``; for R·V there are no marks."""
         p, g, mirror = self.model, self._graph, self.model.spans.mirror
         width, name = p.PIXEL_FRACTION + 2, f"{light}"
 
@@ -281,8 +284,8 @@ class QuotientUnit(PipelinedUnit):
         )
 
         def row(octaves, away=0):
-            # Below the octaves, from OCTAVES = 15 on, the leading 1 is a part of the position, too. The
-            # largest octave is 4 GROUPS + 5.
+            # From OCTAVES = 15 on, below the octaves of the table, the leading 1 is a part of the position.
+            # The largest octave is 4 GROUPS + 5.
             under = ~octaves[5] & (octaves[4] | octaves[:4].all())
             low = Mux(under, octaves[:4] - (OCTAVES - 1), 0)[:4]
             past = octaves[5] | (~octaves.any() if mirror else away)

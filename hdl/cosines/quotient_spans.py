@@ -43,21 +43,22 @@ def line_directions_shape(model: QuotientSpans) -> data.ArrayLayout:
 class QuotientSpansUnit(wiring.Component):
     """Words of every pixel of spans, first pixel first; `QuotientSpans` is the bit-accurate model.
 
-    *Setup.* The multipliers make ``v·v``, ``v·d`` and ``d·d`` of a span in turns, three cycles in all. A span
-    of one pixel needs ``v·v`` alone, and one cycle. Every squared component has a multiplier, and every l has
-    two. These are 5 multipliers for a light with highlights of N·H, 6 with highlights of R·V, and 4 more for
-    each further light. Without highlights there are 3. Differences wait in registers behind the shifts,
-    starts in a memory of `DEPTH` words. So the differences of a span pass the starts of the spans before it.
+    *Setup.* The multipliers make ``v·v``, ``v·d`` and ``d·d`` of a span's start v and step d in turns, three
+    cycles in all. A span of one pixel needs ``v·v`` alone, and one cycle. Every squared component has a
+    multiplier, and every l has two. These are 5 multipliers for a light with highlights of N·H, 6 with
+    highlights of R·V, and 4 more for each further light. Without highlights there are 3. Differences wait in
+    registers behind the shifts, and starts wait in a memory of `DEPTH` words. So the differences of a span
+    pass the starts of the spans before it.
 
     *Serial setup.* One multiplier makes all products of a span one after the other, in three turns: for
     second differences, for first differences, for the start. Each turn waits until the words of its kind from
     the span before were taken. A turn has P products: two for each line and one for each square. A span takes
-    3 P cycles, or ``P + 6`` if it has one pixel. All sums have one shift, and a start waits in registers.
+    3 P cycles, or ``P + 6`` if it has one pixel. All sums share one shifter, and a start waits in registers.
 
     *Accumulators.* Second differences are taken while the last three pixels of a span leave. First
     differences are taken with the last two pixels, the start with the last pixel. So spans follow each other
-    without a gap. A run of spans takes as many cycles as pixels, if at most a third of the spans have two.
-    The first addition takes half of a second difference. So ``D1 = 2 v·d + d·d`` takes no adder.
+    without a gap. A run of spans takes as many cycles as pixels, if at most a third of the spans have two
+    pixels. The first addition takes half of a second difference. So ``D1 = 2 v·d + d·d`` takes no adder.
 
     The first pixel of a span is on the output `latency` cycles after an empty unit has accepted the span. For
     a span of one pixel these are `short_latency` cycles. Payloads are registers.
@@ -230,7 +231,7 @@ class QuotientSpansUnit(wiring.Component):
             self.i.ready.eq(moves & ends),
             self.begun.eq(begun),
         ]
-        # Their enable comes from registers alone, because valid and the length are late.
+        # The enable of these registers comes from registers alone. Valid and length come late in a cycle.
         with m.If(moves):
             m.d.sync += [
                 begun.eq(Mux(begun, is_second | ~valid, valid & is_long)),
@@ -288,7 +289,8 @@ class QuotientSpansUnit(wiring.Component):
         few = self._few_of(to_start.payload.length)
         self._few = connect_headed_fifo(m, "starts", to_start, start, few, self.DEPTH)
 
-        # Differences are shifted by their exponent. Second differences of squares are shifted by twice that.
+        # Differences are shifted by their exponent. Second differences of squares are shifted by twice the
+        # exponent.
         at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
         before = delayed(span.exponent, "exponent", self._SUMS - 1)
         exponent = register(before, f"exponent_{self._SUMS}")
@@ -430,7 +432,7 @@ class QuotientSpansUnit(wiring.Component):
             return register(scaled, f"line_sum_{light}")
         sine, cosine = (part.as_value() for part in self.constants[light])
         if p.takes_heights:
-            # Gates, because Yosys makes resets from a choice of constants. Multipliers have no resets.
+            # Gates choose here. From a choice of constants Yosys makes resets, which multipliers do not have.
             kept = (~is_second).replicate(len(sine))
             sine, cosine = sine.as_unsigned() & kept, cosine.as_unsigned() & kept
             sine, cosine = sine.as_signed(), Cat(cosine[:16], cosine[16] | is_second, cosine[17]).as_signed()
@@ -490,7 +492,7 @@ class QuotientSpansUnit(wiring.Component):
             Signal(signed(width), name=f"{name}_{light}", reset_less=True) for name in names
         )
         begin = Cat(Const(0, width - len(start)), start).as_signed()
-        # z times 2^16 has the binary point of a line. Both may be taken on the same cycle.
+        # z times 2^16 has the binary point of a line. Both differences may be taken on the same cycle.
         given = Mux(takes[0], step[6 : 6 + width], following)
         with m.If(advance):
             m.d.sync += following.eq(given)

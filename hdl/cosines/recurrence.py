@@ -1,4 +1,4 @@
-"""Recurrence unit ([T] figure 3.5): two cosines of equally spaced angles, by one product a pixel each."""
+"""Recurrence unit ([T] figure 3.5): cosines of equally spaced angles, by one product for each pixel."""
 
 from typing import ClassVar
 
@@ -26,8 +26,8 @@ class RecurrenceUnit(wiring.Component):
 
     With ``interleave`` 1 every pixel depends on the pixel before it. So the registers of the loop hold one
     pixel at a time. ``reinsch`` gives a pixel every 4 cycles: product, two stages of shift, sums. ``direct``
-    gives a pixel every 3 cycles: product, sum, saturation. After a span of m pixels the next is accepted ``4
-    (m - 1) + 1`` (``3 (m - 1) + 1``) cycles later.
+    gives a pixel every 3 cycles: product, sum, saturation. After a span of m pixels the next span is accepted
+    ``4 (m - 1) + 1`` cycles later, with ``direct`` ``3 (m - 1) + 1`` cycles later.
 
     With ``interleave`` 4 every pixel depends on the fourth pixel before it. The four phases follow each other
     through the four registers of the loop. So there is a pixel in every cycle. A span takes m cycles, and the
@@ -188,7 +188,7 @@ class RecurrenceUnit(wiring.Component):
         m.d.sync += [
             product.eq(operand * coefficient),
             coarse.eq(FixedValue(p.curvature_format, Value.cast(curvature) >> Cat(Const(0, 3), shift[3:]))),
-            # D(0) is given.
+            # D(0) comes from the input, so the first pixel takes no product.
             Value.cast(fine).eq(Mux(is_first, 0, Value.cast(shifted))),
             total.eq((x + difference).wrap(state)),
         ]

@@ -40,8 +40,8 @@ class RecurrenceSetupUnit(PipelinedUnit):
 
     A span has 14 products, and 32 more for each light. Let I be the initiation interval. The products share
     ``ceil((14 + 32 lights) / I)`` multipliers of 18x18 bits. The seven steps of the recurrence take 14 of a
-    light's products, for L and for H. The 18 shifts of a light share ``ceil(18 lights / I)`` shifters of 48
-    bits. For one light:
+    light's products, seven for L and seven for H. The 18 shifts of a light share ``ceil(18 lights / I)``
+    shifters of 48 bits. For one light:
 
     =================== === === === === ===
     initiation interval 1   2   4   8   46

@@ -21,30 +21,30 @@ from blysk.hdl.normals.bisection import BisectionUnit
 __all__ = ["AdaptiveNormaliserUnit"]
 
 SEGMENT_CYCLES = 14
-"""Cycles from the preparation of a segment to the preparation of the next."""
+"""Cycles that the preparation of a segment takes. Then the next segment is prepared."""
 
 
 class AdaptiveNormaliserUnit(wiring.Component):
-    """Normals of a span, by straight lines over ``2^k`` arcs. k is as small as the threshold allows.
+    """Normals of a span, on straight lines over ``2^k`` arcs. k is as small as the threshold allows.
 
     `AdaptiveNormaliser`, the bit-accurate model, has formats, choice of k and error bounds.
 
     Three parts work at the same time, each on another span.
 
-    1. The first bisects, level by level (`BisectionUnit`), and counts the levels.
-    2. The second computes start, step and length of every segment, and puts them into a FIFO. A segment takes
-       14 cycles, or 3 without a pixel.
-    3. The last gives a normal in every cycle, from a span's first to its last, unless the output waits. It
-       begins a span when the FIFO has all of its segments.
+    1. The first part bisects, level by level (`BisectionUnit`), and counts the levels.
+    2. The second part computes start, step and length of every segment, and puts them into a FIFO. A segment
+       takes 14 cycles, or 3 cycles without a pixel.
+    3. The last part gives a normal in every cycle, from a span's first to its last, unless the output waits.
+       It begins a span when the FIFO has all segments of the span.
 
     `preparation` is the number of cycles from a span to its first normal, if all parts are free: 63 for k =
     0, 77 for k = 1, 142 for k = 2. Spans with at most `interval` pixels follow each other in `interval`
-    cycles: 33 for k = 0, 42 for k = 1, 70 for k = 2. Spans of one or two pixels count as k = 0, spans of
-    three pixels as k = 1 at most. A span of length 0 takes one cycle and gives nothing.
+    cycles: 33 for k = 0, 42 for k = 1, 70 for k = 2. For a span of one or two pixels k is 0. For a span of
+    three pixels k is at most 1. A span of length 0 takes one cycle and gives nothing.
 
     The unit has three multipliers: two in the bisection unit, and one for the square of q and for the
     segments. A memory of ``2^(depth + 2)`` words of 54 bits holds the segment ends of two spans. A FIFO of
-    ``2^(depth + 1)`` words holds the segments, and a table of 2048 words of 17 bits the reciprocals.
+    ``2^(depth + 1)`` words holds the segments. A table of 2048 words of 17 bits holds the reciprocals.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ class AdaptiveNormaliserUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(span_normals_shape()))`
-        Unit normals, three components ``SQ(1, 17)`` each; pixels.
+        Unit normals, three components ``SQ(1, 17)`` each, and the number of pixels.
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range": 1, "last": 1})))`
         Normals, three components ``SQ(1, 17)``. ``out_of_range``: the span is wider than the bisection's
-        ``max_angle``. ``last``: the last normal of its span.
+        ``max_angle``. ``last``: the normal is the last of its span.
 
     Source: docs/theory/interpolation.md#adaptive-normaliser; [T] 2.1, figure 2.7.
     """
@@ -79,14 +79,14 @@ class AdaptiveNormaliserUnit(wiring.Component):
         )
 
     def preparation(self, levels: int) -> int:
-        """Cycles from a span to its first normal, if it has at least ``2^levels + 1`` pixels.
+        """Cycles from a span to its first normal, if the span has at least ``2^levels + 1`` pixels.
 
-        A span of one pixel has a single segment, which takes one cycle more through the FIFO: 50.
+        A span of one pixel takes 50 cycles. Its single segment takes one cycle more through the FIFO.
         """
         return self.counting(levels) + 2 + SEGMENT_CYCLES * ((1 << levels) + 1)
 
     def interval(self, levels: int) -> int:
-        """Cycles from a span to the next, if both have this number of levels and ``2^levels + 1`` pixels.
+        """Cycles from a span to the next, if both spans have ``levels`` levels and ``2^levels + 1`` pixels.
 
         The slower of the first two parts decides. Between spans of different levels the first part may wait
         up to 6 cycles for the multiplier.
@@ -120,8 +120,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
         m.d.sync += ready_spans.eq(ready_spans + s.through - begun)
         m.submodules.ends = ends = Memory(shape=normal_shape(), depth=4 << p.depth, init=[])
         multiplier = SteppedMultiplier(m, s.step)
-        # The segments are described before the levels. Levels use the multiplier on steps on which segments
-        # do not use it.
+        # The segments are described first, and reserve their steps of the multiplier. Levels use the free
+        # steps.
         self._divide(m, r, s, ends, multiplier, fifo, segment_shape)
         self._count(m, r, s, ends, multiplier)
         self._back(m, fifo, segment_shape, ready_spans, begun)
@@ -154,7 +154,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                 self._hand_on(m, r, s)
 
     def _reciprocal(self, m, r: "_Levels") -> None:
-        """Reciprocal of m - 1 and its shift, long before the first bisection is done."""
+        """Find the reciprocal of m - 1 and its shift for the length m, before the first bisection ends."""
         bits = self.model.LENGTH_BITS
         position = Signal(range(bits))
         below_top = Signal(range(bits))
@@ -201,7 +201,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
             ]
 
     def _begin(self, m, r: "_Levels") -> None:
-        """A span is taken, and its ends go into the bisection at once."""
+        """Take a span, and give its ends to the bisection on the same cycle."""
         whole, bisection = 1 << self.model.depth, self._bisection
         m.d.comb += [
             self.i.ready.eq(bisection.i.ready),
@@ -219,7 +219,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
             m.next = "store left"
 
     def _bisect(self, m, r: "_Levels", read) -> None:
-        """Send pairs of neighbouring ends of a level into the bisection, from the second pair on."""
+        """Send all pairs of neighbouring ends of a level into the bisection, from the second level on."""
         bisection, bits = self._bisection, self.model.depth + 1
         m.d.comb += [
             read.addr.eq(Cat(Mux(r.step == 0, r.index, r.next_index)[:bits], r.bank)),
@@ -240,7 +240,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
                     m.next = "drain"
 
     def _next_level(self, m, r: "_Levels", s: "_Segments") -> None:
-        """The results of a level are stored. Go on."""
+        """When the results of a level are stored, begin the next level, or end the bisection of the span."""
         result = self._bisection.o.payload
         m.d.sync += [
             r.half.eq(r.half >> 1),
@@ -261,7 +261,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
             m.next = "bisect"
 
     def _count_levels(self, m, r: "_Levels", s: "_Segments", multiplier: SteppedMultiplier) -> None:
-        """Number of levels, from ``q + q^2`` and its limits."""
+        """Number of levels, from ``q + q^2`` and its limits. q is a quarter of ``one_minus_cosine``."""
         p = self.model
         with m.If(r.step != 0):
             m.d.sync += r.step.eq(r.step + 1)
@@ -276,7 +276,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         with m.If(r.step == 3):
             m.d.sync += r.levels.eq(0)
             for k, code in enumerate(p.limits.codes.tolist()):
-                # One or two pixels are at the ends. The middle pixel of three comes from the first level.
+                # A span of one or two pixels needs no level. A span of three pixels needs the first at most.
                 with m.If((sagitta.as_value() > code) & ~r.out_of_range & (r.steps > min(k + 1, 2))):
                     m.d.sync += r.levels.eq(k + 1)
         with m.If(r.step == 4):
@@ -377,7 +377,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
 
     @staticmethod
     def _hand_over(m, s: "_Segments", fifo, segment_shape) -> None:
-        """Fields of a segment at the input of the FIFO."""
+        """Drive the fields of a segment at the input of the FIFO."""
         segment = Signal(segment_shape)
         m.d.comb += [
             segment.count.eq(s.count),
@@ -435,7 +435,7 @@ class _Levels:
         p, bits, depth = model, model.LENGTH_BITS, model.depth
         self.span = Signal(span_shape)
         self.step = Signal(3)
-        # Half of the memory of ends.
+        # Half of the memory of ends, in which the span's ends are.
         self.bank = Signal()
         # Words of the reciprocal of m - 1.
         self.steps = Signal(bits)
@@ -458,13 +458,13 @@ class _Levels:
 
 
 class _Segments:
-    """Registers and wires of the part that prepares segments: copies from the first part, and its own."""
+    """Registers and wires of the part that prepares segments. Some are copies from the first part."""
 
     def __init__(self, model: AdaptiveNormaliser):
         p, bits, depth = model, model.LENGTH_BITS, model.depth
         component = FixedShape(COMPONENT)
         self.busy = Signal()
-        # The last segment leaves, and the next span may come.
+        # The last segment leaves on this cycle, and the next span may come.
         self.through = Signal()
         self.free = Signal()
         self.step = Signal(range(SEGMENT_CYCLES), name="segment_step")
@@ -475,7 +475,7 @@ class _Segments:
         self.levels = Signal(range(depth + 1), name="segment_levels")
         self.out_of_range = Signal(name="segment_out_of_range")
         self.index = Signal(depth + 1, name="segment_index")
-        # ``offset`` is phi (m - 1) of the first pixel.
+        # ``offset`` is ``phi (m - 1)`` of the segment's first pixel. phi is its position in the segment.
         self.left = Signal(normal_shape())
         self.right = Signal(normal_shape())
         self.difference = [Signal(component, name=f"difference_{c}") for c in range(3)]

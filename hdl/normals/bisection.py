@@ -21,7 +21,7 @@ def coefficient(model: Bisection, power: int, first_step: Value) -> FixedValue:
     Parameters
     ----------
     model : Bisection
-        Model.
+        Bit-accurate model.
     power : int
         Power of the coefficient.
     first_step : Value
@@ -38,9 +38,10 @@ def coefficient(model: Bisection, power: int, first_step: Value) -> FixedValue:
 
 
 class BisectionUnit(PipelinedUnit):
-    """Normal half-way between two: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 N_a . N_b``.
+    """Normal half-way between two normals: ``N = (N_a + N_b) / sqrt(2 + z)``, ``z = 2 N_a . N_b``.
 
-    `Bisection`, the bit-accurate model, has formats, variants, error bounds and the rule for spans too wide.
+    `Bisection`, the bit-accurate model, has formats, variants and error bounds. It also has the rule for
+    spans that are too wide.
 
     A beat needs ``s + 6`` multiplications: three of the dot product, s Horner steps, three scalings. With an
     initiation interval I, ``ceil((s + 6) / I)`` multipliers share them (`blysk.hdl.core.dataflow`). The
@@ -74,7 +75,7 @@ class BisectionUnit(PipelinedUnit):
         Unit normals, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
         ``normal_middle``, three components ``SQ(1, 17)``. ``one_minus_cosine`` of the two normals,
-        ``SQ(2, 17)``. ``out_of_range``: they are further apart than ``max_angle``, and the middle is
+        ``SQ(2, 17)``. ``out_of_range``: the normals are further apart than ``max_angle``. The middle is then
         undefined.
 
     Source: docs/theory/interpolation.md#bisection; [T] 2.1, figure 2.6.

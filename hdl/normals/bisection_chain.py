@@ -23,12 +23,12 @@ _ANGLE_STEPS = 6
 class BisectionChainUnit(wiring.Component):
     """Normal at ``psi / 2^k`` from the left end of a span: ``N_k = (L_k N_l + N_r) / M_k``.
 
-    `BisectionChain`, the bit-accurate model, has formats and error bound.
+    `BisectionChain`, the bit-accurate model, has L_k and M_k, formats and error bound.
 
     The unit is sequential, one span at a time. With s Horner steps of the bisection's factor, a span gives
-    its normal ``17 + k (3 s + 8)`` cycles after it was taken in (`latency`). The next span is taken in a
-    cycle after the normal at the earliest. The unit has four multipliers: three in the dot product, used
-    once, and one for all other products.
+    its normal ``17 + k (3 s + 8)`` cycles after it was taken in (`latency`). The next span is taken in at
+    least one cycle after the normal. The unit has four multipliers: three in the dot product, used once, and
+    one for all other products.
 
     Parameters
     ----------
@@ -38,10 +38,10 @@ class BisectionChainUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "level": 4})))`
-        Unit normals, three components ``SQ(1, 17)`` each; k, 1 to 15 (0 counts as 16).
+        Unit normals, three components ``SQ(1, 17)`` each; the level k, 1 to 15 (0 counts as 16).
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range": 1})))`
         The normal, three components ``SQ(1, 17)``. ``out_of_range``: the span is wider than the bisection's
-        ``max_angle``, and its normal undefined.
+        ``max_angle``. Its normal is then undefined.
 
     Source: docs/theory/interpolation.md#bisection; [T] 2.1.
     """
@@ -74,7 +74,7 @@ class BisectionChainUnit(wiring.Component):
         return 17 + level * (3 * self.model.bisection.steps + 8)
 
     def elaborate(self, platform):
-        """Dot product, then one round of the multiplier a level, then six products."""
+        """Dot product, then one round of the multiplier for each level, then six products."""
         m = Module()
         registers = _Registers(self.model, self.i.payload.shape())
         span, step = registers.span, registers.step
@@ -116,7 +116,7 @@ class BisectionChainUnit(wiring.Component):
         return m
 
     def _first_u(self, m: Module, r: "_Registers") -> FixedValue:
-        """``u = 1 - cos psi`` of the span's normals, `_ANGLE_STEPS` - 1 cycles after these."""
+        """``u = 1 - cos psi`` of the span's normals, `_ANGLE_STEPS` - 1 cycles after the normals."""
         m.submodules.dot_product = dot_product = DotProductUnit()
         m.d.comb += [
             copy(dot_product.i.payload.a, r.span.normal_left),
@@ -189,7 +189,7 @@ class BisectionChainUnit(wiring.Component):
                 m.next = "combine"
 
     def _combine(self, m: Module, r: "_Registers", multiplier: SteppedMultiplier) -> None:
-        """Components of ``l N_l + m N_r``. Each takes two products."""
+        """Components of ``l N_l + m N_r``, with two products each."""
         product = multiplier.product
         left_term = Signal(product.shape())
         exact_sum = left_term + product

@@ -1,4 +1,4 @@
-"""Forward-difference accumulator ([T] figure 2.10): two accumulating adders a component."""
+"""Forward-difference accumulator ([T] figure 2.10): two accumulating adders for each component."""
 
 from collections.abc import Iterator, Mapping
 
@@ -31,7 +31,7 @@ class AccumulatorUnit(wiring.Component):
     Parameters
     ----------
     input_shape : StructLayout
-        Shape of a prepared span; has a field ``length``.
+        Shape of a prepared span, with a field ``length``.
     output_shape : ShapeLike
         Shape of the values of a pixel.
     ports : mapping of str to Member, optional
@@ -64,7 +64,7 @@ class AccumulatorUnit(wiring.Component):
     def quadratics(
         self, values: ValueCastable
     ) -> Iterator[tuple[str, DifferenceAccumulator, tuple, FixedValue]]:
-        """Name, model, (start, first, second) and element of ``values`` of each quadratic."""
+        """For each quadratic: name, model, words (start, first, second), and element of ``values``."""
         raise NotImplementedError
 
     def carried(self, values: ValueCastable) -> Iterator[tuple[Value, Value]]:

@@ -31,9 +31,9 @@ def difference_shape() -> data.StructLayout:
 
 
 class DifferenceSetupUnit(PipelinedUnit):
-    """First differences ``W_0 = P dt + G dt^2`` and ``2 G dt^2`` of a span, ``dt = 1/(m - 1)``.
+    """First difference ``W_0 = P dt + G dt^2`` and second difference ``2 G dt^2``, with ``dt = 1/(m - 1)``.
 
-    `DifferenceSetup`, the bit-accurate model, has formats and error bound.
+    m is the length of the span. `DifferenceSetup`, the bit-accurate model, has formats and error bound.
 
     A span needs seven multiplications: the square of dt, three products with P and three with G. With an
     initiation interval I, ``ceil(7 / I)`` multipliers share them (`blysk.hdl.core.dataflow`), each with its
@@ -56,7 +56,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     multipliers 3  2  1  1  1  1  1
     =========== == == == == == == ==
 
-    In the order of [T] there are nine products, the three of ``G dt`` first:
+    In the order of [T] there are nine products, first the three of ``G dt``:
 
     =========== == == == == == == == == ==
     interval    1  2  3  4  5  6  7  8  9
@@ -73,8 +73,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         Cycles from an input to the next, 1 to 7, or to 9 in the order of [T]. ``None``: the number of
         products.
     order : int
-        Degree of the curve, 2 or 1. A straight line, 1, has G = 0 without a port, and a second difference of
-        0.
+        Degree of the curve, 2 or 1. A straight line (1) has no port for G, and its second difference is 0.
     length_bits : int
         Bits of the length, 2 to 12. Spans have at most ``2^length_bits - 1`` pixels.
 
@@ -86,7 +85,7 @@ class DifferenceSetupUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"g", "p", "q", "length"})))`
-        Coefficients in the formats of `GPQ`; length, `length_bits` bits, at least 1.
+        Coefficients in the formats of `GPQ`, and the length in `length_bits` bits, at least 1.
     o : :py:`Out(stream.Signature(difference_shape()))`
         The start ``q``, both differences in ``SQ(2, 42)``, the length.
 
@@ -244,7 +243,7 @@ class DifferenceSetupUnit(PipelinedUnit):
 
 
 def _plus_one(shift: Value) -> Value:
-    """Shift of a product with dt."""
+    """Shift amount of a product with ``dt = 2 reciprocal 2^-shift``, see `_shifted`."""
     return shift + 1
 
 

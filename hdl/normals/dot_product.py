@@ -14,7 +14,7 @@ __all__ = ["DotProductUnit"]
 class DotProductUnit(PipelinedUnit):
     """Exact dot product ``a0 b0 + a1 b1 + a2 b2``.
 
-    The sum keeps every bit (``SQ(4, 34)`` for unit vectors), without rounding and overflow.
+    The sum keeps every bit (``SQ(4, 34)`` for unit vectors), without rounding or overflow.
 
     The latency is 3 cycles (products, first sum, second sum), the initiation interval 1. The unit has three
     multipliers.

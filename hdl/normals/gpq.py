@@ -27,7 +27,7 @@ def curve_shapes() -> dict[str, data.ArrayLayout]:
 class GPQUnit(PipelinedUnit):
     """Coefficients ``G = 2 N_r - 4 N_c + 2 N_l``, ``P = 4 N_c - N_r - 3 N_l``, ``Q = N_l``.
 
-    The coefficients are exact for spans up to 45 degrees, and saturate beyond.
+    The coefficients are exact for spans up to 45 degrees. For wider spans they saturate.
 
     The latency is 3 cycles (first sums, second sums, saturation), the initiation interval 1. The unit has no
     multipliers.

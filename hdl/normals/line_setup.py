@@ -29,8 +29,8 @@ def line_shape(length_bits: int = LENGTH_BITS) -> data.StructLayout:
 class LineSetupUnit(PipelinedUnit):
     """First difference ``W = (N_r - N_l) / (m - 1)``; `LineSetup` is the bit-accurate model.
 
-    With the initiation interval I nine products share ``ceil(9 / I)`` multipliers. A table of
-    ``2^(length_bits - 1)`` words of 24 bits holds the reciprocals. The attribute ``latency`` depends on I.
+    m is the length. With the initiation interval I nine products share ``ceil(9 / I)`` multipliers. A table
+    of ``2^(length_bits - 1)`` words of 24 bits holds the reciprocals. The attribute ``latency`` depends on I.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class LineSetupUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"normal_left", "normal_right", "length"})))`
-        Ends of a line, vectors in ``SQ(1, 22)``; pixels, at least 1.
+        Ends of a line, vectors in ``SQ(1, 22)``, and the length, at least 1.
     o : :py:`Out(stream.Signature(line_shape(length_bits)))`
         The line.
 
@@ -109,12 +109,12 @@ class LineSetupUnit(PipelinedUnit):
 
     @staticmethod
     def _shifted_operands(total, shift):
-        """``2 P r`` with one more bit than W, for rounding, and the shift."""
+        """``2 P r`` for the rise P and the reciprocal r, with a bit more than W for rounding; the shift."""
         return total.scale(1).extend(_SHIFTED), shift
 
     @staticmethod
     def _shift(register, value, amount):
-        """Two stages shift. Then the result is rounded half up to W."""
+        """Shift in two stages, then round half up to the format of W."""
         coarse = FixedValue(_SHIFTED, Value.cast(value) >> Cat(Const(0, 2), amount[2:]))
         coarse, fine = register(coarse, "coarse"), register(amount[:2], "fine_amount")
         shifted = register(FixedValue(_SHIFTED, Value.cast(coarse) >> fine), "shifted")

@@ -15,7 +15,7 @@ from blysk.hdl.core.views import copy_fields
 __all__ = ["MiddleNormalUnit"]
 
 _MULTIPLICATIONS = 9
-"""Three of the dot product, three Horner steps, three scalings by e."""
+"""Multiplications of a span: three of the dot product, three Horner steps, three scalings by e."""
 
 
 class MiddleNormalUnit(PipelinedUnit):
@@ -53,7 +53,7 @@ class MiddleNormalUnit(PipelinedUnit):
         Unit normals of the span's ends, three components ``SQ(1, 17)`` each.
     o : :py:`Out(stream.Signature(StructLayout({...})))`
         The same two normals, and ``normal_middle`` in ``SQ(1, 19)``. ``out_of_range``: the span is wider than
-        45 degrees, and its middle normal undefined.
+        45 degrees. Its middle normal is then undefined.
 
     Source: docs/theory/interpolation.md#middle-normal; [T] 2.2.
     """
@@ -135,5 +135,5 @@ def _cut(half_sum: FixedValue) -> FixedValue:
 
 
 def _corrected(half_sum: FixedValue, product: FixedValue) -> FixedValue:
-    """Half sum and ``2 e`` times it."""
+    """Half sum plus ``2 e`` times the half sum."""
     return half_sum + product.scale(1).round_half_up(19)

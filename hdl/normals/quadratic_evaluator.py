@@ -22,21 +22,21 @@ __all__ = ["QuadraticEvaluatorUnit"]
 
 
 class QuadraticEvaluatorUnit(wiring.Component):
-    """Normals ``N(t) = G t^2 + P t + Q`` of a span in raster order, first pixel at t = 0, last at t = 1.
+    """Normals ``N(t) = G t^2 + P t + Q`` of a span. The first pixel is at t = 0, the last at t = 1.
 
     `QuadraticEvaluator`, the bit-accurate model, has formats, rounding and error bound. The table of
     reciprocals holds 2048 words of 18 bits.
 
-    ``direct`` (figure 2.9 a) has seven multipliers, for t^2 once and two products a component. (The figure
-    draws one component, with three.) The first normal comes 14 cycles after its span was taken in, then a
-    normal in every cycle.
+    ``direct`` (figure 2.9 a) has seven multipliers: one for t^2, and two for each component. (The figure
+    draws one component, with three multipliers.) The first normal comes 14 cycles after its span was taken
+    in. Then a normal comes in every cycle.
 
-    ``horner`` (figure 2.9 b) has one multiplier, one adder and multiplexers a component, three multipliers in
-    all. The first normal comes 17 cycles after its span, then a normal every two cycles.
+    ``horner`` (figure 2.9 b) has one multiplier, one adder and multiplexers for each component. The first
+    normal comes 17 cycles after its span was taken in. Then a normal comes every two cycles.
 
-    The step of the next span is prepared while this span runs. Spans are taken in at least 7 cycles apart. If
-    they have 7 pixels (``horner``: 4) or more, there is no gap between their pixels. A span of length 0 gives
-    nothing.
+    The step of the next span is prepared during the pixels of this span. Spans are taken in at least 7 cycles
+    apart. If they have 7 pixels (``horner``: 4) or more, there is no gap between their pixels. A span of
+    length 0 gives nothing.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class QuadraticEvaluatorUnit(wiring.Component):
 
 
 class _StepUnit(PipelinedUnit):
-    """Step ``dt = 1/(m - 1)`` and the coefficients. Latency 8, initiation interval 7: one register each."""
+    """Step ``dt = 1/(m - 1)`` and the coefficients. With latency 8 and interval 7 a word has one register."""
 
     def __init__(self, model: QuadraticEvaluator):
         self.model = model
@@ -147,7 +147,7 @@ def _pixel_shape() -> data.StructLayout:
 
 
 def _with_half(value: FixedValue) -> FixedValue:
-    """Component plus half its step, by a wire: a cut after the sum then rounds half up."""
+    """Component plus half its step, by wiring. A cut after the sum then rounds half up."""
     return FixedValue(SQ(1, 18), Cat(Const(1, 1), Value.cast(value)))
 
 
@@ -178,7 +178,7 @@ class _DirectUnit(PipelinedUnit):
 
 
 class _HornerUnit(PipelinedUnit):
-    """Figure 2.9 b. Latency 8, initiation interval 2, one multiplier and one adder a component."""
+    """Figure 2.9 b. Latency 8, initiation interval 2, one multiplier and one adder for each component."""
 
     def __init__(self):
         super().__init__(_pixel_shape(), normal_shape(), latency=8, initiation_interval=2)

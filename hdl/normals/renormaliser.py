@@ -26,10 +26,10 @@ class RenormaliserUnit(PipelinedUnit):
 
     `Renormaliser`, the bit-accurate model, has segments, formats, error bounds and flag.
 
-    The latency is 16 cycles (leading one, its place, two for the shift, dot product 3, octave, table, four
-    for the polynomial, product, rounding, saturation). The initiation interval is 1. The unit has eight
-    multipliers: three squares, two in the polynomial, three products with the factor. The table holds 64
-    words of 48 bits.
+    The latency is 16 cycles (leading one, its place, two for the shift, three for the dot product, octave,
+    table, four for the polynomial, product, rounding, saturation). The initiation interval is 1. The unit has
+    eight multipliers: three squares, two in the polynomial, three products with the factor. The table holds
+    64 words of 48 bits.
 
     Parameters
     ----------
@@ -39,10 +39,10 @@ class RenormaliserUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"vector": vector_shape(), "span": 1})))`
-        Vectors, with a bit that passes through.
+        Vectors, and a bit ``span`` that passes through.
     o : :py:`Out(stream.Signature(StructLayout({"normal", "out_of_range", "span"})))`
-        Unit vector, ``SQ(1, 17)``. ``out_of_range``: the vector is too short, and the normal invalid. The bit
-        that passes.
+        Unit vector, ``SQ(1, 17)``. ``out_of_range``: the vector is too short, and the normal is invalid.
+        ``span``: the bit of the vector.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """
@@ -68,7 +68,7 @@ class RenormaliserUnit(PipelinedUnit):
         )
 
     def _delayed(self, m, value, name, first, last):
-        """A value, from the register of a stage to that of a later one."""
+        """A value, through a register on each stage from ``first`` to ``last``."""
         for stage in range(first, last + 1):
             value = self.register(m, value, f"{name}_{stage}")
         return value
@@ -119,7 +119,8 @@ class RenormaliserUnit(PipelinedUnit):
         magnitude = register(m, magnitudes[0] | magnitudes[1] | magnitudes[2], "magnitude")
         codes = [register(m, code, f"code_{c}") for c, code in enumerate(codes)]
         shift, bits = unsigned(3), len(magnitude)
-        # The place of the leading one, from the lowest that counts.
+        # The place of the leading one, counted from the top. Beyond `MAX_SHIFT` zeros the vector is too
+        # short.
         place = p.MAX_SHIFT
         for k in reversed(range(p.MAX_SHIFT)):
             place = Mux(magnitude[bits - 1 - k], k, place)
