@@ -1,4 +1,4 @@
-"""Band buffer: bands of lines that are drawn while others are shown, and the choice of the next band."""
+"""Band buffer: draws a band of lines while another band is shown, and chooses the next band."""
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
@@ -16,7 +16,7 @@ __all__ = ["BandBufferUnit", "band_pixel_shape", "shown_shape"]
 
 
 def band_pixel_shape(model: BandBuffer) -> data.StructLayout:
-    """Shape of a drawn pixel: column, line of the band, colour."""
+    """Shape of a drawn pixel: column, line inside the band, colour."""
     width, lines = model.mode.horizontal.visible, model.lines
     place = {"x": unsigned((width - 1).bit_length()), "y": unsigned((lines - 1).bit_length())}
     return data.StructLayout(place | {channel: unsigned(8) for channel in "rgb"})
@@ -31,20 +31,22 @@ def shown_shape(model: BandBuffer) -> data.StructLayout:
 class BandBufferUnit(wiring.Component):
     """Two bands in a memory with two clocks. `BandBuffer` is the bit-accurate model.
 
-    The domain ``sync`` draws, and the domain ``pixel`` shows. Pixels of a free buffer are written as they
-    come, one in each cycle. With ``done`` the buffer goes to the display. The display clears each word as it
-    reads it, on the same port, as the memory reads before it writes. It gives the buffer back after its last
-    line. A buffer that came too late is given back uncleared, at the beginning of the next slot. The drawing
-    side clears an uncleared buffer, and each buffer after a reset. It clears a word in each cycle, while the
-    band is already requested. The display's addresses follow from the timing alone, so it does not depend on
-    the time of drawing. A colour leaves a cycle after its timing. The unit has no multipliers.
+    The domain ``sync`` draws, and the domain ``pixel`` shows. A slot is the time of one band on the display.
+    Pixels of a free buffer are written as they come, one in each cycle. With ``done`` the buffer goes to the
+    display. The display reads each word, and clears it on the same cycle and port, because the memory reads
+    before it writes. After the last line of the band it gives the buffer back. A buffer that came too late is
+    given back uncleared, at the beginning of the next slot. The drawing side clears an uncleared buffer, and
+    each buffer after a reset. It clears a word in each cycle, while the band is already requested. The
+    display's addresses follow from the timing alone. So the display does not depend on the time of drawing. A
+    colour leaves a cycle after its timing. The unit has no multipliers.
 
-    Toggles cross between the clocks, each through two flip-flops. Each buffer has two toggles: it is filled,
-    and it is free. A toggle marks the beginning of a slot, and another marks a late band. The numbers of
-    bands and of the slot cross beside the toggles. So does a bit that tells whether a free buffer was shown.
-    Each of these words is written with its toggle or a cycle before. It is read at least two cycles of the
-    reader's clock later. The constraint is that the words' paths take less than one period of the reader's
-    clock. A slot lasts longer than a crossing, because its lines have 800 pixels each by default.
+    Toggles cross between the clocks, each through two flip-flops. Each buffer has two toggles: one tells that
+    it is filled, the other tells that it is free. A toggle marks the beginning of a slot, and another marks a
+    late band. The numbers of bands and of the slot cross beside the toggles. So does a bit that tells whether
+    a free buffer was shown. Each of these words is written with its toggle or a cycle before. It is read at
+    least two cycles of the reader's clock later. The constraint is that the words' paths take less than one
+    period of the reader's clock. A slot lasts longer than a crossing, because its lines have 800 pixels each
+    by default.
 
     Parameters
     ----------
@@ -58,9 +60,9 @@ class BandBufferUnit(wiring.Component):
     pixels : :py:`In(stream.Signature(band_pixel_shape(model)))`
         Pixels of the last requested band. A pixel outside the band is lost.
     done : :py:`In(stream.Signature(band))`
-        Number of this band, when all its pixels have been taken.
+        Number of the last requested band, when all its pixels have been taken.
     timing : :py:`In(timing_shape(model.mode))`
-        Domain ``pixel``.
+        Timing of the display, in the domain ``pixel``.
     shown : :py:`Out(shown_shape(model))`
         Domain ``pixel``: the timing a cycle later, and the colour.
     status : :py:`Out(counters_shape("late_bands", "frames"))`
@@ -109,7 +111,7 @@ class BandBufferUnit(wiring.Component):
 
     @property
     def _clear(self) -> int:
-        """Words are XORed with the background's word. So a memory of zeros is a cleared memory."""
+        """Word of the background. All words are XORed with it, so a memory of zeros is a cleared memory."""
         return sum(
             int(code) << sum(self.model.colour_bits[:k])
             for k, code in enumerate(self.model.kept(self.model.background))
@@ -219,5 +221,5 @@ class BandBufferUnit(wiring.Component):
 
 
 def _times(value: Value, factor: int) -> Value:
-    """A product by a constant, as sums. Four bits need no multiplier."""
+    """A product with a constant, as a sum. A value of four bits needs no multiplier."""
     return sum(value << k for k in range(factor.bit_length()) if factor >> k & 1)

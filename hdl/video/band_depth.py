@@ -43,7 +43,7 @@ class BandDepthUnit(wiring.Component):
         super().__init__({"memory": In(DepthMemory(x_bits, y_bits)), "begin": In(1), "busy": Out(1)})
 
     def elaborate(self, platform):
-        """The memory; the tag; the sweep."""
+        """The memory, the tag and the sweep."""
         m = Module()
         given, port = self.model, self.memory
         bits = given.tag_bits

@@ -14,7 +14,7 @@ class ClockUnit(wiring.Component):
 
     Each clock has a gate, ``DCCA``, which lets only whole pulses through. A clock stands still until the PLL
     is locked. So every register starts as the configuration set it, and no register needs a reset. The net of
-    a reset would go to half of them. The enclosing module defines the domains, without reset.
+    a reset would go to half of the registers. The enclosing module defines the domains, without reset.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class ClockUnit(wiring.Component):
         super().__init__({"reference": In(1)})
 
     def elaborate(self, platform):
-        """The PLL; a gate a clock."""
+        """The PLL, and a gate for each clock."""
         m = Module()
         plan, locked, loop = self.model, Signal(name="locked"), Signal(name="loop")
         always = {name: Signal(name=f"{name}_always") for name in self.clocks}

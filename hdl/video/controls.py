@@ -30,9 +30,9 @@ class ControlsUnit(wiring.Component):
     frame : :py:`In(1)`
         A frame begins.
     angle : :py:`Out(12)`
-        Its angle.
+        Angle of the frame.
     index : :py:`Out(range(materials * lights))`
-        Its list.
+        Index of the frame's list of draw commands.
 
     Source: docs/theory/video.md#bands; not in the documents.
     """

@@ -26,7 +26,7 @@ class DisplayUnit(wiring.Component):
     Parameters
     ----------
     model : BandBuffer
-        Mode, lines of a band, colours.
+        Bit-accurate model, with mode, lines of a band, and colours.
 
     Members
     -------

@@ -27,9 +27,9 @@ def walk_request_shape(commands: int) -> data.StructLayout:
 class DrawCommandsUnit(wiring.Component):
     """Walks a list from its start to its end. `DrawCommands` is the bit-accurate model.
 
-    The unit reads a word a cycle. In other bands it leaves out commands for a frame's first band. The first
-    command is offered two cycles after the request was accepted. The next request is accepted after the end
-    was taken. The unit has no multipliers.
+    The unit reads a word a cycle. Some commands are for a frame's first band only. In other bands the unit
+    leaves them out. The first command is offered two cycles after the request was accepted. The next request
+    is accepted after the end was taken. The unit has no multipliers.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ def band_shape(bands: int):
 
 
 def drawn_band_pixel_shape(x_bits: int, y_bits: int) -> data.StructLayout:
-    """Shape of a pixel of a band: column, line of the band, colour."""
+    """Shape of a pixel of a band: column, line inside the band, colour."""
     place = {"x": unsigned(x_bits), "y": unsigned(y_bits)}
     return data.StructLayout(place | {channel: unsigned(8) for channel in "rgb"})
 
@@ -44,17 +44,17 @@ def drawn_band_pixel_shape(x_bits: int, y_bits: int) -> data.StructLayout:
 class DrawUnit(wiring.Component):
     """Draws bands on request. `Drawing` is the bit-accurate model.
 
-    A band begins a frame if its index is at most the index of the band before. The controls then move on, the
-    vertices of all meshes are transformed, and the constants written. Then, and in other bands at once, the
-    list's triangles are read, and the triangles in the band are drawn. When the last pixel has left, ``done``
-    gives the band's index. Then the depths are cleared, before the next request is accepted.
+    A band begins a frame if its index is at most the index of the band before. Then the controls move on, the
+    vertices of all meshes are transformed, and the constants are written. After this, or at once in other
+    bands, the list's triangles are read, and the triangles in the band are drawn. When the last pixel has
+    left, ``done`` gives the band's index. Then the depths are cleared, before the next request is accepted.
 
     Beside the renderer's cycles a frame takes
 
-    - three cycles for a triangle and a band;
-    - 30 for a vertex;
-    - 150 for a mesh;
-    - `BandDepth.swept` for a band, if the next band is requested at once.
+    - three cycles for each triangle in each band;
+    - 30 for each vertex;
+    - 150 for each mesh;
+    - `BandDepth.swept` for each band, if the next band is requested at once.
 
     Parameters
     ----------
@@ -64,13 +64,13 @@ class DrawUnit(wiring.Component):
     Members
     -------
     request : :py:`In(stream.Signature(band_shape(bands)))`
-        Bands to draw, from 0 on. Some may be left out.
+        Bands to draw, from 0 on. Some bands may be left out.
     done : :py:`Out(stream.Signature(band_shape(bands)))`
         Bands whose pixels have all been taken.
     pixels : :py:`Out(stream.Signature(drawn_band_pixel_shape(x_bits, y_bits)))`
         Pixels of the last requested band. Of several pixels at a place, the last pixel counts.
     buttons : :py:`In(4)`
-        See `ControlsUnit`.
+        Buttons, see `ControlsUnit`.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
 
@@ -118,7 +118,7 @@ class DrawUnit(wiring.Component):
         return m
 
     def _matrix(self, m: Module) -> None:
-        """The registers of the matrix are written one after the other."""
+        """Write the registers of the matrix, one after the other."""
         matrix = Signal(matrix_shape(), name="matrix")
         given = self.motion.o.payload
         words = [word for name in ("position", "normal") for row in matrix[name] for word in row]
@@ -130,7 +130,7 @@ class DrawUnit(wiring.Component):
                 m.d.sync += code.eq(Value.cast(given.value)[: len(code)])
 
     def _band(self, m: Module) -> None:
-        """One band after the other."""
+        """Draw one band after the other."""
         given, commands = self.model, self.commands
         # A register follows, because a word of the memory comes late in its cycle.
         self._command_in = stream.Signature(commands.o.payload.shape()).create(path=("command",))
@@ -167,7 +167,7 @@ class DrawUnit(wiring.Component):
             self.done.payload.eq(band),
         ]
         idle = Signal(name="idle")
-        # This is a cycle late, but before the command after a draw command comes.
+        # ``idle`` is a cycle late, but in time for the command after a draw command.
         m.d.sync += idle.eq(self.assembly.idle & render.idle)
         with m.FSM(name="state") as state:
             with m.State("clear"):
@@ -232,7 +232,7 @@ class DrawUnit(wiring.Component):
                 ]
         with m.State("turn"):
             m.d.sync += left.eq(command.payload.count)
-            # The motion waits again when its last entry was taken.
+            # The motion unit waits again when its last entry was taken.
             with m.If(self.motion.i.ready):
                 m.next = "read"
         with m.State("read"):
@@ -247,7 +247,7 @@ class DrawUnit(wiring.Component):
                 m.next = "command"
 
     def _count(self, m: Module, **events) -> None:
-        """Counters of this unit and of the units inside."""
+        """Drive the counters of this unit and of the units inside."""
         status = self.status
         count_events(m, status, **events)
         m.d.comb += [

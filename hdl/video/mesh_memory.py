@@ -12,16 +12,16 @@ from blysk.hdl.video.vertex_unit import mesh_vertex_shape
 __all__ = ["RANGE_BITS", "MeshMemoryUnit", "range_shape"]
 
 RANGE_BITS = 12
-"""Bits of the index of a range's first vertex or triangle, and of their number."""
+"""Bits of a range's first index, and of its number of vertices or triangles."""
 
 
 def range_shape() -> data.StructLayout:
-    """Shape of a range: first vertex or triangle, and their number, at least one."""
+    """Shape of a range: its first vertex or triangle, and its number of vertices or triangles, at least 1."""
     return data.StructLayout({"first": unsigned(RANGE_BITS), "count": unsigned(RANGE_BITS)})
 
 
 class MeshMemoryUnit(wiring.Component):
-    """Reads the vertices of ranges from a memory with contents fixed at build time, one a cycle.
+    """Reads ranges of vertices, a vertex a cycle, from a memory with contents fixed at build time.
 
     A range is accepted while no other range is read. Its first vertex is offered two cycles later. The unit
     has no multipliers.
@@ -36,7 +36,7 @@ class MeshMemoryUnit(wiring.Component):
     i : :py:`In(stream.Signature(range_shape()))`
         Ranges.
     o : :py:`Out(stream.Signature(mesh_vertex_shape(index_bits)))`
-        Their vertices.
+        Vertices of the ranges.
 
     Source: docs/theory/video.md#vertices; not in the documents.
     """

@@ -14,7 +14,7 @@ from blysk.hdl.core.fixed import FixedShape, FixedValue
 __all__ = ["MotionUnit", "entry_shape", "turn_shape"]
 
 _STEPS = 5
-"""Steps of an entry before its output."""
+"""Cycles of an entry before its output."""
 
 _FIRST_OFFSET, _LAST_OFFSET = 9, 11
 
@@ -29,7 +29,7 @@ def turn_shape(slots: int) -> data.StructLayout:
 def entry_shape() -> data.StructLayout:
     """Shape of an entry: its index in the matrix, and its value.
 
-    The format is `OFFSET`, and `ENTRY` for the last entries.
+    An offset is in the format `OFFSET`. The low bits of every other value are in the format `ENTRY`.
     """
     return data.StructLayout({"index": range(ENTRIES), "value": FixedShape(OFFSET)})
 
@@ -37,7 +37,8 @@ def entry_shape() -> data.StructLayout:
 class MotionUnit(wiring.Component):
     """Computes a matrix, one entry after the other. `Motion` is the bit-accurate model.
 
-    A matrix takes three cycles for cosine and sine, then seven an entry. The unit has one multiplier.
+    A matrix takes three cycles for cosine and sine, then seven cycles for each entry. The unit has one
+    multiplier.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ __all__ = ["SerialiserUnit"]
 class SerialiserUnit(wiring.Component):
     """Sends each word as five pairs of bits. `Serialiser` is the bit-accurate model.
 
-    The unit takes a word every 5 cycles. Its first pair leaves a cycle after it was taken in. The clock is
-    the serial clock. The unit has no multipliers.
+    The unit takes a word every 5 cycles. The first pair leaves a cycle after the word was taken in. The clock
+    is the serial clock. The unit has no multipliers.
 
     Parameters
     ----------

@@ -27,11 +27,11 @@ def band_rows_shape() -> data.StructLayout:
 
 
 class TriangleAssemblyUnit(wiring.Component):
-    """Keeps vertices of a frame, makes triangles from them. `TriangleAssembly` is the bit-accurate model.
+    """Keeps the vertices of a frame, and makes triangles. `TriangleAssembly` is the bit-accurate model.
 
     A triangle takes three cycles, one for each corner that is read, even if the triangle is not sent. It is
-    offered `latency` cycles after its first corner's address. A range is accepted while no other is read, and
-    costs two cycles more. The unit has no multipliers.
+    offered `latency` cycles after its first corner's address. A range is accepted while no other range is
+    read. Each range costs two more cycles. The unit has no multipliers.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class TriangleAssemblyUnit(wiring.Component):
         }
 
     def _judge(self, m: Module, advance, found: dict, result, valid) -> None:
-        """The triangle, if it is in the band."""
+        """Give the triangle to the output, if it is in the band."""
         band = self.constants
         low = Mux(found["low"] > band.top, found["low"], band.top)
         high = Mux(found["high"] < band.bottom, found["high"], band.bottom)

@@ -59,7 +59,7 @@ class VertexUnit(PipelinedUnit):
     index_bits : int
         Bits of the index that goes with a vertex.
     initiation_interval : int
-        Cycles from a vertex to the next, 15 or more. 15 takes two multipliers.
+        Cycles from a vertex to the next, 15 or more. An interval of 15 takes two multipliers.
 
     Members
     -------

@@ -27,7 +27,7 @@ class WordCrossing(wiring.Component):
     Members
     -------
     i : :py:`In(shape)`
-        Domain ``pixel``.
+        Word, in the domain ``pixel``.
     o, valid : :py:`Out(shape)`, :py:`Out(1)`
         Domain ``serial``: the word, and the cycle on which it has to be taken.
 
