@@ -117,7 +117,7 @@ class Build:
         if self.geometry_style is not None and not self.takes_triangles:
             raise BuildError("geometry_style", "spans need no geometry", triangles)
         if self.coarse is not None and self.top != "render":
-            raise BuildError("coarse", "it is of triangles to pixels", "also give top render")
+            raise BuildError("coarse", "it needs a core from triangles to pixels", "also give top render")
 
     @property
     def shading(self) -> "Build":
@@ -148,4 +148,4 @@ _CHOICES = {
     "geometry_style": (None, *STYLES),
     "bus": PORTS,
 }
-"""Values of the fields with few values."""
+"""Values that are accepted, for fields that have few values."""

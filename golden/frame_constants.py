@@ -51,10 +51,10 @@ TINTED_ADDRESS = 11
 """Address that tells whether a material is tinted, in a pipeline with tints."""
 
 TEXTURE_ADDRESS = 12
-"""First of two addresses of a material's texture, in a pipeline with textures; `TextureDescriptor.words`."""
+"""First of two addresses of a material's texture, in a pipeline with textures: `TextureDescriptor.words`."""
 
 TEXELS_ADDRESS, TEXEL_ADDRESS = 14, 15
-"""Addresses that load texels, see `LoadedTextures.writes`: of an index, and of a value behind it."""
+"""Addresses that load texels: one takes an index, the other takes values, see `LoadedTextures.writes`."""
 
 FIELDS_OF_A_LIGHT = {"direction": (0, 3), "halfway": (3, 3), "diffuse": (6, 3), "specular": (9, 3)}
 """First address, from ``(light + 1) * LIGHT_STRIDE`` on, and number of words of each field of a light."""
@@ -115,8 +115,8 @@ class FrameConstants:
         Threshold of this table, see `ShadingPipeline.threshold_of`, for a design with a gate.
     axes : int array, shape (lights - 1, rows, 3), optional
         Axes of the frame of each further light, in the frame of the first light, ``SQ(1, 17)``. The rows are
-        x, y, z; with highlights of R·V x, ``y cos a``, z; without highlights z alone. For a renderer of
-        triangles whose method takes vectors.
+        x, y, z. With highlights of R·V they are x, ``y cos a``, z. Without highlights there is z alone. For a
+        renderer of triangles whose method takes vectors.
     emission : int array, shape (3,), optional
         Emission, ``UQ(11, 6)`` in LSB, for a design with an albedo.
     tinted : bool, optional
@@ -149,7 +149,7 @@ class FrameConstants:
         Raises
         ------
         ValueError
-            If the constants have none.
+            If the constants have no table.
         """
         if self.lobe is None:
             raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
@@ -174,7 +174,7 @@ class FrameConstants:
         - Lights that the scene does not have are black.
         - A light straight behind the surface that faces the viewer (``L = -V``) has no half-way vector. It
           has specular light only by R·V.
-        - With point lights or a near viewer L and H change within a frame: both are 0.
+        - With point lights or a near viewer L and H change within a frame. Then both are 0 here.
         - A light that is off has vectors and colours of 0. So its terms are 0, and the compact style spends
           no cycle on them.
         - Fresnel's reflection of a distant light and viewer is a constant, and part of the specular colour.
@@ -305,7 +305,7 @@ class FrameConstants:
 def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
     """Beats for the write port, from the constants of each material; see `FrameConstants.writes`.
 
-    A table of several materials is loaded once.
+    A table that several materials share is loaded once.
     """
     if len(constants) == 1:
         return constants[0].writes()
@@ -317,7 +317,7 @@ def writes_of(constants: Sequence[FrameConstants]) -> dict[str, np.ndarray]:
 _MEANINGS = {
     "exponent": "specular exponent, 1 to 1000; for a lobe the exponent of an equally steep Blinn's power",
     "ambient": "ambient colour, red green blue, UQ(11, 6) in LSB of the channel",
-    "material": "index of the material that exponent and colours written next belong to",
+    "material": "index of the material to which the next exponent and colours belong",
     "lobe": "next value of a table, UQ(0, 17); with bit 17 set, number of the bank whose table begins",
     "threshold": "of the table: where its highlight ends; {threshold}",
     "bank": "bank of the material's table",

@@ -56,10 +56,10 @@ class ShadingPipeline:
         Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
     factors : tuple of int
         Indices, in ascending order, of the lights that fade by their distance or as a spot. A factor
-        multiplies the specular term of each. For methods that take values, with specular light. Other lights
-        need no hardware for a factor.
+        multiplies the specular term of its light. The method must take values, and there must be specular
+        light. Other lights need no hardware for a factor.
     albedo : Albedo or None
-        Albedo path: each pixel has a colour of the surface, of vertex colours and textures. ``None``: none.
+        Albedo path: vertex colours and textures give each pixel a colour of the surface. ``None``: no albedo.
     transfer : str
         Codes of the pixels: ``"linear"`` light, or encoded by the curve of ``"srgb"``, see `Transfer`.
     build : Build
@@ -71,13 +71,13 @@ class ShadingPipeline:
         In one of these cases:
 
         - the number of lights or materials or a number of bits is out of range;
-        - there is a gate, and no specular light, or the method has no error bound or no normals;
+        - there is a gate, but no specular light, or the method has no error bound for a gate;
         - an exponent is fixed with a lobe;
         - a lobe takes 1 - N·H with other than 25 fraction bits;
-        - the method has a scale, and there is no lobe;
+        - the method has a scale, but there is no lobe;
         - factors are not different lights in order, or lack specular light or a method that takes values;
         - the transfer is unknown;
-        - the albedo has tints, and there is no specular light.
+        - the albedo has tints, but there is no specular light.
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -153,7 +153,8 @@ class ShadingPipeline:
     def for_materials(self, materials: Sequence[Material], scaled: bool = True) -> "ShadingPipeline":
         """The same design for the materials of a scene.
 
-        The lobe has a bank for each different table, at most `Lobe.MAX_BANKS`, and the steps for them.
+        The lobe has a bank for each different table, at most `Lobe.MAX_BANKS`, and as many steps as the
+        tables need.
 
         Parameters
         ----------
@@ -358,7 +359,7 @@ class ShadingPipeline:
         return self.intensity.compute(*colors, diffuse, specular, *colored)
 
     def _operands(self, spans: Spans, constants: FrameConstants) -> Operands:
-        """Operands of every pixel; of a pipeline without lights those of no light."""
+        """Operands of every pixel. Without lights they are empty: shape (pixels, 0)."""
         if self.lights:
             return self.operands(spans, constants)
         none = Fixed(Intensity.TERM_FORMAT, np.zeros((int(spans.length.sum()), 0), dtype=np.int64))

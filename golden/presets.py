@@ -39,7 +39,7 @@ __all__ = [
 
 
 def _lines(module: ModuleType, *names: str) -> dict[Interpolator, str]:
-    """Methods of a module, with a line about each: of dictionaries of these names, where it has them."""
+    """Methods of a module, with a line about each, from its dictionaries with these names."""
     return {method: line for name in names for method, line in vars(module).get(name, {}).items()}
 
 
@@ -53,8 +53,7 @@ _OWN = (
     local_chord_interpolator,
     quotient_interpolator,
 )
-"""Modules of this project with ``METHODS``, and some with ``PUBLISHED``, a line about each; in the order of
-tables."""
+"""Modules of this project with dictionaries ``METHODS``, some with ``PUBLISHED``, in the order of tables."""
 
 _MODULES = (
     *_OWN,
@@ -78,7 +77,7 @@ METHOD_LINES: dict[str, str] = {
     for module in _MODULES
     for method, line in _lines(module, name).items()
 }
-"""A line about each method and each as published, for the help of the command line."""
+"""A line about each method, also about methods as published, for the help of the command line."""
 
 MODELS: dict[str, Specular | Power] = {
     model.name: Specular(model) for model in REFLECTION_MODELS.values() if isinstance(model, Specular.SERVED)
@@ -121,9 +120,9 @@ def default_method(
 ) -> str:
     """The method of a design that names none.
 
-    It is ``quotient``, which models of R·V need. Point lights and a near viewer get ``chord-local``, the only
-    method that serves them. Three options, which ``quotient`` lacks, get ``renormalise``, the most exact
-    method of normals:
+    The default is ``quotient``, which models of R·V need. Point lights and a near viewer get ``chord-local``,
+    the only method that serves them. Three options, which ``quotient`` lacks, get ``renormalise``, the most
+    exact method of normals:
 
     - a model of `MODELS`, which has a unit of its own in place of a table;
     - an operand;

@@ -30,7 +30,7 @@ class Albedo:
     texture : TextureSampler or None
         Model of the texture unit; ``None``: no textures.
     perspective : bool
-        Whether attributes are over W.
+        Whether attributes are divided by W.
     tints : bool
         Whether materials may be tinted, see `Intensity`.
 
@@ -118,5 +118,5 @@ class Albedo:
         if found.colors is None:
             return sampled
         product = (found.colors * sampled).round_half_up(self.FORMAT.fraction_bits)
-        # Neither is over 1.
+        # Neither factor is over 1.
         return Fixed(self.FORMAT, product.codes)

@@ -32,7 +32,7 @@ def whole_texels(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nd
         Nearest to the middle of both ends.
     range : int64 array, shape (spans,)
         Least whole number r, 0 or more, with ``|coordinate - base| < 2^r`` at both ends. A source of spans
-        cuts a span where r is too large for the error that it grants.
+        cuts a span if its r would make the error too large.
     """
     base = np.floor((left + right) / 2 + 0.5)
     distance = np.maximum(np.abs(left - base), np.abs(right - base)).max(axis=1, initial=0)
@@ -44,15 +44,16 @@ def whole_texels(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nd
 class SpanAttributes(NamedTuple):
     """Attributes of spans: lines at the first pixel, and their steps to the next.
 
-    Pixel i of a span has the word ``start + i 2^-exponent step`` of each attribute, which is U = A/W times a
-    scale of the span, and of 1/W times the same scale. Without perspective it is A itself.
+    At pixel i the word of each attribute, and of 1/W, is ``start + i 2^-exponent step``. The word of an
+    attribute A is U, A/W times a scale of the span. The word of 1/W has the same scale. Without perspective
+    the word of an attribute is A itself.
 
     Parameters
     ----------
     start, step : int64 arrays, shape (spans, attributes)
         Codes of ``SQ(1, 23)``. Colours are first, then texture coordinates.
     exponent : int64 array, shape (spans,)
-        0 to 15, of all steps.
+        0 to 15, the same for all steps of a span.
     weight_start, weight_step : int64 arrays, shape (spans,), or None
         Codes of 1/W; ``None`` without perspective.
     base : int64 array, shape (spans, 2), or None
@@ -112,8 +113,9 @@ class SpanAttributes(NamedTuple):
             Level of the texture; all 0 without it.
         periodic : bool array, shape (spans, 2), or bool
             Whether u and v may change by multiples of `AttributeSpans.PERIOD` texels: with ``repeat`` and
-            ``mirror``. The base is then brought into its range. If not, a span whose ends are both beyond
-            `AttributeSpans.LARGEST_BASE` has this number instead: it has the border's texel all along.
+            ``mirror``. The base is then brought into its range. If not, a span with both ends
+            beyond `AttributeSpans.LARGEST_BASE` gets this number at both ends, because all of its pixels have
+            the texel of the border.
 
         Raises
         ------
@@ -230,8 +232,9 @@ class AttributeSpans:
 
     *Error.* Let u be 2^-23. At pixel i a word is off by at most ``(1 + i 2^-e/2) u``, as `errors` has it: u/2
     for the start, ``i 2^-e u/2`` for the step, u/2 for the word. Let D be the largest difference of a line's
-    ends. Either e has its limit and ``(m - 1) 2^-e`` is at most 1/8. Or one more bit of the steps would not
-    fit and it is at most ``2 D (1 + u)``, under 4. So a word is off by under 3 u.
+    ends. Either e has its limit and ``(m - 1) 2^-e`` is at most 1/8. Or the steps would
+    not fit with e + 1, and ``(m - 1) 2^-e`` is at most ``2 D (1 + u)``, under 4. So a word is off by under 3
+    u.
 
     *No word wraps.* A line has its extremes at its ends. Both are within ``1 - 4 u`` of 0, and words within
     3 u of the line. So words stay within ``1 - u``. A step of 1 or more comes only in a span of two pixels,
@@ -246,7 +249,7 @@ class AttributeSpans:
     coordinates : bool
         Whether there are texture coordinates: attributes u and v, with base, range and level.
     perspective : bool
-        Whether the attributes are over W.
+        Whether the attributes are divided by W.
 
     Raises
     ------
@@ -271,7 +274,7 @@ class AttributeSpans:
     """Texels by which the base of a texture that repeats may change, also where tiles are mirrored."""
 
     LARGEST_BASE = 1984
-    """So that no texture coordinate leaves its word: with A up to 33/32 it stays within 4096 texels."""
+    """Largest base. With A up to 33/32 a texture coordinate then stays in its word, 4096 texels."""
 
     def __post_init__(self) -> None:
         if not (self.colors or self.coordinates):

@@ -34,10 +34,11 @@ class PixelAttributes(NamedTuple):
 class Attributes:
     """``A = U/w`` of every attribute of a pixel, by one reciprocal of w.
 
-    w is shifted by k bits into [1/2, 1), and each U by as many. Let x be ``2 w 2^k``, from 1 to 2. Then
-    ``A = 2 U 2^k r`` with ``r = 1/x``. A table of 512 entries and one product make r. It comes in two parts,
-    ``r = c + d``: c is 1/2, 3/4 or 1, and ``|d| < 0.126``. So the product of an attribute needs no more than
-    18 bits of U: ``2 c U`` is an addition of whole words, and an error of U in d U counts a quarter.
+    w is shifted by k bits into [1/2, 1), and each U by the same k bits. Let x be ``2 w 2^k``, from 1 to 2.
+    Then ``A = 2 U 2^k r`` with ``r = 1/x``. A table of 512 entries and one product make r. It comes in two
+    parts, ``r = c + d``: c is 1/2, 3/4 or 1, and ``|d| < 0.126``. So the product of an attribute needs no
+    more than 18 bits of U: ``2 c U`` is an addition of whole words, and an error of U in ``2 d U`` counts for
+    a quarter.
 
     ============== ============ ==================================================================
     word           format       why
@@ -103,13 +104,13 @@ class Attributes:
 
     @cached_property
     def halves(self) -> np.ndarray:
-        """``2 (2 c - 1)`` of every entry of the table: how many halves of U join U. Shape (512,)."""
+        """``2 (2 c - 1)`` of every entry of the table: the number of halves of U added to U. Shape (512,)."""
         entry = np.arange(1 << self.TABLE_BITS)
         return np.where(entry < self.WHOLE, 2, np.where(entry < self.HALF, 1, 0))
 
     @cached_property
     def table(self) -> tuple[Fixed, Fixed]:
-        """Entries ``base`` and ``slope`` of d, shape (512,) each, by the upper 9 bits of x behind its first.
+        """Entries ``base`` and ``slope`` of d, shape (512,) each, by the 9 bits behind the first bit of x.
 
         ``d = base - slope f`` with f from 0 to 1 in a step. A base is moved by half of the chord's error in
         the middle. It contains half a step of d for its rounding, less the mean of the cut of the product.

@@ -23,8 +23,8 @@ _BASE_UNIT = 2
 def levels_placed(width: int, height: int, levels: int) -> tuple[list[tuple[int, int]], int]:
     """Place of each level in a bank, from the base of the texture on.
 
-    A level of w by h texels has ``S = max(w/2, 1) max(h/2, 1)`` words in a bank. Level 0 is at 0. From its
-    end, S_0, on are the others. Level l is there at S_l, and the level of one texel at 0.
+    A level of w by h texels has ``S = max(w/2, 1) max(h/2, 1)`` words in a bank. Level 0 is at 0. The
+    others follow from its end, S_0, on: level l at S_0 + S_l, and the level of a single texel at S_0.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class LoadedTextures:
     codes : int64 array, shape (words, 4, 3)
         Texels of each word of the four banks: codes of red, green, blue.
     descriptors : tuple of TextureDescriptor
-        Of each texture.
+        Descriptor of each texture.
     """
 
     codes: np.ndarray
@@ -119,9 +119,9 @@ class LoadedTextures:
     def writes(self) -> dict[str, np.ndarray]:
         """Beats that load the memory: ``value`` of 18 bits, and ``begins``.
 
-        A value with ``begins`` is an index, in pairs of words. The values behind it are the words from there
-        on. Each word of bank 0 is followed by those of banks 1 to 3, and of each word come the lower 18
-        bits, then the upper ones.
+        A value with ``begins`` is an index, in pairs of words. The values behind it are halves of words, from
+        this index on. At each index the words of banks 0 to 3 follow one another. The lower 18 bits of a
+        word come first, then the upper 18 bits.
         """
         halves = self.words[:, :, np.newaxis] >> np.array([0, 18]) & 0x3FFFF
         value = np.r_[0, halves.ravel()]
@@ -133,10 +133,10 @@ class TexelMemory:
     """Four banks of texels: any 2 by 2 neighbours are in different banks, and are read at once.
 
     *Code.* A channel has 12 bits: 11 bits of a number, and above them a bit for the size of its step. In
-    units of 2^-14, a fine code c is c, for numbers to 1/8. A coarse code is ``8 c + 7``. These values are in
-    linear light, times ``1 - 2^-14``: the filter divides by this factor at its end, so that the largest code
-    is exactly 1. A texel is off by at most 2^-15 to 1/8, and 2^-12 from there on. After the transfer of sRGB
-    both are at most 0.101 LSB. Equal steps of 2^-12 would be off by 0.4 LSB near black.
+    units of 2^-14, a fine code c stands for c, up to 1/8. A coarse code c stands for ``8 c + 7``. These
+    values are in linear light, times ``1 - 2^-14``: the filter divides by this factor at its end, so that the
+    largest code is exactly 1. A texel is off by at most 2^-15 to 1/8, and 2^-12 from there on. After the
+    transfer of sRGB both are at most 0.101 LSB. Equal steps of 2^-12 would be off by 0.4 LSB near black.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ class TexelMemory:
         return side
 
     def load(self, textures: Sequence[Texture]) -> LoadedTextures:
-        """Contents with all levels of some textures. A texture that comes twice is there once.
+        """Contents with all levels of some textures. A texture that is given twice is stored once.
 
         A base is a multiple of the power of two that holds the texture. So an address is a base and bits
         beside it, with no sum.
@@ -258,7 +258,7 @@ class TexelMemory:
         return levels_placed(width, height, len(texture.levels))
 
     def _does_not_fit(self, textures: Sequence[Texture], words: int) -> str:
-        """Message with the words that they need, and with what fits."""
+        """Message with the number of words that the textures need, and the size of a texture that fits."""
         height, width, _ = textures[0].texels.shape
         what = f"a texture of {width}x{height} texels needs"
         if len(textures) > 1:

@@ -50,7 +50,7 @@ class TextureAddress:
     share_bits : int
         Fraction bits of a coordinate, and of a weight, 8 to 14.
     bilinear : bool
-        Whether there are textures that are no ``nearest``. If not, weights are 0 or 1, in one bit.
+        Whether there are textures with another filter than ``nearest``. If not, weights are 0 or 1, in a bit.
 
     Raises
     ------
@@ -90,7 +90,7 @@ class TextureAddress:
         coordinates : Fixed, shape (places, 2), `coordinate_format`
             u and v, in texels of the level.
         level : int64 array, shape (places,)
-            Level of each place, 0 to 15. All levels from that of one texel on are that level.
+            Level of each place, 0 to 15. Levels beyond the level of a single texel count as this level.
         """
         nearest = descriptor.nearest or not self.bilinear
         one = 1 << self.share_bits

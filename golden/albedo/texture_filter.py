@@ -21,7 +21,7 @@ class TextureFilter:
     word         format    why
     ============ ========= ==================================================================
     texel        UQ(0, 14) `TexelMemory.values`; 1 is ``1 - 2^-14``
-    a, b         UQ(0, 17) with half a step of the colour, so that its end is a cut
+    a, b         UQ(0, 17) with half a step of the colour, whose last rounding is then a cut
     weight       UQ(1, F)  0 to 1
     product      SQ(1, 18) cut
     row          UQ(0, 17) rounded

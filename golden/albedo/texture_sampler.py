@@ -31,7 +31,7 @@ class TextureSampler:
         Fraction bits of a coordinate, 8 to 14. A coordinate that is rounded to them is off by
         ``2^-(share_bits + 1)``.
     bilinear : bool
-        Whether there are textures that are no ``nearest``.
+        Whether there are textures with another filter than ``nearest``.
 
     Source: docs/theory/textures.md#texture-unit; not in the documents.
     """

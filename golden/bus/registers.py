@@ -120,7 +120,7 @@ def frame_registers(keep: bool = False) -> list[Register]:
     Parameters
     ----------
     keep : bool
-        Whether the core tests depths. These begin anew with each frame unless they are kept.
+        Whether the core tests depths. Each frame clears the depths unless they are kept.
     """
     borders = {
         "left": "first column of the picture on the grid",

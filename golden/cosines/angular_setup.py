@@ -48,7 +48,7 @@ class AngularSetup:
     Beyond 90 degrees ``|N_r + N_l|^2`` takes the role of w, and x and y are exchanged. So angles from 0 to
     180 degrees are possible. Only opposite normals have no plane. The curve then goes through the pole
     ``x = 0``. The rounding of the normals rotates the plane in proportion to ``1/sin psi``. So spans over 150
-    degrees are flagged, by the comparison ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``. Its limit is lowered by
+    degrees are flagged, by the comparison ``|N_r + N_l|^2 < 4 cos^2(75 degrees)``. The limit is lowered by
     the largest error of rounding. So all spans from 150.01 degrees on are flagged.
 
     Polar coordinates come from 22 steps of CORDIC [Volder59]. Shifts and additions divide its gain out. A
@@ -324,7 +324,7 @@ class AngularSetup:
         return (radians * self.TURNS_PER_RADIAN).extend(self.ANGLE_FORMAT)
 
     def _looked_up(self, table: tuple[Fixed, Fixed], bits: np.ndarray, width: int) -> tuple[Fixed, Fixed]:
-        """Word of a table at the leading bits, and its change times the fraction that follows them."""
+        """Word of a table at the leading bits of an operand, and the word's change times the other bits."""
         values, changes = table
         address = bits >> (width - self.ADDRESS_BITS)
         fraction = bits >> (width - self.ADDRESS_BITS - self.FRACTION_BITS) & ((1 << self.FRACTION_BITS) - 1)

@@ -219,7 +219,7 @@ class ChordSetup:
 
         The error is in units of `ONE_SQUARED`, like u. The error of the three values is half a step, which
         the quadratic multiplies by at most 1.25. The rounding of G is 2^-21. ``t (1 - t)``, at most 1/4,
-        multiplies this rounding, so both ends have no part of it. The rest is `walk_error`.
+        multiplies this rounding, so it has no effect at both ends. The rest is `walk_error`.
 
         Parameters
         ----------

@@ -42,13 +42,13 @@ class Quotient:
     ============ =========== =====================================================================
     word         format      why
     ============ =========== =====================================================================
-    m, w         SQ(2, 40)   cut; 6 of the accumulators' bits under those of ``v·v``
+    m, w         SQ(2, 40)   cut; 6 bits of the accumulators below the bits of ``v·v``
     q            UQ(2, 34)   sum of m and w, each cut to 34
     q shifted    UQ(2, 19)   cut; 9 bits address the table, 12 interpolate
     r            UQ(0, 17)   1/2 to 1; rounded; saturates
     r^2          UQ(0, 17)   1/4 to 1; cut
     line         SQ(2, 16)   l 2^k, cut
-    N·L          SQ(2, 18)   cut, behind the bit by which `Diffuse` rounds
+    N·L          SQ(2, 18)   cut; the last bit is for the rounding in `Diffuse`
     numerator    17 bits     14 to 17 of them count; cut
     place        UQ(i, 12)   cut
     ============ =========== =====================================================================
@@ -165,7 +165,7 @@ class Quotient:
         past = (self.parts * (OCTAVES + 1) * STEPS) << FRACTION_BITS
         if not self.spans.highlights:
             return cosine, Fixed(self.place_format, np.full(line.shape, past)), too_small
-        # At most z^2 of each light, but for the drift.
+        # At most z^2 of each light, except for the drift.
         exact = SQ(2, cut).wrap((rest + numerator[:, 0])[:, np.newaxis] - numerator)
         second = self._second(numerator, exact)
         chosen = np.maximum(np.where(second, exact, numerator), 0)
@@ -182,7 +182,7 @@ class Quotient:
         return numerator >> dropped > rest >> dropped
 
     def _place(self, chosen: np.ndarray, square_root: np.ndarray, shift: np.ndarray) -> np.ndarray:
-        """Place of ``chosen / q`` in a part of the table, 20 bits; 2^20 and more from 1 on."""
+        """Place of ``chosen / q`` in a part of the table: 20 bits, or 2^20 or more if it is 1 or more."""
         group = np.full(chosen.shape, self.GROUPS)
         for k in reversed(range(self.GROUPS)):
             group[chosen >> (38 - 4 * k) > 0] = k

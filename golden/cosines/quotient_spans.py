@@ -96,7 +96,7 @@ class PixelWords(NamedTuple):
     line : Fixed, shape (pixels, lights)
         l of each light.
     away : bool array, shape (pixels, lights)
-        Whether ``z < 0``. It is ``False`` if z is not taken.
+        Whether ``z < 0``. It is ``False`` if z is not used.
     """
 
     numerator: Fixed
@@ -132,7 +132,7 @@ class QuotientSpans:
     - ``m = x^2 + y^2``, the numerator of ``sin^2 gamma``; with ``mirror`` ``x^2 + (y cos a)^2``;
     - ``w = q - m`` of the first light: ``z^2``; with ``mirror`` ``z^2 + (y sin a)^2``;
     - ``l = x sin a + z cos a``, the numerator of N·L;
-    - z, whose sign tells whether there is a highlight; not with ``mirror``.
+    - z, whose sign tells whether there is a highlight; ``mirror`` does not use z.
 
     Without highlights ``w = x^2 + y^2 + z^2`` in the frame with z along the first light, and l is z. A
     further light brings its l alone.

@@ -285,7 +285,7 @@ class Recurrence:
         codes = replace(self, interleave=1).states(first, second, coefficient, shift, 8).codes.T
         start, following = codes[:, :4], codes[:, 4:]
         if self.form == "reinsch":
-            # The half step that the register of x holds.
+            # The register of x holds half a step of the operand, which start values do not have.
             start, following = (
                 self.state_format.wrap(start - self._half_operand),
                 self.state_format.wrap(following - start),

@@ -45,7 +45,7 @@ class RecurrenceSetup:
     =============== ============ =================================================================
     a, b            SQ(2, 34)    times 1 + 2^-16, so that the code of length 1 counts as 1
     q               UQ(0, 35)    also times 1 + 2^-16; saturates. Word UQ(0, 17), rounded; shift 0 to 34
-    p-1, i-1        UQ(0, 17)    from UQ(0, 22), rise UQ(-8, 22), 512 words by q
+    p-1, i-1        UQ(0, 17)    from 512 words UQ(0, 22), with rises UQ(-8, 22), by q
     1-k, s          UQ(0, 17)    from the same formats, by Q in UQ(2, 21)
     psi^2/2, Q/8    UQ(0, 17)    word, 1/2 or more, rounded; their shifts are added
     1/(m-1)         UQ(0, 17)    table of 2048 words, with ``1/(m-1)^2`` of the same precision

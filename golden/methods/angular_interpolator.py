@@ -78,7 +78,7 @@ class AngularInterpolator(EndNormalInterpolator):
         pixels = pixels_of(length)
 
         def complement(vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            """1 - cosine of a vector at every pixel, and the flags."""
+            """1 minus the cosine of a vector and the normal, at every pixel; and the flags."""
             every = Fixed(COMPONENT, np.broadcast_to(vector, normal_left.codes.shape))
             _, phase, step, cos_beta, out_of_range = self.setup.compute(
                 normal_left, normal_right, every, length

@@ -20,7 +20,7 @@ __all__ = ["METHODS", "PUBLISHED", "BisectionInterpolator"]
 
 @dataclass(frozen=True)
 class BisectionInterpolator(NormalInterpolator):
-    """Normals on straight lines over ``2^k`` arcs of the great circle; k is the least within the threshold.
+    """Normals on straight lines over ``2^k`` arcs of the great circle, with the least k for the threshold.
 
     Formats and error bounds are those of `AdaptiveNormaliser`, for spans to 90 degrees.
 
@@ -70,7 +70,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     @property
     def degrees(self) -> Sequence[int]:
-        """Degrees of the factor of `Bisection`; none as published."""
+        """Degrees of the factor of `Bisection`; empty for the published factor."""
         return () if self.bisection.as_published else (1, 2)
 
     def with_degree(self, degree: int) -> Interpolator:

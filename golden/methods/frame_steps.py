@@ -1,4 +1,4 @@
-"""Steps of a frame that a method chooses from: to cut, fill, shade exactly and bound its spans.
+"""Steps of a frame: ways to cut, fill, shade exactly and bound spans, among which a method chooses.
 
 `blysk.golden.frames` gives a method an object of each interface, for its scene and design. The method calls
 the step that suits it.
@@ -19,19 +19,19 @@ class SpanCutter(Protocol):
     """Ways to cut the spans of a frame. Each gives the spans, and the number of given spans that were cut."""
 
     def by_error(self) -> tuple[Raster, int]:
-        """Until the method's curve keeps its tolerance, see `cut_by_error`."""
+        """Cut until the method's curve keeps its tolerance, see `cut_by_error`."""
 
     def by_angle(self) -> tuple[Raster, int]:
-        """Until no span is wider than `Interpolator.widest_span`, see `cut_by_angle`."""
+        """Cut until no span is wider than `Interpolator.widest_span`, see `cut_by_angle`."""
 
     def by_length(self, largest_ratio: float) -> tuple[Raster, int]:
-        """Until no pixel's N/W is too short compared with the longer end's N/W, see `cut_by_length`."""
+        """Cut until no pixel's N/W is too short compared with the longer end's N/W, see `cut_by_length`."""
 
     def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
-        """Until the two ends are alike, see `cut_by_ends`."""
+        """Cut until the two ends of each span are alike, see `cut_by_ends`."""
 
     def uncut(self) -> Raster:
-        """The spans as they are given."""
+        """Leave the spans as they are given."""
 
     def split_pairs(self) -> Raster:
         """Divide each span of two pixels into two spans of one pixel. The other spans stay."""
@@ -60,24 +60,24 @@ class ExactShading(Protocol):
     """Ways to shade a frame by a method in exact arithmetic; float64 arrays, shape (height, width, 3)."""
 
     def by_normals(self) -> np.ndarray:
-        """By `Interpolator.exact_normals` of the unit normals at both ends."""
+        """Shade by `Interpolator.exact_normals` of the unit normals at both ends."""
 
     def by_lines(self) -> np.ndarray:
-        """By `Interpolator.exact_normals` of the ends of the true line."""
+        """Shade by `Interpolator.exact_normals` of the ends of the true line."""
 
     def by_values(self, exact_operands: Callable[..., tuple[np.ndarray, ...]]) -> np.ndarray:
-        """By operands from the values of spans, as of `LocalChordInterpolator.exact_operands`."""
+        """Shade by operands from the values of spans, see `LocalChordInterpolator.exact_operands`."""
 
 
 Bound = TypeVar("Bound", covariant=True)
-"""Of a frame, or of each of its pixels."""
+"""Bound of a frame, or of each of its pixels."""
 
 
 class ErrorBounds(Protocol[Bound]):
     """Ways to bound the error of a frame or of its pixels, in LSB; ``None`` where no bound is known."""
 
     def by_tolerance(self) -> Bound | None:
-        """From the tolerances of cut spans, see `error_bound`."""
+        """Bound from the tolerances of cut spans, see `error_bound`."""
 
     def by_vectors(self) -> Bound | None:
-        """From the vectors of the spans, see `quotient_bound`."""
+        """Bound from the vectors of the spans, see `quotient_bound`."""

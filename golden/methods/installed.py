@@ -26,7 +26,7 @@ def installed_methods() -> "list[EntryPoint]":
     - the component of the method: a subclass of `InterpolatorUnit` whose ``model=`` names its class;
     - ``RECORD``, if tables and tests of units are to find the component.
     """
-    # It reads the metadata of every package.
+    # The call reads the metadata of every package.
     from importlib.metadata import entry_points
 
     return sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
@@ -38,12 +38,12 @@ def load_methods(known: Iterable[str]) -> list[ModuleType]:
     Parameters
     ----------
     known : iterable of str
-        Names of the methods that there are already.
+        Names of the methods that exist already.
 
     Raises
     ------
     MethodError
-        If a module cannot be imported, lacks ``METHODS``, or has a method with the name of another.
+        If a module cannot be imported, lacks ``METHODS``, or has a method with the name of another method.
     """
     names, found = set(known), []
     for entry in installed_methods():

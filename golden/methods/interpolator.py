@@ -127,7 +127,7 @@ class Interpolator(ABC):
 
     @property
     def lights_cut(self) -> bool:
-        """Whether each light that is on may cut spans, even without effect, as the curve has an error."""
+        """Whether each light that is on may cut spans, even if it lights no pixel: the curve has an error."""
         return False
 
     @property
@@ -218,7 +218,7 @@ class Interpolator(ABC):
     def shortest_words(self, longest: int) -> int | None:
         """Fraction bits that are enough for spans up to a length.
 
-        ``None`` if the method has no more than these.
+        ``None`` if the method's words cannot be shortened.
         """
         return None
 
@@ -247,7 +247,7 @@ class Interpolator(ABC):
         return self
 
     def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
-        """The specular unit with the model of a given unit that takes the method's operand, in its scale.
+        """The specular unit that has the model of a given unit and takes the method's operand, in its scale.
 
         Raises
         ------
@@ -339,7 +339,7 @@ class Interpolator(ABC):
         ValueError
             If triangles cannot give the operands of the method.
         """
-        raise ValueError(f"triangles do not give what {self.name} takes; use another method")
+        raise ValueError(f"triangles do not give the operands of {self.name}; use another method")
 
     def constants_for(self, scene: Scene, constants: Sequence[FrameConstants]) -> list[FrameConstants]:
         """Frame constants of each material, with L and H in the frame that the method takes."""
@@ -373,7 +373,7 @@ class Interpolator(ABC):
         return None
 
     def triangle_axes(self, scene: Scene, lights: int, highlights: bool) -> np.ndarray | None:
-        """Axes in the scene's frame of the normals that triangles have, by rows; ``None``: the scene's own.
+        """Axes of the frame for normals of triangles, as rows in the scene's frame; ``None``: the scene's frame.
 
         Parameters
         ----------

@@ -56,12 +56,12 @@ class LocalChordInterpolator(Interpolator):
     of a frame.
 
     Where N·L changes its sign the highlight ends at any brightness. A pixel whose N·L is within the error of
-    0 may have the highlight or not. Where `is_lit`, cut a span with these pixels further.
+    0 may have the highlight or not. If `is_lit`, cut a span with these pixels further.
 
     A light that fades, by its distance or as a spot, has a factor a. Its values of N·L contain the factor,
-    ``a N·L``. At each pixel a multiplies its specular term (`Factor`). There a is a third quadratic of the
-    light, in the formats of N·L. Spans are cut until three conditions hold at every pixel that the light
-    reaches:
+    ``a N·L``. At each pixel the factor multiplies the specular term of its light (`Factor`). The factor is a
+    third quadratic of the light, in the formats of N·L. Spans are cut until three conditions hold at every
+    pixel that the light reaches:
 
     - the error of ``a N·L`` is within `DIFFUSE_BUDGET`;
     - where the highlight shows, the error of a is within `FACTOR_BUDGET`;

@@ -159,7 +159,7 @@ class NormalInterpolator(EndNormalInterpolator):
     Raises
     ------
     ValueError
-        If the operand is neither.
+        If the operand is unknown.
     """
 
     operand: Operand = "cosine"
@@ -189,7 +189,7 @@ class NormalInterpolator(EndNormalInterpolator):
 
     @property
     def highlight_excess(self) -> float:
-        """`normal_error`. With half the squared chord, twice the error, as ``|N - H| <= 2``, and the cut.
+        """`normal_error`; with half the squared chord twice this error, as ``|N - H| <= 2``, plus the cut.
 
         Let r be the length of the curve and c the cosine to H. Half the squared chord is
         ``(1 - r)^2/2 + r (1 - c)``, at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from
@@ -224,7 +224,7 @@ class NormalInterpolator(EndNormalInterpolator):
     def products(self, normals: Fixed, direction: Fixed, halfway: Fixed) -> tuple[Fixed, Fixed]:
         """N·L, exact, and the operand of the specular unit.
 
-        This is N·H, exact, or half the squared chord, cut to 25 fraction bits.
+        The operand is N·H, exact, or half the squared chord, cut to 25 fraction bits.
 
         Parameters
         ----------

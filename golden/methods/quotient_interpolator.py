@@ -165,7 +165,7 @@ class QuotientInterpolator(Interpolator):
         return cutter.by_ends(self.LARGEST_RATIO)
 
     def least_cut(self, cutter: SpanCutter) -> Raster:
-        """Spans of two pixels as two of one: their step would not fit."""
+        """Spans of two pixels become two spans of one pixel, because their step would not fit."""
         return cutter.split_pairs()
 
     def filled(self, filler: SpanFiller) -> Spans:

@@ -114,7 +114,7 @@ class RecurrenceInterpolator(EndNormalInterpolator):
         return Operands(cosine, (one - highlight).saturate(Specular.ARGUMENT_FORMAT), out_of_range)
 
 
-METHODS = {RecurrenceInterpolator(): "equal angles on the great circle, each normal from the two before"}
+METHODS = {RecurrenceInterpolator(): "equal angles on the great circle, each cosine from the two before"}
 """The method of this module, and a line about it."""
 
 PUBLISHED = {RecurrenceInterpolator("direct"): "the recurrence as drawn, which is unstable"}

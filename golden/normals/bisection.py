@@ -213,7 +213,7 @@ class Bisection:
         one_minus_cosine : Fixed, shape (...), SQ(2, 17)
             ``u``.
         out_of_range : bool array, shape (...)
-            Whether the two are further apart than `max_angle`. The normal is then undefined.
+            Whether the two normals are further apart than `max_angle`. The middle normal is then undefined.
 
         Raises
         ------

@@ -79,7 +79,7 @@ class Format:
         return 2.0**-self.fraction_bits
 
     def wrap(self, codes: np.ndarray) -> np.ndarray:
-        """Codes with the low bits of integers of any size; an int64 sum may have overflowed."""
+        """Codes made of the low bits of integers of any size. An int64 sum may have overflowed."""
         low = codes & ((1 << self.width) - 1)
         return low - ((low >> (self.width - 1)) << self.width) if self.signed else low
 
@@ -310,7 +310,7 @@ class Fixed:
         dropped = self.format.fraction_bits - fraction_bits
         if dropped == 0:
             return self
-        # One bit less is shifted out before the half is added, so that no intermediate outgrows an int64.
+        # All dropped bits but one are shifted out before the half is added. So no sum outgrows an int64.
         return Fixed._exact(format, ((self.codes >> (dropped - 1)) + 1) >> 1)
 
     def saturate(self, format: Format) -> "Fixed":

@@ -76,7 +76,7 @@ def minimax(
     basis, triangle = np.linalg.qr(powers[:, free])
     matrix = basis * np.sqrt(GRID)
     ones = np.ones((len(x), 1))
-    # Its import takes half a second, and most programs need no fit.
+    # The import takes half a second, and most programs need no fit.
     from scipy.optimize import linprog
 
     tighter = 1.0

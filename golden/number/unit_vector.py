@@ -35,7 +35,7 @@ CODE_LENGTH_ERROR = 3**0.5 * COMPONENT.step / 2 * (1 + 2.0**-10)
 
 
 def quantise(vectors: np.ndarray) -> np.ndarray:
-    """Codes of unit vectors, with a length closer to 1 than rounded components have.
+    """Codes of unit vectors. Their length is nearer to 1 than the length of rounded components.
 
     A vector has eight neighbours on the grid of codes. The neighbour with the length nearest to 1 is taken.
     Near the peak of a highlight an error of the normal's length changes the specular term at first order. An
