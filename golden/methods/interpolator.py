@@ -373,7 +373,7 @@ class Interpolator(ABC):
         return None
 
     def triangle_axes(self, scene: Scene, lights: int, highlights: bool) -> np.ndarray | None:
-        """Axes of the frame for normals of triangles, as rows in the scene's frame; ``None``: the scene's frame.
+        """Axes of the frame for normals of triangles, by rows; ``None``: the axes of the scene.
 
         Parameters
         ----------
