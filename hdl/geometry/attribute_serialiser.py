@@ -44,8 +44,8 @@ class AttributeSerialiserUnit(wiring.Component):
     Parameters
     ----------
     skid : bool
-        Whether the output has a skid buffer. Else it has a register that keeps its payload until this is
-        taken.
+        Whether the output has a skid buffer. If not, the output has a register, which keeps its payload until
+        the sink takes it.
 
     Members
     -------

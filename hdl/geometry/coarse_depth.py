@@ -1,4 +1,4 @@
-"""Coarse depth test, which finds hidden spans by a bound of the depths of each block."""
+"""Coarse depth test, which finds hidden spans by a bound of the depths in each block."""
 
 from operator import and_
 
@@ -92,7 +92,7 @@ class CoarseDepthUnit(wiring.Component):
         m.d.comb += advance.eq(skid_buffer(m, self.o, valid, answer))
         word = data.StructLayout(
             {
-                # The bound, inverted: a cleared word is 0.
+                # The bound, inverted, so that a cleared word is 0.
                 "nearness": given.depth_bits,
                 "candidate": given.depth_bits,
                 "mask": given.block,
@@ -180,7 +180,7 @@ class CoarseDepthUnit(wiring.Component):
         return span, span_valid, place, sweeping, held
 
     def _blocks(self, m: Module, bits: int, advance: Signal, given_span: tuple) -> tuple[data.View, Value]:
-        """Spans split into blocks, one a cycle; also whether a block is there or will follow."""
+        """Split spans into blocks, one a cycle. Also returns whether a block is there or will follow."""
         given, incoming = self.model, self.i.payload
         span, span_valid, held = given_span
         step = {"step": DEPTH_STEP.width, "outside": 1}

@@ -53,11 +53,11 @@ def is_inside(place: data.View, size: tuple[int, int]) -> Value:
 
 
 class DepthMemory(wiring.Signature):
-    """Port to a memory of depths, one word a pixel. The word of a read comes on the next cycle.
+    """Port to a memory of depths, one word for each pixel. The word of a read comes on the next cycle.
 
     If the same place is read and written on the same cycle, the read gets the old word. ``read_data`` keeps
     its value while ``read_enable`` is low. Before each picture every word is `DepthTester.CLEARED`. A
-    `DepthTesterUnit` that clears writes these words. Else the owner of the memory writes them.
+    `DepthTesterUnit` with ``clears`` writes these words. Otherwise the owner of the memory writes them.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class DepthTesterUnit(wiring.Component):
 
     With ``clears`` the unit writes `DepthTester.CLEARED` to each place of the picture, one a cycle. It does
     so when the first pixel comes after a reset, and after each change of ``picture.number``. Pixels wait
-    meanwhile. A unit without ``clears`` is right for one picture. Clear its memory outside between pictures.
+    meanwhile. Without ``clears`` the unit draws one picture only. Clear its memory outside between pictures.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class DepthTesterUnit(wiring.Component):
     status : :py:`Out(counters_shape("pixels", "hidden"))`
         Number of pixels, and number of dropped pixels among them, since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
-        Depths so far. Only if ``size`` is ``None``.
+        Memory of the depths. Only if ``size`` is ``None``.
     picture : :py:`In(picture_shape(x_bits, y_bits))`
         Size of the picture, constant while pixels come, and a number that changes before the first pixel of
         each next picture. Only if the unit clears.
@@ -174,7 +174,7 @@ class DepthTesterUnit(wiring.Component):
         code = total.as_signed() >> SPAN_DEPTH.fraction_bits
         depth = Mux(code < 0, 0, Mux(code > DepthTester.FARTHEST, DepthTester.FARTHEST, code))
         nearer, drawn = Signal(name="nearer"), Signal(name="drawn")
-        # These words are written after the read, or on the clock of the read.
+        # These words are written after the read, or on the same cycle.
         late = [(valid[last], stages[last])] + [
             (Signal(name=f"before_valid_{k}"), Signal.like(stages[last], name=f"before_{k}"))
             for k in range(last - 1)
@@ -184,9 +184,9 @@ class DepthTesterUnit(wiring.Component):
             there = Signal.like(port.read_data, name="there")
             with m.If(advance):
                 m.d.sync += there.eq(port.read_data)
-        # The memory's word comes late. So it is compared before the unit knows which depth counts.
+        # The memory's word comes late in a cycle. So it is compared before the unit knows which depth counts.
         m.d.comb += [nearer.eq(judged.depth < there), drawn.eq(valid[last - 1] & nearer)]
-        # The comparison of places is ready a cycle before.
+        # The places are compared a cycle earlier.
         nexts = [judged, *(pixel for _, pixel in late[:-1])]
         same = [Signal(name=f"same_{k}") for k in range(last)]
         for (written, pixel), flag in reversed(list(zip(late, same, strict=True))):
@@ -251,7 +251,7 @@ class DepthTesterUnit(wiring.Component):
         return stale | turns | sweeps
 
     def _remember(self, m: Module) -> None:
-        """A memory of the picture's size at the port; it holds inverted depths."""
+        """A memory of the picture's size at the port. The memory holds inverted depths."""
         # Inverted, so that a cleared memory holds zeros.
         port, (width, height) = self._port, self.size
         m.submodules.depths = memory = Memory(shape=DEPTH.width, depth=width * height, init=[])

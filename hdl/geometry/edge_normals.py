@@ -25,7 +25,7 @@ def true_spans_shape() -> data.StructLayout:
 
 
 class EdgeNormalsUnit(wiring.Component):
-    """Normalises the ends of a piece one after the other. `EdgeNormals` is the model.
+    """Normalises the ends of a piece one after the other. `EdgeNormals` is the bit-accurate model.
 
     A piece of one pixel takes one cycle. A longer piece takes two cycles, one for each normal. A span of one
     pixel is offered `latency` cycles, 20, after its piece is taken in. A longer span is offered one cycle
@@ -40,16 +40,16 @@ class EdgeNormalsUnit(wiring.Component):
     model : EdgeNormals
         Bit-accurate model.
     compact : bool
-        The compact style.
+        Whether the unit has the compact style.
 
     Members
     -------
     i : :py:`In(stream.Signature(pieces_shape()))`
         Pieces of spans.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
-        The same with unit normals.
+        The same pieces, with unit normals.
     status : :py:`Out(counters_shape("repaired"))`
-        Normals that took the place of lost normals, since the reset. Each is counted one cycle later.
+        Number of lost normals that were replaced, since the reset. Each is counted one cycle later.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
@@ -75,7 +75,7 @@ class EdgeNormalsUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """Sends a piece's vectors one after the other, and collects its normals.
+        """Send a piece's vectors one after the other, and collect its normals.
 
         Other words wait in a FIFO.
         """
@@ -111,8 +111,7 @@ class EdgeNormalsUnit(wiring.Component):
         ]
         begins = moves & ~turn
         if self.compact:
-            # This is a cycle later. The piece stays for at least one more cycle, and then the next piece
-            # begins.
+            # The FIFO is written a cycle late. The piece stays in its register for at least this cycle.
             begun = Signal(name="begun")
             m.d.sync += begun.eq(begins)
             begins = begun

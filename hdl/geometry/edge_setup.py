@@ -15,10 +15,10 @@ from blysk.hdl.geometry.triangles import first_centre, tag_shape
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
 
 _DIVISORS = (0, "divisor"), (1, "triple")
-"""Registers of a divisor and of three times a divisor, with a number k: 2 k bits more than a divisor."""
+"""Number k and name of the registers of a divisor and its triple, which have 2 k bits more than a divisor."""
 
 ALONG_BITS = 9
-"""Bits of `Edges.along`. It is 0 to 511, because n of `EdgeSetup` is 2 only where its b is over 0."""
+"""Bits of `Edges.along`. It is 0 to 511, because n of `EdgeSetup` is 2 only if b is over 0."""
 
 
 def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
@@ -48,7 +48,7 @@ def edges_shape(grid: Grid = GRID) -> data.StructLayout:
 
 @dataclass(frozen=True)
 class _Ages:
-    """Stages of a beat (`PipelinedUnit.at`): an edge's division and start are loaded, and are done."""
+    """Stages of a beat (`PipelinedUnit.at`) at which an edge's division and its start are loaded, and end."""
 
     divide: int
     start: int
@@ -268,7 +268,7 @@ class EdgeSetupUnit(PipelinedUnit):
         under, over = carried < 0, less >= 0
         places = Mux(under, 0, Mux(over, 2, 1))
         error = Mux(under, more, Mux(over, less, carried))[: grid.bits]
-        # The column takes one cycle more.
+        # The column takes one cycle more than the error.
         whole = self.register(m, ((begin >> s) + total)[:X_BITS], f"whole_{number}")
         column = (whole + self.register(m, places, f"places_{number}"))[:X_BITS].as_signed()
         along = ((places << s) - low).as_signed() << (8 - s)
@@ -306,10 +306,11 @@ class EdgeSetupUnit(PipelinedUnit):
         return word
 
     def _steps(self, rest: Value, word: Value, divisor: Value, triple: Value) -> tuple[Value, Value]:
-        """One or two steps of a division: ``rest`` takes in a bit of ``word``, minus or plus the divisor.
+        """Make one or two steps of a division. Returns ``rest`` and ``word``.
 
-        The sign of ``rest`` decides between minus and plus. The second step is computed from ``rest`` for
-        both signs of the first result, with one or three times the divisor. Returns ``rest`` and ``word``.
+        A step shifts a bit of ``word`` into ``rest``, and subtracts or adds the divisor. The sign of ``rest``
+        decides. The second step is computed from ``rest`` for both signs of the first result, with one or
+        three times the divisor.
         """
         # An unsigned number would make the comparison with 0 constant.
         subtract = rest >= 0 if rest.shape().signed else Const(1)
@@ -327,8 +328,8 @@ class EdgeSetupUnit(PipelinedUnit):
         positive = first >= 0
         if self.bits_per_cycle == 1:
             return first, Cat(positive, word[:-1])
-        # First result not negative: minus 3 divisors if `subtract`, else plus 1. Negative: minus 1 divisor if
-        # `subtract`, else plus 3.
+        # If the first result is not negative, both steps subtract 3 divisors (`subtract`) or add 1. If it is
+        # negative, both steps subtract 1 divisor (`subtract`) or add 3.
         down, up = added(word[-2:], triple, divisor), added(word[-2:], divisor, triple)
         second = Mux(positive, down, up).as_signed()
         return second, Cat(Mux(positive, down >= 0, up >= 0), positive, word[:-2])

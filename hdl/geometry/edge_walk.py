@@ -61,7 +61,7 @@ class EdgeWalkUnit(wiring.Component):
     grid : Grid
         Fraction bits of the coordinates.
     skid : bool
-        Whether the output has a skid buffer. Else a scanline takes two cycles.
+        Whether the output has a skid buffer. If not, a scanline takes two cycles.
 
     Members
     -------
@@ -196,5 +196,5 @@ class _Edge:
 
     @property
     def words(self) -> tuple[Signal, ...]:
-        """All of them."""
+        """Registers with the words of the edge, without the carry."""
         return self.x, self.step, self.error, self.error_step, self.lack

@@ -54,8 +54,8 @@ PORT_DESCRIPTIONS = {
 WAITING_TRIANGLES = 512
 """Triangles between sort and setup, in block RAMs, in the throughput style.
 
-Dropped triangles come in runs. Where a mesh shows its back, a run may have hundreds. Meanwhile the setup
-works on the waiting triangles.
+Dropped triangles come in runs. Where a mesh shows its back, a run may have hundreds of triangles. During a
+run the setup works on the waiting triangles.
 """
 
 BLOCK_WORDS = 64
@@ -67,7 +67,7 @@ _COMPACT_GRADIENT = 12
 _INSIDE_BITS = 10
 """Bits of the counters of triangles.
 
-The counters wrap only beyond the number of triangles inside the unit.
+The counters wrap. Their difference is right, because fewer than 2^10 triangles are inside the unit.
 """
 
 
@@ -79,7 +79,7 @@ class _TriangleSetup(wiring.Component):
     grid : Grid
         Fraction bits of the coordinates.
     compact : bool
-        The compact style.
+        Whether the unit has the compact style.
     cuts : bool
         Whether spans are cut.
     """
@@ -164,42 +164,45 @@ class GeometryUnit(wiring.Component):
     triangle. The edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits
     before each lane, so neither lane keeps the other from its turn.
 
-    In the *compact* style one divider serves all edges and one multiplier the gradients of all attributes.
-    Attributes take turns along the spans, too, and so do the normals of a span. With vectors one unit cuts a
-    span and makes the words of its pieces. In this style only the attributes have a FIFO in the setup. Other
-    words wait in registers.
+    In the *compact* style one divider serves all edges. One multiplier serves the gradients of all
+    attributes. Attributes take turns along the spans, too, and so do the normals of a span. With vectors one
+    unit cuts a span and makes the words of its pieces. In this style only the attributes have a FIFO in the
+    setup. Other words wait in registers.
 
     The units work on several triangles at the same time, and the slowest unit sets the pace. A triangle
     takes:
 
-    - in the setup `interval` cycles if it is drawn: 16, compact 48, with two lanes half as many. A triangle
-      that the sort drops takes 4 to 9 cycles, compact 5 to 15 (`VertexSortUnit`);
+    - in the setup `interval` cycles if it is drawn: 16, or 48 in the compact style, and half as many with two
+      lanes. A triangle that the sort drops takes 4 to 9 cycles, or 5 to 15 in the compact style
+      (`VertexSortUnit`);
     - in the walk one cycle for each scanline without pixels in the picture;
-    - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits. These are at least 1 for
-      1 pixel, 2 for 2 pixels and 3 for more, and never more than its pixels. With ``lines`` or ``vectors``
-      the least is 1 for any number of pixels. If n pixels are cut off at the long edge, the scanline takes
-      one more cycle for each bit of n. In the compact style a scanline takes four cycles, and four more for
-      every two of these bits. At the same time the normals take three cycles each. With ``vectors`` each time
-      that a span does not fit, and each piece behind the first, takes two cycles (`SpanHalverUnit`). In the
-      compact style a piece takes 13 cycles or more at the same time (`SerialVectorsUnit`).
+    - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits. The least is 1 cycle for
+      1 pixel, 2 cycles for 2 pixels and 3 cycles for more. With ``lines`` or ``vectors`` the least is 1 cycle
+      for any number of pixels. A span never takes more cycles than it has pixels. If n pixels are cut off at
+      the long edge, the scanline takes one more cycle for each bit of n. In the compact style a scanline
+      takes four cycles, and four more for every two of these bits. At the same time the normals take three
+      cycles each. With ``vectors`` a span takes two more cycles each time that it does not fit, and for each
+      piece behind the first (`SpanHalverUnit`). In the compact style a piece takes 13 cycles or more at the
+      same time (`SerialVectorsUnit`).
 
-    The number of multipliers is `multipliers`: 10, in the compact style 5; with ``lines`` or ``vectors``
-    4 and 2. The second lane adds 4, in the compact style 2.
+    The number of multipliers is `multipliers`: 10, or 5 in the compact style. With ``lines`` or ``vectors``
+    it is 4, or 2 in the compact style. The second lane adds 4, or 2 in the compact style.
 
     Parameters
     ----------
     model : Geometry
         Bit-accurate model: grid, and kind of spans.
     build : Build
-        Style of the geometry, and ``setups``, the number of lanes, from the edges to the planes, that
-        triangles take in turns.
+        Style of the geometry, and ``setups``: the number of lanes, which triangles take in turns. A lane goes
+        from the edges to the planes.
 
     Members
     -------
     i : :py:`In(stream.Signature(triangle_shape(grid)))`
         Triangles.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
-        Their spans. With ``lines`` in `line_spans_shape`, with ``vectors`` in `vector_spans_shape`.
+        Spans of the triangles. With ``lines`` in `line_spans_shape`, with ``vectors`` in
+        `vector_spans_shape`.
     constants : :py:`In(frame_shape())`
         The frame, constant while triangles are inside.
     status : :py:`Out(counters_shape(*COUNTERS))`
@@ -208,7 +211,7 @@ class GeometryUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        No triangle and no span is inside. Rises one cycle after the last has left.
+        High while no triangle and no span is inside. It rises one cycle after the last has left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -277,7 +280,7 @@ class GeometryUnit(wiring.Component):
         return m
 
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
-        """Connect the sort, through the lanes in turns, to the edges for the walk and to the planes."""
+        """Connect the sort and the lanes. Returns the edges for the walk and the planes, merged in turns."""
         drawn = _between("drawn", self._sort.o)
         if self.compact:
             connect(m, self._sort.o, drawn)
@@ -340,7 +343,7 @@ class GeometryUnit(wiring.Component):
         return rows
 
     def _watch(self, m: Module, rows: stream.Interface) -> None:
-        """Whether anything is inside: triangles until their last scanline, and pieces of their spans."""
+        """Drive `idle`. Triangles are inside until their last scanline, and pieces until they leave."""
         sort = self._sort
         dropped = sum(sort.status[name] for name in ("empty", "zero_area", "culled"))[:_INSIDE_BITS]
         taken, walked = (Signal(_INSIDE_BITS, name=name) for name in ("taken", "walked"))

@@ -60,7 +60,7 @@ class GradientSetupUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(attribute_shape()))`
         Attributes.
     o : :py:`Out(stream.Signature(gradient_shape()))`
-        Their gradients.
+        Gradients of the attributes.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
@@ -170,7 +170,7 @@ class GradientSetupUnit(PipelinedUnit):
         return Cat(Const(0, _ROUND), Value.cast(word)).as_signed(), amount
 
     def _start(self, first, short, step, right):
-        """``(k short + n inward) / 256``: four digits of two bits, lowest first, then n's upper bits."""
+        """``(k short + n inward) / 256`` with ``down`` as k: four digits of two bits, then n's upper bits."""
         g, p = self._graph, GradientSetup
         point = p.START_FORMAT.fraction_bits
         down, along = (g.input(name, lambda o, name=name: o[name]) for name in ("down", "along"))

@@ -30,11 +30,11 @@ def with_components(shape: data.StructLayout, components: int) -> data.StructLay
 class LightAdapterUnit(wiring.Component):
     """Components of vectors for further lights, beside the first light's. `LightAdapter` is the model.
 
-    Each component of start and step has a multiplier, which takes x, y and z in turns and adds the products.
-    So the initiation interval is 3. In the *serial* form one multiplier makes all components one after the
-    other. Each component takes 6 cycles. A span is taken in on the last cycle of its interval, and offered 4
-    cycles later. If a span still waits at the output when the next span is made, the next span waits a cycle
-    longer.
+    Each component of start and step has a multiplier. It takes x, y and z in turns, and the products are
+    added. So the initiation interval is 3. In the *serial* form one multiplier makes all components one after
+    the other. Each component takes 6 cycles. A span is taken in on the last cycle of its interval, and
+    offered 4 cycles later. If a span still waits at the output when the next span is made, the next span
+    waits a cycle longer.
 
     Axes are in memories, so they take no registers. Reset does not clear them.
 
@@ -153,7 +153,7 @@ class LightAdapterUnit(wiring.Component):
             done = ends_row
             for stage in range(1, 4):
                 done = register(done, f"done_{stage}")
-            # Results wait in a chain, which moves with each of them.
+            # Results wait in a chain of registers, which moves on with each result.
             for k in range(1, 2 * made):
                 chain.append(register(chain[-1], f"made_{k}", done))
             sums = chain[::-1]

@@ -14,7 +14,7 @@ __all__ = ["MirrorAdapterUnit", "mirror_constants_shape"]
 
 
 def mirror_constants_shape() -> data.StructLayout:
-    """Shape of sin a and cos a, half the angle between light and viewer."""
+    """Shape of sin a and cos a. The angle a is half the angle between light and viewer."""
     return data.StructLayout({name: FixedShape(MirrorAdapter.FORMAT) for name in ("sine", "cosine")})
 
 

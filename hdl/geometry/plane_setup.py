@@ -33,11 +33,12 @@ def scales_shape() -> dict:
 
 
 class PlaneSetupUnit(PipelinedUnit):
-    """``1/D`` and ``1/W`` as mantissas and exponents. `PlaneSetup` is the bit-accurate model.
+    """Reciprocals ``1/D`` and ``1/W`` of a triangle's height D and width W, as mantissas and exponents.
 
-    One shifter normalises height and area, and one table serves both reciprocals. Let I be the initiation
-    interval. The seven multiplications take turns at ``ceil(7 / I)`` multipliers of 18x18 bits. The latency,
-    `latency`, follows from the schedule: 26 cycles for an interval of 16.
+    `PlaneSetup` is the bit-accurate model. One shifter normalises height and area, and one table serves both
+    reciprocals. Let I be the initiation interval. The seven multiplications take turns at ``ceil(7 / I)``
+    multipliers of 18x18 bits. The latency, `latency`, follows from the schedule: 26 cycles for an interval of
+    16.
 
     Parameters
     ----------
@@ -149,7 +150,8 @@ class PlaneSetupUnit(PipelinedUnit):
             kept = Mux(code[point], code[1:], code[:point])
             return FixedValue(p.WIDTH_FORMAT, Mux(sliver, 0, kept)[:point])
 
-        # On a grid of 8 bits, e is 19 less the places of the height, and g is 39 less the places of the area.
+        # These are e and g of `PlaneSetup`. On a grid of 8 fraction bits, e is 19 minus the places of the
+        # height, and g is 39 minus the places of the area.
         row = g.register("row_shift", lambda top: (8 - s + grid.bits - 1 - top.places)[: p.SHIFT_BITS], top)
         column = g.register(
             "column_shift",
@@ -187,7 +189,7 @@ def _bytes(word: Value) -> list[Value]:
 def _move(word: Value, step: int, moved: list) -> tuple[Value, list]:
     """Shift left by ``step`` places if the first ``step`` bits are 0.
 
-    ``moved`` gets a bit that is 1 if shifted.
+    A bit is appended to ``moved``. It is 1 if the word was shifted.
     """
     empty = ~word[-step:].any()
     return Mux(empty, (word << step)[: len(word)], word), [*moved, empty]

@@ -16,7 +16,7 @@ _BITS = GradientSetup.FORMAT.width
 
 
 class AttributeTurns:
-    """Control of the turns of attributes. All come on one cycle, or *serially* in four turns.
+    """Control of the turns of attributes: all attributes on one cycle, or *serially* in four turns.
 
     In the serial form the first attribute decides for all four whether a scanline comes in. The control of
     the walk moves on with the last attribute, `ends`. With ``ahead`` registers tell whether the walk
@@ -29,7 +29,7 @@ class AttributeTurns:
         self.advance, self.leaves = Signal(name="advance", init=ahead), Signal(name="would_leave")
         self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
         # ``accepts``: a scanline comes in, on a step of each attribute; ``goes``: the control moves on;
-        # ``takes``: it takes a scanline; ``loads``: it takes one with pixels.
+        # ``takes``: it takes a scanline; ``loads``: it takes a scanline with pixels.
         self.accepts, self.goes, self.takes = (Signal(name=name) for name in ("accepts", "goes", "takes"))
         self.loads, covered = Signal(name="loads_walk"), rows.payload.row.covered
         opens = ~busy | self.leaves

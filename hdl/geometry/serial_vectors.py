@@ -1,4 +1,4 @@
-"""Serial vectors: from spans of one attribute after the other to pieces with words of the quotient method."""
+"""Serial vectors: from spans, attribute by attribute, to pieces with words of the quotient method."""
 
 from itertools import pairwise
 
@@ -37,8 +37,8 @@ class SerialVectorsUnit(wiring.Component):
 
     A piece takes 13 cycles. Each time that it does not fit, it takes six more cycles. Each time that its
     shift differs from the shift before, it takes five more cycles. Steps 3 and 4 of the next piece begin when
-    this piece was taken. Steps 1 and 2 go on meanwhile. A span that fits is offered at most `latency` cycles
-    after its last attribute was taken. The unit has no multipliers.
+    this piece has been taken. Steps 1 and 2 go on meanwhile. A span that fits is offered at most `latency`
+    cycles after its last attribute was taken. The unit has no multipliers.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class SerialVectorsUnit(wiring.Component):
         turns, ends, whole = (Signal(name=name) for name in ("turns", "ends", "whole"))
         fits, agrees = Signal(name="fits"), Signal(name="agrees")
         begins, decides, retries = ~place.any(), Signal(name="decides"), Signal(name="retries")
-        # A piece has not left yet, so the words of the next piece have to wait.
+        # While ``leaving`` is high, a piece has not left yet. The words of the next piece have to wait.
         leaving = Signal(name="leaving")
         comes = loads | (steps & Mux(begins, whole & self.i.valid, overlaps))
         m.d.comb += [
@@ -129,7 +129,7 @@ class SerialVectorsUnit(wiring.Component):
         return m
 
     def _rings(self, m: Module, turns, comes, renews, odd, leaves) -> dict[str, Signal]:
-        """Attributes at both ends, the far end of the whole span, and the step; the first word of each."""
+        """Rings of the attributes at both ends, of the whole span's far end, and of the step: first words."""
         given = self.i.payload
         rings = {
             name: [Signal(_WIDTH, name=f"{name}_{k}", reset_less=True) for k in range(ATTRIBUTES)]

@@ -30,7 +30,7 @@ class LineAdapterUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(pieces_shape()))`
         Spans of `SpanAttributesUnit`.
     o : :py:`Out(stream.Signature(line_spans_shape()))`
-        The same with ends in ``SQ(1, 22)``.
+        The same spans, with ends in ``SQ(1, 22)``.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """

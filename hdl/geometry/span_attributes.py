@@ -77,8 +77,9 @@ class SpanAttributesUnit(wiring.Component):
 
     In the *serial* form one attribute after the other goes through the same adders, and its words through
     rings of registers. A scanline comes four times, each time with another attribute's plane. A scanline
-    without pixels takes four cycles. Else it takes four cycles for every two bits of the numbers above.
-    `latency` is 6, counted from the fourth time. A piece also waits until the piece before it has been taken.
+    without pixels takes four cycles. A scanline with pixels takes four cycles for every two bits of ``p - 1``
+    and n. `latency` is 6, counted from the fourth time. A piece also waits until the piece before it has been
+    taken.
 
     With ``whole`` spans are not cut. They leave as the walk finds them, a cycle earlier: `latency` is 2. In
     the serial form they leave attribute by attribute. The first attribute is offered `latency` cycles, 3,
@@ -97,7 +98,7 @@ class SpanAttributesUnit(wiring.Component):
         Scanlines. The planes are read with the first scanline of a triangle. This is the first of all
         scanlines, or the scanline after a scanline with ``last``.
     o : :py:`Out(stream.Signature(pieces_shape()))`
-        Pieces. With ``whole`` spans, in `whole_spans_shape`, serial in `whole_span_shape`.
+        Pieces. With ``whole`` these are spans in `whole_spans_shape`, if serial in `whole_span_shape`.
     status : :py:`Out(counters_shape("empty", "cut"))`
         Number of triangles without a span, and number of spans of more than one piece, since the reset. With
         ``whole`` only the number of triangles.

@@ -34,7 +34,7 @@ class SpanClipUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(rows_shape()))`
         Scanlines.
     o : :py:`Out(stream.Signature(clipped_rows_shape()))`
-        The same in the picture.
+        The same scanlines, cut to the picture.
     constants : :py:`In(frame_shape())`
         The frame, constant while scanlines are inside.
 

@@ -36,7 +36,7 @@ class SpanHalverUnit(wiring.Component):
 
     A span, or a piece, is offered on the cycle after it was taken in. While the output is ready, a span is
     taken in on every cycle. A span that does not fit takes two cycles more each time that it is tried again.
-    So does the rest of a span behind a piece. Two ends of an attribute share one adder. The unit has no
+    So does the rest of a span behind a piece. Both ends of an attribute share one adder. The unit has no
     multipliers.
 
     Parameters
@@ -49,8 +49,8 @@ class SpanHalverUnit(wiring.Component):
     i : :py:`In(stream.Signature(whole_spans_shape()))`
         Spans of `SpanAttributesUnit` with ``whole``.
     o : :py:`Out(stream.Signature(halved_spans_shape()))`
-        Their pieces, with N/W at the first pixel, the attributes' step away from the long edge, and the
-        places of the shift of both.
+        Pieces of the spans, with N/W at the first pixel, the attributes' step away from the long edge, and
+        the places of the shift of both.
     status : :py:`Out(counters_shape("cut"))`
         Number of spans that were cut, since the reset.
 
@@ -79,7 +79,8 @@ class SpanHalverUnit(wiring.Component):
         """The piece that is tried, the bits that tell whether it fits, and the next try."""
         m = Module()
         given, result = self.i.payload, self.o.payload
-        # ``known``: the bits of the test belong to its ends; ``whole``: it reaches to the end of the span.
+        # ``known``: the bits of the test belong to the piece's ends; ``whole``: the piece reaches to the end
+        # of the span.
         valid, known, whole, uncut = (Signal(name=name) for name in ("valid", "known", "whole", "uncut"))
         fits, takes, leaves = (Signal(name=name) for name in ("fits", "takes", "leaves"))
         tag = {
@@ -241,8 +242,7 @@ class SpanHalverUnit(wiring.Component):
 
 
 def size_of(code: Value) -> Value:
-    """First bits of the size of a component's code ``SPAN_STEP``: `SpanHalver.BITS`, and the bits of its
-    shift.
+    """First bits of the size of a component in ``SPAN_STEP``: `SpanHalver.BITS`, and the bits of the shift.
 
     The size of a negative code is its complement. Beyond the range all bits are 1.
     """
@@ -264,11 +264,12 @@ def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
     Parameters
     ----------
     pixels : Value
-        Number of its pixels.
+        Number of the piece's pixels.
     long : Value
-        Whether a component, or a sum of two, stays long along it.
+        Whether a component, or a sum of two, stays long along the piece.
     large : Value
-        Whether a component has its first bit at an end. Without this bit the largest shift is too small.
+        Whether the first bit of a component is 1 at an end. If it is 1 nowhere, the largest shift is too
+        small.
     steep : Value
         Whether a component's ends are too far apart for a piece of two pixels.
     """

@@ -37,7 +37,7 @@ class VectorAdapterUnit(PipelinedUnit):
     i : :py:`In(stream.Signature(halved_spans_shape()))`
         Pieces of `SpanHalverUnit`.
     o : :py:`Out(stream.Signature(vector_spans_shape()))`
-        The same with words of `SpanVectors`.
+        The same pieces, with words of `SpanVectors`.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
@@ -60,7 +60,7 @@ class VectorAdapterUnit(PipelinedUnit):
         flips = words.pop("flip"), words.pop("step_flip")
         words = {name: self.register(m, word, f"{name}_{self.latency}") for name, word in words.items()}
 
-        # Modulo 2, see the model.
+        # The step is kept modulo 2, see the model.
         step = [code[: p.STEP_BITS + 1] for code in step]
         shift = shift_of(p, operands.shift)
         for k in reversed(range(len(shift))):
@@ -70,7 +70,7 @@ class VectorAdapterUnit(PipelinedUnit):
         start = [self.register(m, code, f"shifted_{k}") for k, code in enumerate(start)]
         step = [self.register(m, code, f"shifted_step_{k}") for k, code in enumerate(step)]
 
-        # A step is shifted by at most as many places, so lower bits do not count.
+        # A step is shifted by at most `LARGEST_EXPONENT` places, so lower bits do not count.
         used = self.register(m, used_bits(p, step), "step_used")
         step = [self.register(m, _smaller(p, code), f"small_step_{k}") for k, code in enumerate(step)]
         start = [self.register(m, _smaller(p, code), f"small_{k}") for k, code in enumerate(start)]

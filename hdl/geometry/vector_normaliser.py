@@ -34,8 +34,8 @@ class VectorNormaliserUnit(PipelinedUnit):
 
     The latency is 18 cycles. Shift and rounding take four, `DotProductUnit` three, the segment one, the table
     two, ``c0 - c1 u`` three, e one, and ``v + e v`` four. The initiation interval is 1. There are six
-    multipliers of 18x18 bits, for three squares and three scalings. ``c1 u`` is a sum of Booth digits. The
-    table holds 512 words of 32 bits.
+    multipliers of 18x18 bits, for three squares and three scalings. ``c1 u`` is a sum of terms by Booth
+    digits. The table holds 512 words of 32 bits.
 
     Parameters
     ----------
@@ -125,8 +125,7 @@ class VectorNormaliserUnit(PipelinedUnit):
         rest = register(m, s[:bits], "rest")
         large = self._delay(m, large, "large", 6)
         c0, c1 = self._coefficients(m, segment)
-        # The number counts half steps. It is always odd, because half a step stands for the bits that were
-        # cut.
+        # u counts half steps. It is always odd, because half a step stands for the bits that were cut.
         u = self._delay(m, _offset(rest), "u", 2)
         # c1 is unsigned: a zero above it completes its last Booth digit.
         digits = Cat(Const(0, 1), Value.cast(c1), Const(0, 2))
@@ -278,7 +277,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return self._graph.share("shifter", (signed(width), unsigned(4)), 3, shift)
 
     def _last(self, format):
-        """``v + e v``, negated if asked for, and rounded. This takes three registers."""
+        """``v + e v``, negated if ``flip``, and rounded. This takes three registers."""
 
         def last(register, product, word, flip):
             total = register(FixedValue(COMPONENT, word) + FixedValue(format, product), "total")
@@ -325,7 +324,7 @@ def _root_place(square: FixedValue) -> tuple[Value, Value]:
 
 
 def _offset(rest: Value) -> Value:
-    """``u``: the bits below the segment less its middle, in half steps, odd for the bits that were cut."""
+    """``u``: distance of s' from its segment's middle in half steps. The bits that were cut make it odd."""
     return Cat(Const(1, 1), rest[:-1], ~rest[-1]).as_signed()
 
 

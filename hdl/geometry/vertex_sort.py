@@ -35,18 +35,18 @@ def sorted_triangle_shape(grid: Grid = GRID) -> data.StructLayout:
 class VertexSortUnit(wiring.Component):
     """Sorts corners, finds the area, and drops triangles. `VertexSort` is the bit-accurate model.
 
-    There are two stages, each with a triangle inside. The first compares neighbouring corners in three
-    cycles, exchanges them a cycle later, and compares the triangle's box with the picture. The second sums
-    ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in n digits of four bits of the heights, from the first
-    digit on. It takes two Booth digits of each product a cycle. Low triangles have fewer digits. Results are
-    exact. The unit has no multipliers.
+    There are two stages, each with a triangle inside. The first stage compares neighbouring corners in three
+    cycles, exchanges them a cycle later, and compares the triangle's box with the picture. The second stage
+    sums ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in n digits of four bits of the heights, from the
+    first digit on. It takes two Booth digits of each product a cycle. Low triangles have fewer digits.
+    Results are exact. The unit has no multipliers.
 
-    On a grid of 1/256 pixel n depends on the scanlines of a box: 3 up to 6 scanlines, 4 up to 126, 5 up to
-    2046, and 6 for more. A triangle takes 4 cycles if its box is empty. Else it takes n + 3 cycles if it is
-    dropped, and n + 4 if it is drawn. A waiting output adds cycles. A drawn triangle is offered n + 8 cycles
-    after it was taken in.
+    On a grid of 1/256 pixel n depends on the scanlines of a box. It is 3 for up to 6 scanlines, 4 for up to
+    126, 5 for up to 2046, and 6 for more. A triangle takes 4 cycles if its box is empty. Else it takes n + 3
+    cycles if it is dropped, and n + 4 if it is drawn. A waiting output adds cycles. A drawn triangle is
+    offered n + 8 cycles after it was taken in.
 
-    In the *compact* style there is one triangle inside, and its corners stay in the registers of the first
+    In the *compact* style only one triangle is inside, and its corners stay in the registers of the first
     stage. It takes 5 cycles if its box is empty, else n + 9 cycles. If it is drawn, it also takes the cycles
     on which it is offered, at least one.
 
