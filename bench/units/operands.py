@@ -195,7 +195,7 @@ def any_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndar
 
 
 def vectors_near(rng: np.random.Generator, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Codes of a unit vector for each span: near the span's normals for every second span, else anywhere."""
+    """Codes of a unit vector for each span. In every second span it is near the normals of the span."""
     vector = sphere(rng, len(left))
     vector[::2] = normalise((0.7 * left + 0.3 * right)[::2] / ONE + vector[::2] * 1e-3)
     return quantise(vector)
@@ -283,7 +283,7 @@ def setup_spans(
     left = sphere(rng, len(angles))
     left, right = quantise(left), quantise(turned(rng, left, angles))
     left, right = np.vstack([left, word_ends(rng, 40, 3)]), np.vstack([right, word_ends(rng, 40, 3)])
-    # The longest chord.
+    # These ends have the longest chord.
     left[-1], right[-1] = COMPONENT.max_code, COMPONENT.min_code
     length = rng.integers(1, 4096, len(left))
     length[::2] = rng.integers(1, 20, len(length[::2]))

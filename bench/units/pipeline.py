@@ -67,7 +67,7 @@ _GROUPS = 8
 """Number of exponents of a measurement. The spans are divided into as many parts, with an exponent each."""
 
 _COUNTED = (1 << 16) + 2
-"""Number of spans over the range of a counter of 16 bits."""
+"""Number of spans that is larger than the largest value of a counter of 16 bits."""
 
 
 # Errors.
@@ -126,7 +126,7 @@ def _measure(rng, count, design):
 
 
 def spans_of(design: ShadingPipeline, beats) -> Spans:
-    """Spans in input beats of a pipeline."""
+    """Spans from the input beats of a pipeline."""
     none = np.zeros((len(beats["length"]), 3), dtype=np.int64)
     normals = (beats.get(name, none) for name in ("normal_left", "normal_right"))
     values = values_of(beats) if "values" in beats else None
@@ -172,11 +172,11 @@ def _status(unit, case):
 
 
 _ORDERED = LOBE_ADDRESS, BANK_ADDRESS, TEXELS_ADDRESS, TEXEL_ADDRESS
-"""Addresses of tables and texels, whose writes have an order of their own."""
+"""Addresses of tables and texels. The order of their writes matters."""
 
 
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
-    """Input of spans and constants of each material. These are written over constants of codes ``before``."""
+    """Input of spans and constants of each material. First all constants get each of the codes ``before``."""
     write = writes_of(constants if isinstance(constants, list) else [constants])
     kept = np.isin(write["address"], _ORDERED)
     parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
@@ -184,7 +184,7 @@ def case_of(unit, spans: Spans, constants, *before: int) -> Case:
 
 
 def _spans(unit, rng, count):
-    """Spans of every length and angle, some empty, some out of range; the highlights are on some of them."""
+    """Spans of every length and angle. Some are empty, some are out of range, and some have a highlight."""
     design = unit.model
     spans = any_spans(rng, design, short_lengths(rng, count))
     return case_of(unit, spans, any_constants(rng, design, spans, rng.choice([1.0, 8.0])))
@@ -199,7 +199,7 @@ def _every_setup(unit, rng, count):
 
 
 def _border(design, rng):
-    """Constants of eight times the full light, steep at the terminator, and the light's vector."""
+    """Constants of a light of eight full channels, and its vector L. The light is steep at the terminator."""
     light, peak = (quantise(v)[np.newaxis] for v in sphere(rng, 2))
     colors = (Intensity.color(np.array([color])) for color in ((8, 7, 6), (0.03, 0.5, 0.1)))
     constants = FrameConstants(1, np.zeros(3, dtype=int), light, peak, *colors)
@@ -207,7 +207,7 @@ def _border(design, rng):
 
 
 def _terminator(unit, rng, count):
-    """Spans on the terminator of eight times the full light, where the last bits of N.L show."""
+    """Spans on the terminator of a light of eight full channels. There the last bits of N·L change pixels."""
     constants, light = _border(unit.model, rng)
     spans = spans_near_terminator(rng, unit.model.interpolator.MAX_ANGLE - 0.01, light)
     return case_of(unit, spans, constants, 0x3FFFF)
@@ -222,9 +222,9 @@ def _roundings(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Long spans of large angles in a row, on the terminator.
+    """Long spans of large angles on the terminator, one after the other.
 
-    Setups wait, and last bits of differences show.
+    Setups wait, and the last bits of differences change pixels.
     """
     constants, light = _border(unit.model, rng)
     largest = unit.model.interpolator.MAX_ANGLE - 0.01
@@ -236,7 +236,7 @@ def _long_spans(unit, rng, count):
 
 
 def _highlights(unit, rng, count, *, exponent, invert, brightness=8):
-    """Spans inside a steep highlight of H, or of its opposite. Every bit of H is 0 once, and 1 once."""
+    """Spans inside a steep highlight around H. All bits of L and H are inverted if ``invert`` is 1."""
     peak = sphere(rng, 1)[0]
     direction = normalise(sphere(rng, 1)[0] + 3 * peak)
     peak, direction = (quantise(v) ^ -invert for v in (peak, direction))
@@ -250,9 +250,9 @@ def _highlights(unit, rng, count, *, exponent, invert, brightness=8):
 
 
 def _halves(unit, rng, count):
-    """Channels of a half, and a step less, where every bit of both terms' products counts."""
-    # For a pixel's terms d and s and a diffuse colour c the specular colour is
-    # (2^22 - 0 or 1 - 2^17 ambient - c d) / s modulo 2^23, where it is a colour.
+    """Channels that end in half an LSB, or in a step less. Every bit of both products counts."""
+    # A pixel has the terms d and s and the diffuse colour c. The specular colour is
+    # (2^22 - b - 2^17 ambient - c d) / s modulo 2^23, with b = 0 or 1, if this is a colour.
     design, candidates = unit.model, 32_768
     halfway = sphere(rng, 1)[0]
     spans = flat_spans(quantise(halfway)[np.newaxis])
@@ -267,7 +267,7 @@ def _halves(unit, rng, count):
     cosine, highlight, dark = operands_of(design, flat, constants)
     d = Diffuse(cosine.format).compute(cosine).codes
     s = design.specular.compute(highlight, dark, constants.highlight).codes
-    # The inverse of an odd number: each step doubles its bits, of which three are right at the start.
+    # The inverse of an odd number. At first its last 3 bits are right, then 6, 12 and 24.
     inverse = s
     for _ in range(3):
         inverse = inverse * (2 - s * inverse % (1 << 23)) % (1 << 23)
@@ -281,7 +281,7 @@ def _halves(unit, rng, count):
 
 
 def _brightest(unit, rng, count):
-    """Three terms of eight times the full channel, written over constants of all bits 1 and 0."""
+    """Three terms of eight full channels each. Every bit of the constants is 1 and 0 before."""
     design = unit.model
     spans = any_spans(rng, design, short_lengths(rng, count))
     (constants,) = any_constants(rng, design, spans)
@@ -296,7 +296,7 @@ _LOST = 700
 
 
 def _disordered(rng, write, share):
-    """A share of the words of a frame, in any order, without words of tables."""
+    """A share of the words of a frame, in any order. Words of tables are left out."""
     kept = ~np.isin(write["address"], _ORDERED) & (rng.random(len(write["data"])) < share)
     order = rng.permutation(np.flatnonzero(kept))
     return {name: words[order] for name, words in write.items()}
@@ -310,14 +310,14 @@ def _lost(rng, design):
 
 
 def _frames(unit, rng, count):
-    """Constants written between spans, all or some of them. A frame may have one pixel or no pixel."""
+    """Spans, with writes of some or all constants between them. A frame may have one pixel or no pixel."""
     design, frames, writes, after = unit.model, [], [], [0]
     while after[-1] < count:
         length = short_lengths(rng, int(rng.choice([1, 2, 5, 20, 80])))
         frame = any_spans(rng, design, length if 2 < len(length) < 80 else length % 3)
         constants = any_constants(rng, design, frame, rng.choice([1.0, 8.0]))
         if rng.random() < 0.3:
-            # The word has the value that begins a table.
+            # This word of L is equal to the value that begins a table.
             constants[0].direction[:, 0] = -ONE
         write = [writes_of(constants)]
         if design.loads_tables and rng.random() < 0.2:
@@ -333,9 +333,9 @@ def _frames(unit, rng, count):
 
 
 def _counters(unit, rng, count):
-    """More spans that are out of range, and empty spans, than the counters hold.
+    """More empty spans, and more spans out of range, than the counters hold.
 
-    A span goes past the last x.
+    The last span goes past the last column.
     """
     design = unit.model
     kinds = any_spans(rng, design, np.array([4, 0, 2]))
@@ -351,9 +351,12 @@ def _counters(unit, rng, count):
 
 _FULL = preset("chord-local", "cosquad", lights=2, gate=True)
 _BOTH = ("renormalise, blinn", "quadratic, cosquad")
-"""Variants of normals that get every stimulus: one with the default model's table, one of the documents."""
+"""Variants that get every stimulus: with the table of the default model, and with a model of the documents.
+
+Both take normals at the ends of spans.
+"""
 _ALL = ("quotient, blinn", *_BOTH)
-"""Variants that get the stimuli of any spans, the default design among them."""
+"""Variants that get the stimuli of arbitrary spans. The first variant is the default design."""
 _LESS = {"x_bits": 9, "y_bits": 8, "length_bits": 5}
 
 DESIGNS: dict[str, ShadingPipeline] = {
@@ -446,7 +449,7 @@ def _variants():
             Variant(
                 partial(ShadingPipelineUnit, design),
                 partial(_measure, design=design),
-                "spans to what the method asks for, 45 degrees at most, 1 to 4095 pixels, n 1 to 1000, "
+                "spans as wide as the method takes, at most 45 degrees, 1 to 4095 pixels, n 1 to 1000, "
                 "N.L > 1/16",
                 "LSB",
                 beat=SPAN if design.interpolator.brings_ends else {"length": SPAN["length"]},
@@ -488,13 +491,13 @@ RECORD = Record(
     },
     waivers={
         "tables.read": "No table is written while beats read it, so the register may change on a write.",
-        "multiplier_0_product": "A reciprocal and its square are normalised: the first bit is 1 already.",
+        "multiplier_0_product": (
+            "A reciprocal and its square are normalised, so their first bits are 1 already."
+        ),
     },
     still={
-        "a counter stops at its largest value, and a flag that is set stays": (
-            "top.status[15] top.status[31-32]"
-        ),
-        "a table of the only bank ends at one address": "tables.last[0-8]",
-        "the coordinates of all spans inside have room": "coordinates_room[0]",
+        "a counter stays at its largest value, and a flag stays 1": "top.status[15] top.status[31-32]",
+        "with one bank the last address is the same for every table": "tables.last[0-8]",
+        "the FIFO of coordinates has room for all spans inside": "coordinates_room[0]",
     },
 )

@@ -1,4 +1,4 @@
-"""Spans and constants for the pipeline: arbitrary, or chosen so that last bits decide a pixel."""
+"""Spans and constants for the pipeline. Some are arbitrary. For others, last bits decide a pixel."""
 
 from dataclasses import replace
 
@@ -80,11 +80,11 @@ def any_constants(
     for _ in range(design.materials):
         chosen = [1, 20, 200, 1000, rng.integers(1, 1001), 513 + 2 * rng.integers(243)]
         exponent = design.build.exponent or int(rng.choice(chosen))
-        # Odd codes: the last bits of their products count.
+        # The codes are odd, so the last bits of their products count.
         colors = [Intensity.color(rng.uniform(0, brightness, (lights, 3))) | 1 for _ in range(2)]
         if design.specular is None:
             colors[1][:] = 0
-        # Without lights it is the whole colour.
+        # Without lights the ambient term is the whole colour.
         ambient = Intensity.color(rng.uniform(0, 0.2 if lights else 1, 3))
         found.append(FrameConstants(exponent, ambient, direction, halfway, *colors))
     if design.loads_tables:
@@ -100,7 +100,10 @@ def any_constants(
 def tabled(
     design: ShadingPipeline, constants: FrameConstants, parameter: float | None = None, bank: int = 0
 ) -> FrameConstants:
-    """Constants with the table of a parameter, by default the exponent, if the pipeline has tables."""
+    """Constants, with the table of a parameter if the pipeline loads tables.
+
+    The default parameter is the exponent of the constants.
+    """
     if not design.loads_tables:
         return constants
     table = design.specular.table(constants.exponent if parameter is None else parameter)
@@ -125,14 +128,14 @@ def _tables_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> li
 
 
 def constants_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> list[FrameConstants]:
-    """Constants of each material after the writes to a pipeline in which all were 0."""
+    """Constants of each material after the writes to a pipeline. Before the writes all constants are 0."""
     words = np.zeros((design.materials, (design.lights + 1) * LIGHT_STRIDE), dtype=np.int64)
     index = 0
     for address, data in zip(write["address"].tolist(), write["data"].tolist(), strict=True):
         if design.materials > 1 and address == MATERIAL_ADDRESS:
             index = data
         elif address < words.shape[1]:
-            # L and H come from the frame.
+            # L and H belong to the frame, not to a material.
             of_frame = address >= LIGHT_STRIDE and address % LIGHT_STRIDE < FIELDS_OF_A_LIGHT["diffuse"][0]
             words[slice(None) if of_frame else index, address] = data
     by_light = words.reshape(design.materials, -1, LIGHT_STRIDE)[:, 1:]
@@ -163,7 +166,7 @@ def constants_written(design: ShadingPipeline, write: dict[str, np.ndarray]) -> 
 def _colored(
     design: ShadingPipeline, found: list[FrameConstants], words: np.ndarray, write: dict[str, np.ndarray]
 ) -> list[FrameConstants]:
-    """Constants with those of an albedo, from the words of each material and the writes of texels."""
+    """Constants with the fields of an albedo, from the words of each material and the writes of texels."""
     albedo = design.albedo
     emission = words[:, EMISSION_ADDRESS : EMISSION_ADDRESS + 3] & Intensity.COLOR_FORMAT.max_code
     tinted = words[:, TINTED_ADDRESS] & 1
@@ -188,7 +191,7 @@ def _colored(
 
 
 def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndarray) -> Spans:
-    """Spans of given lengths and any material. Some are flat, some wider than the method serves."""
+    """Spans of given lengths and any material. Some have equal normals. Some are too wide for the method."""
     count = len(length)
     largest = min(design.interpolator.MAX_ANGLE, 179.0)
     angles = np.where(rng.random(count) < 0.1, rng.uniform(largest, 180, count), largest * rng.random(count))
@@ -210,15 +213,16 @@ def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndar
 
 
 def vectors_for(rng: np.random.Generator, design: ShadingPipeline, length: np.ndarray) -> SpanVectors:
-    """Any vectors of spans of given lengths, for a method that takes them."""
+    """Any vectors of spans of given lengths, for a method that takes vectors."""
     highlights = design.specular is not None
     return any_span_vectors(rng, design.interpolator, design.lights, highlights, length)
 
 
 def spans_in_frame(spans: Spans, light: np.ndarray, halfway: np.ndarray) -> tuple[Spans, np.ndarray]:
-    """Spans between unit normals with vectors in the frame of a light, and the light's codes in it, (1, 3).
+    """Spans between unit normals with their vectors in the frame of a light.
 
-    No source gives a span of two pixels. It gets a third pixel.
+    The second result is the direction to the light in this frame, as codes, shape (1, 3). No source gives a
+    span of two pixels, so such a span gets a third pixel.
 
     Parameters
     ----------
@@ -237,7 +241,7 @@ def spans_in_frame(spans: Spans, light: np.ndarray, halfway: np.ndarray) -> tupl
 
 
 def ends_for(design: ShadingPipeline, spans: Spans) -> Spans:
-    """Spans between unit normals, with ends in the method's own format."""
+    """Spans whose ends are changed from the format of unit normals to the format of the method."""
     shift = design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
     if not shift:
         return spans
@@ -251,7 +255,7 @@ def flat_spans(normals: np.ndarray) -> Spans:
 
 
 def joined(rng: np.random.Generator, *kinds: Spans) -> Spans:
-    """All spans of several kinds, mixed."""
+    """All spans of several kinds, in random order."""
     names = ("x", "y", "length", "normal_left", "normal_right")
     spans = Spans(*(np.concatenate([getattr(kind, name) for kind in kinds]) for name in names))
     return spans[rng.permutation(len(spans))]
@@ -265,7 +269,7 @@ def spans_about(
     Parameters
     ----------
     rng : Generator
-        Of the random numbers.
+        Generator of the random numbers.
     largest : float
         Largest angle, degrees.
     middles : array, shape (spans, 3)
@@ -286,11 +290,11 @@ def spans_about(
 
 
 def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.ndarray) -> Spans:
-    """Spans on the terminator, the border of light and shade. The light's vector has this code.
+    """Spans on the terminator, the border of light and shade. ``code`` has the codes of L.
 
-    The sign of N.L, of 34 bits or rounded to 25, decides whether there is a highlight. So some spans start
-    within a few last bits of the terminator. Some cross it as slowly as possible. Along some, N.L rises by a
-    whole number of steps of 18 bits and half a step.
+    The sign of N·L decides whether there is a highlight. N·L has 34 fraction bits, or is rounded to 25. So
+    some spans start within a few last bits of the terminator. Some spans cross the terminator as slowly as
+    possible. Along some spans N·L rises by half a step of 2^-18 more than a whole number of these steps.
     """
     light = normalise(code)
 
@@ -321,8 +325,8 @@ def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.nda
 def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarray) -> Spans:
     """Spans along the terminator whose 1 - cosine depends on last bits.
 
-    For some spans this word is at the border of its rounding. For the others the number of segments of
-    bisection is about to change.
+    For some spans 1 - cosine is at the border of its rounding. For the others it is at a border where the
+    number of segments of bisection changes.
     """
     normaliser = AdaptiveNormaliser()
     across = normalise(np.cross(light, rng.normal(size=3)))
@@ -352,7 +356,7 @@ def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarra
 def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.ndarray, exponent: int) -> Spans:
     """Spans inside a highlight, with 1 - N.H up to 2/n.
 
-    Most are in the part with an eighth of the peak or less. For some the logarithm of the distance is
+    Most spans are in the part with an eighth of the peak or less. For some the logarithm of 1 - N·H is
     uniform.
     """
     kinds = []
@@ -367,7 +371,7 @@ def spans_in_highlight(rng: np.random.Generator, largest: float, halfway: np.nda
 
 
 def axes_about(rng: np.random.Generator, largest: float) -> Spans:
-    """Spans about the axes. There a component of a normal is 1, which is rounded to the largest code."""
+    """Spans near the axes. On an axis a component of the normal is 1, and is rounded to the largest code."""
     axes = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 40, axis=0)
     return spans_about(rng, largest, axes, 60)
 

@@ -20,7 +20,7 @@ from blysk.sim.frames.testbench import pixel_beats
 __all__ = ["RECORD"]
 
 _COUNTED = (1 << 16) + 2
-"""Number of spans over the range of a counter of 16 bits."""
+"""Number of spans that is larger than the largest value of a counter of 16 bits."""
 
 _DEFAULT = "2 pipelines, without lights"
 
@@ -54,7 +54,7 @@ def _spans(unit, rng, count):
 
 
 def _scanlines(unit, rng, count):
-    """Many spans in a row for one pipeline, then as many for the next: FIFOs fill up and run empty."""
+    """40 spans for one pipeline, then 40 spans for the next pipeline. FIFOs fill up and run empty."""
     pipes, design = unit.model.pipes, unit.model.design
     spans = any_spans(rng, design, rng.integers(0, 16, count // 8))
     turn = np.arange(len(spans)) // 40
@@ -76,7 +76,7 @@ def _constants(unit, rng, count):
     ]
     write = writes_of(constants)
     others = rng.integers(0, 1 << 18, (6, len(write["data"])))
-    # An index of a material is never changed, because it must exist.
+    # The index of a material is not changed, because the material must exist.
     others = np.where(write["address"] == MATERIAL_ADDRESS, write["data"], others)
     address = np.tile(write["address"], len(others) + 1)
     beats = beats_of(unit, ends_for(design, spans))
@@ -84,7 +84,7 @@ def _constants(unit, rng, count):
 
 
 def _counters(unit, rng, count):
-    """More empty spans than the counters hold, for all pipelines. A span goes past the last x."""
+    """More empty spans in all pipelines than a counter holds. The last span goes past the last column."""
     design, pipes = unit.model.design, unit.model.pipes
     kinds = any_spans(rng, design, np.array([0, 2]))
     spans = kinds[np.r_[np.zeros(_COUNTED, dtype=int), 1]]
@@ -119,13 +119,13 @@ RECORD = Record(
     },
     axis="",
     waivers={
-        "pixel_assembler.$signal$*": "A pipeline has scanlines of one remainder, so the bit is 0 already.",
+        "pixel_assembler.$signal$*": (
+            "All scanlines of a pipeline have the same remainder of y, so the bit is 0 already."
+        ),
     },
     still={
         "without an interpolator no span is out of range": "pipelines.sum_out_of_range_spans[0-15]",
-        "a counter stops at its largest value, and a flag that is set stays": (
-            "sum_empty_spans[15] sum_overrun[0]"
-        ),
-        "a pipeline has scanlines of one remainder": "pipelines.{read,word}[6]",
+        "a counter stays at its largest value, and a flag stays 1": "sum_empty_spans[15] sum_overrun[0]",
+        "all scanlines of a pipeline have the same remainder of y": "pipelines.{read,word}[6]",
     },
 )

@@ -25,7 +25,7 @@ _SEED = 2026
 
 
 def _constants(rng, renderer):
-    """Frame constants of each material, with lights from anywhere, in frames with any rotation."""
+    """Frame constants of each material. Lights have any direction, and their frames any rotation."""
     design = renderer.design
     direction, halfway = (unit_codes(rng, design.lights) for _ in range(2))
     constants = []
@@ -61,7 +61,7 @@ def _triangles(unit, rng, count, size=6.0, spread=0.2):
     triangles = ended(random_triangles(rng, count, size=size, spread=spread))
     triangles.material[:] = rng.integers(0, design.materials, count)
     if unit.model.rows:
-        # No normal is longer than 1.
+        # With several lights no normal may be longer than 1.
         triangles.normal[:] //= 2
     frame = FrameSettings.centred(*_SIZE, limit=FrameSettings.limit_of(15.0))
     write = writes_of(_constants(np.random.default_rng(_SEED), unit.model))
@@ -116,8 +116,8 @@ RECORD = Record(
     axis="",
     still={
         "a counter has room for more than a run has": "count_spans[9-31]",
-        "depths have room whenever the pipeline takes a span": "depths_room[0] depths_level[5]",
-        "shading works on fewer spans than the largest number of waiting spans": "spans_level[9]",
+        "the FIFO of depths has room whenever the pipeline takes a span": "depths_room[0] depths_level[5]",
+        "fewer spans wait for shading than the FIFO has places": "spans_level[9]",
         "a line of the picture has fewer than 64 pixels": "{spans_payload,read,word}[16-21]",
     },
     remembers=True,

@@ -41,7 +41,7 @@ def _columns(layout: ByteLayout, beats) -> dict:
 
 
 def _core_cases(unit, case) -> list[Case]:
-    """Input of the core inside a unit, frame by frame. Nothing of a frame is left in the next frame."""
+    """Input of the core inside a unit, a case for each frame. A frame does not depend on earlier frames."""
     data = np.asarray(case.beats["data"], dtype=np.uint8)
     beats = unit.model.given.unpack(data)
     ends = [*np.flatnonzero(case.beats["last"][:-1]) + 1, len(data)]
@@ -68,7 +68,7 @@ def _status(unit, case):
     misfits = int(np.count_nonzero(~unit.model.given.fits(np.asarray(case.beats["data"], np.uint8))))
     mine = {"frames": ended, "misfits": misfits, "busy": int(not case.beats["last"][-1])}
     counts = [record.status(unit.core, each) for each in _core_cases(unit, case)]
-    # This is a flag. The other members are counters.
+    # `overrun` is a flag. The other members are counters.
     flags = {"overrun": max}
     return {name: flags.get(name, sum)([each[name] for each in counts]) for name in counts[0]} | mine
 
@@ -84,23 +84,23 @@ def _case(unit, rng, count, length):
     data = unit.model.given.pack(_columns(unit.model.given, inner.beats))
     ends = np.cumsum(rng.integers(1, 2 * length, len(data) + 1)) - 1
     last = np.isin(np.arange(len(data)), ends)
-    # This also holds for the last beats of the run, and of the run with pauses.
+    # The last beat of the run, and of the run with pauses, ends a frame.
     last[[-1, min(PAUSED, len(last)) - 1]] = True
     return replace(inner, beats={"data": data, "last": last.astype(int)})
 
 
 def _frames(unit, rng, count):
-    """Frames of some beats each, some frames without output."""
+    """Frames of 1 to 47 beats. Some frames have no output."""
     return _case(unit, rng, count, 24)
 
 
 def _short(unit, rng, count):
-    """Frames of a beat or two."""
+    """Frames of 1 to 3 beats."""
     return _case(unit, rng, count, 2)
 
 
 def _misfits(unit, rng, count):
-    """Frames with beats in which a bit of any byte is inverted."""
+    """Frames in which a third of the beats have an inverted bit in any byte."""
     case = _frames(unit, rng, count)
     # The last beat of a run is not changed, so that every run ends with a beat.
     data = case.beats["data"]
@@ -133,12 +133,10 @@ RECORD = Record(
     axis="",
     remembers=True,
     still={
-        "bytes hold 12 bits of a coordinate, and no more than colours": (
+        "a coordinate has 12 bits in two bytes, and the byte after the colours is empty": (
             "top.{spare,word}[12-15] top.{spare,word}[28-31] top.{spare,word}[56-63]"
         ),
-        "without lights a colour is a constant of the run, written once": (
-            "top.{spare,word}[32-55] held_back[24-47]"
-        ),
+        "without lights the colour is a constant of the run": ("top.{spare,word}[32-55] held_back[24-47]"),
         "a counter has room for more events than a run has": "count_frames[5-31] count_misfits[3-31]",
     },
 )

@@ -36,7 +36,7 @@ def _expect(unit, case):
 
 
 def _accesses(unit, rng, count, busy=0):
-    """Reads and writes at registers and elsewhere, of fitting and other values. Values are read back."""
+    """Reads and writes of registers and other addresses. Most values fit. Values are read back."""
     registers = unit.model.registers
     chosen = rng.integers(0, len(registers), count)
     address = np.array([register.address for register in registers])[chosen]
@@ -66,7 +66,7 @@ def _accesses(unit, rng, count, busy=0):
 
 
 def _busy(unit, rng, count):
-    """Reads and writes of the same kinds while a frame is inside."""
+    """Reads and writes of registers and other addresses, while a frame is inside."""
     return _accesses(unit, rng, count, 1)
 
 
@@ -92,7 +92,7 @@ def _borders(unit, rng, count):
 
 
 def _decoding(unit, rng, count):
-    """Reads and writes, some of no byte, at addresses that differ in a bit from a register's address."""
+    """Reads and writes, some of no byte, at addresses that differ in one bit from a register's address."""
     address = np.array([register.address for register in unit.model.registers])
     address = (address[:, np.newaxis] ^ 1 << np.arange(12)).ravel()
     thrice = np.tile(address, 3)

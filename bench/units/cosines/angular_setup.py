@@ -30,7 +30,10 @@ __all__ = ["RECORD", "half_angles"]
 
 
 def half_angles(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sine and cosine of half the angle between vectors of codes, each from the smaller of two chords."""
+    """Sine and cosine of half the angle between vectors of codes.
+
+    They follow from the shorter of two chords: between the vectors, or to the opposite vector.
+    """
     chord, chord_to_opposite = (dot(v, v) / ONE**2 for v in (right - left, right + left))
     acute = chord_to_opposite >= chord
     sine = np.where(acute, np.sqrt(chord) / 2, np.sqrt(np.maximum(1 - chord_to_opposite / 4, 0)))
@@ -38,7 +41,7 @@ def half_angles(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _measure(rng, count, unit):
-    """Cosine of gamma at any pixel, from the setup's angles."""
+    """Cosine of gamma at any pixel, from the words of the setup."""
     left, right = span_ends(rng, count, 150.0)
     vector = vectors_near(rng, left, right)
     length = log_lengths(rng, count, 2)
@@ -59,7 +62,7 @@ def _measure(rng, count, unit):
         )
     phases = (pixel / (length - 1) - 0.5) * np.stack([angle, early, late])
     exact, early, late = x * np.cos(phases) + y * np.sin(phases)
-    # At the border of two segments rounding chooses the segment. The formula takes the unit's segment.
+    # At the border of two segments of arccos, rounding chooses the segment. The formula takes the same.
     formula = np.where(np.abs(found - early) < np.abs(found - late), early, late)
     return Sample(found, exact, formula, degrees_between(left, right)[:, 0])
 
@@ -77,19 +80,22 @@ def _case(left, right, vector, length):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any distance, with any vector and length. Every sixteenth pair has any codes."""
+    """Pairs of normals at any angle, with any vector and length. Every sixteenth pair has any codes."""
     return _case(*any_pairs(rng, count), unit_codes(rng, count), any_lengths(rng, count))
 
 
 def _corners(unit, rng, count):
-    """Equal, nearly equal, orthogonal, nearly opposite normals; H or L equal to N_l; extreme codes."""
+    """Normals that are equal, nearly equal, orthogonal, nearly opposite or opposite, and extreme codes.
+
+    Every third vector is equal to N_l.
+    """
     angles = [np.zeros(20), 10.0 ** rng.uniform(-5, 1, count), rng.uniform(0, 180, count), np.full(20, 90)]
     angles = np.concatenate([*angles, 180 - 10.0 ** rng.uniform(-5, 1, count // 5), np.full(20, 180)])
     left, right = (quantise(v) for v in pairs_at(rng, len(angles), rng.permutation(angles)))
     vector = quantise(sphere(rng, len(angles)))
     vector[::3] = left[::3]
     ends = word_ends(rng, count // 2, 9)
-    # These are the largest positive and negative dot products.
+    # The first two rows have the largest and the smallest dot product.
     ends[:2], ends[1, 3:6] = COMPONENT.min_code, COMPONENT.max_code
     left, right, vector = (
         np.vstack([v, ends[:, 3 * k : 3 * k + 3]]) for k, v in enumerate((left, right, vector))
@@ -109,7 +115,7 @@ def _variants():
                 partial(AngularSetupUnit, setup),
                 partial(_measure, unit=setup),
                 f"spans to 150 degrees, {LONG}",
-                note="of cos gamma at any pixel; the tables count as arithmetic, except the table of arccos",
+                note="error of cos gamma at any pixel; only the table of arccos counts as model error",
                 as_published=name == "arccos as_published",
                 long=name != "half chord",
             ),
@@ -128,41 +134,46 @@ RECORD = Record(
     expect=_expect,
     stimuli={"spans": Stimulus(_spans, 800), "corners": Stimulus(_corners, 600)},
     waivers={
-        "cordic_?_*": "The controlling bit is the sign of a word that is not negative.",
-        "entry": "The slope of a root from 1/4 to 1 is 1/2 or more; at 0 it is multiplied by 0.",
-        "factor": "The bit serves the saturation of a factor, but a factor is 0.636 to 0.708.",
-        "steps": "Both readers of an inverted bit invert it again, or ignore it.",
+        "cordic_?_*": "The controlling bit is the sign of a word that is never negative, so it is 0.",
+        "entry": (
+            "From 1/4 to 1 the slope of a root is at least 1/2, so its first bit is 1 already. At 0 the "
+            "slope is multiplied by 0."
+        ),
+        "factor": "The bit says whether a factor saturates. A factor is 0.636 to 0.708, so the bit is 0.",
+        "steps": "Two places read an inverted bit. Each of them inverts it again, or does not use it.",
     },
     still={
-        "the second bit of a square is 0": "dot_1_?[1]",
-        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
+        "a square is 0 or 1 modulo 4": "dot_1_?[1]",
+        "a sum of three squares of at most 2^34 is not negative, and less than 2^36": (
             "dot_1_?[35] dot_0_total[36-37]"
         ),
-        "two such sums, and the squared distance from them, are less than 2^37, the dot product 2^36": (
+        "two sums of squares and a squared chord are less than 2^37, a dot product less than 2^36": (
             "squares[37-38] chord_exact[37-40] cross[36-38]"
         ),
-        "half the reciprocal of the sine, normalised, is not negative": (
+        "half of the reciprocal of the normalised sine is not negative": (
             "inverse_roots_sum[22] inverse_roots_rounded[18]"
         ),
         "the correction is at most 0.4143": "corrections_sum[21] corrections_rounded[17-18]",
         "from 0 to 90 degrees the factor is 0.636 to 0.708": "total[14-18] factor[14-16]",
-        "inner sums of the polynomial are smaller still": "total_3[15-16] total_2[16]",
-        "a root is 1 at most, and only by rounding": "root_sum[21] root_rounded[18]",
-        "an axis is less than 2, and CORDIC makes the distance less than 4": (
+        "earlier sums of the factor's polynomial are smaller": "total_3[15-16] total_2[16]",
+        "a root is at most 1, and reaches 1 only by rounding": "root_sum[21] root_rounded[18]",
+        "x is less than 2 before the steps of CORDIC, and less than 4 after them": (
             "cordic_x[27-29] cordic_x_*[28-29]"
         ),
-        "the distance and its parts are 0 to 4, and parts shifted by 16 are less than 2^-14": (
+        "the distance and its parts are 0 to 4, and parts shifted by 16 bits are less than 2^-14": (
             "gain_1_sum*[32-33] gain_16_sum[16-33] cos_beta_rounded[27-29]"
         ),
-        "the shifted words end in zeros": "gain_1_sum[0]",
-        "the last bits of the sum do not depend on the signs of CORDIC's steps": (
+        "the terms of the sum end in zeros": "gain_1_sum[0]",
+        "the last bits of a direction are the same for all signs of CORDIC's steps": (
             "direction[0-26] direction_0[0-25] direction_{1,2}[1] direction_*[0]"
         ),
-        "half an angle of 36 bits has 37": "phase[0-2] top.spare[36-38]",
-        "an angle is half a turn at most, and a step is less": "psi_rounded[18] step[39] top.spare[115]",
-        "a reciprocal is normalised, so that its first bit is 1": (
+        "half of an angle has 37 fraction bits, and the phase has 40": "phase[0-2] top.spare[36-38]",
+        "an angle is at most half a turn, and a step is less than half a turn": (
+            "psi_rounded[18] step[39] top.spare[115]"
+        ),
+        "a reciprocal is normalised, so its first bit is 1": (
             "reciprocals.port__data[16] reciprocals_word[16]"
         ),
-        "a length of 12 bits takes shifts up to 12": "shift[4]",
+        "for a length of 12 bits the shift is at most 12": "shift[4]",
     },
 )

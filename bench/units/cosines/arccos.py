@@ -29,12 +29,12 @@ def _expect(unit, case):
 
 
 def _cosines(unit, rng, count):
-    """Cosines of every size, and out of range."""
+    """Operands of every size, in range and out of range."""
     return Case(any_codes(rng, FORMAT, count))
 
 
 def _corners(unit, rng, count):
-    """Both sides of every segment's bounds, of 0 and of 1, extreme codes, cosines in range."""
+    """Operands next to the bounds of each segment, to 0, 1 and -1, extreme codes, and any in range."""
     one, bounds = unit.model.MAGNITUDE_FORMAT.code(1), unit.model.bounds
     ends = np.r_[0, 1, bounds - 1, bounds, bounds + 1, one - 1, one, one + 1, FORMAT.max_code]
     return Case(np.r_[ends, -ends, FORMAT.min_code, rng.integers(-one, one + 1, count)])
@@ -46,7 +46,7 @@ def _every(unit, rng, count):
 
 
 def _thirteenth(unit, rng, count):
-    """Every thirteenth operand, so that each segment gets all values of the lower bits."""
+    """Every thirteenth operand. So each segment gets all values of the lower bits."""
     return Case(np.arange(FORMAT.min_code, FORMAT.max_code + 1, 13))
 
 
@@ -80,12 +80,12 @@ RECORD = Record(
     },
     axis="x",
     waivers={
-        "c1": "No coefficient of the table has that bit.",
-        "total": "The sum of no operand has that bit; every operand is sent.",
+        "c1": "The bit is 0 in every coefficient of the table.",
+        "total": "The bit is 0 in the sum of every operand. A stimulus sends every operand.",
     },
     still={
-        "the numbers of five segments are 0 to 4": "segment[3-4]",
-        "the table's words of one power all have the same bit there": (
+        "a segment's number is 0 to 4": "segment[3-4]",
+        "all coefficients of the same power agree in this bit": (
             "c0[18] c1[1] c1[16] c2[0] c2[13-14] c2[17]"
         ),
         "the arccosine of a magnitude is 0 to 1.6": "total[33-42]",

@@ -38,7 +38,7 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Components that differ by 1 or by a step less or more, the largest differences, extreme codes."""
+    """Components that differ by 1, or by a step less or more than 1; largest differences; extreme codes."""
     ends = word_ends(rng, count, 6)
     border = [[ONE, 0, 0, ONE - d, 0, 0] for d in (2**17 - 1, 2**17, 2**17 + 1)]
     border.append([COMPONENT.min_code] * 3 + [COMPONENT.max_code] * 3)
@@ -65,14 +65,17 @@ RECORD = Record(
     },
     waivers={
         "multiplier_?_product": (
-            "Squares end in 00 or 01, so the sum of three has no carry past its second bit. Ten bits are cut."
+            "Squares are 0 or 1 modulo 4, so the last two bits of three squares give no carry. The last ten "
+            "bits of the sum are cut off."
         ),
-        "u_aligned": "If a bit above the format of u is set, u saturates whatever the other bits are.",
-        "u": "The value of the saturation is the inverted sign, and a sum of squares is not negative.",
+        "u_aligned": "If a bit above the format of u is 1, u saturates. The other bits then have no effect.",
+        "u": (
+            "A saturated word has the inverted sign in all bits. The sign of a sum of squares is 0 already."
+        ),
     },
     still={
-        "the second bit of a square is 0": "multiplier_*_product*[1]",
-        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
+        "a square is 0 or 1 modulo 4": "multiplier_*_product*[1]",
+        "a sum of three squares of at most 2^34 is not negative, and less than 2^36": (
             "multiplier_*_product*[35] u_square_partial[36] u_square_total[36-37] u_aligned[38-39]"
         ),
     },

@@ -45,7 +45,7 @@ FORMATS = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIG
 
 
 def local_curves(rng: np.random.Generator, spans: int) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """N·L and ``1 - N·H`` along spans with point lights and a near viewer: a function of span and t."""
+    """Function of span and t that gives N·L and ``1 - N·H``, with a point light and a near viewer."""
     start = rng.normal(size=(spans, 3))
     step = rng.uniform(0, 0.3, (spans, 1)) * sphere(rng, spans)
     to_viewer = sphere(rng, spans)
@@ -76,7 +76,7 @@ def parabola(values: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def value_at(differences, pixel) -> np.ndarray:
-    """Value of the first light's quadratic at a pixel of each span, in float64, in units of `ONE_SQUARED`."""
+    """Value of the quadratic of the first light at a pixel of each span, in float64, over `ONE_SQUARED`."""
     start, first, second = (word.values[:, 0] for word in differences)
     k = pixel.astype(np.float64)
     return (start + k * first + k * (k - 1) / 2 * second) / ONE_SQUARED.values
@@ -85,7 +85,7 @@ def value_at(differences, pixel) -> np.ndarray:
 def _measure(rng, count):
     """N·L and u at any pixel, by the differences in exact arithmetic.
 
-    Equal unit vectors have the product 1.
+    The scale is chosen so that two equal unit vectors have the dot product 1.
     """
     length = log_lengths(rng, count, 2)
     pixel = pixel_of(rng, length)
@@ -99,14 +99,14 @@ def _measure(rng, count):
 
 
 def values_of(beats) -> SpanValues:
-    """Values in input beats. In beats without highlights u is 0."""
+    """Values from input beats. Without highlights u is 0."""
     values = beats["values"]
     diffuse = values["diffuse"]
     return SpanValues(diffuse, values["highlight"] if "highlight" in values.dtype.names else 0 * diffuse)
 
 
 def factors_of(beats) -> np.ndarray | None:
-    """Codes of the factors in input beats, or ``None``."""
+    """Codes of the factors from input beats. ``None`` without factors."""
     return beats["factors"] if "factors" in beats.dtype.names else None
 
 
@@ -141,7 +141,7 @@ def any_values(rng: np.random.Generator, count: int, lights: int) -> SpanValues:
 
 
 def any_factors(rng: np.random.Generator, count: int, factors: int) -> np.ndarray:
-    """Codes of factors on curves of every size, most in 0 to 1. Every eighth span has arbitrary codes."""
+    """Codes of factors from 0 to 1 on curves of every size. Every eighth span has arbitrary codes."""
     format = FORMATS["diffuse"]
     codes = any_codes(rng, format, count, factors, 3)
     start = rng.uniform(0, 1, (count, factors, 1))
@@ -152,7 +152,7 @@ def any_factors(rng: np.random.Generator, count: int, factors: int) -> np.ndarra
 
 
 def value_beats(unit, values: SpanValues, length: np.ndarray) -> np.ndarray:
-    """Input beats of a unit that takes values of spans. Factors follow from the values."""
+    """Input beats of a unit that takes values of spans. The values are the seed of random factors."""
     beats = np.zeros(len(length), dtype_of(unit.i.payload.shape()))
     for name, codes in zip(FORMATS, values, strict=True):
         if name in beats["values"].dtype.names:
@@ -169,12 +169,15 @@ def _lengths(unit, rng, count):
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, lengths with a uniform logarithm. Every eighth span has random codes."""
+    """Curves of every size, and lengths with a uniform logarithm. Every eighth span has random codes."""
     return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
 
 
 def _corners(unit, rng, count):
-    """P and G in range, near their extreme codes and beyond. Equal values and extreme codes."""
+    """Curves whose terms P and G are in range, near their extreme codes, or out of range.
+
+    Other curves have equal values or extreme codes.
+    """
     values = []
     for format in FORMATS.values():
         start = rng.uniform(format.min_code * 0.9, format.max_code * 0.9, (count, unit.lights))
@@ -196,7 +199,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many spans, because the last bits of products and sums are rounded off and rarely matter."""
+    """Many spans, because the last bits of products and sums rarely change a rounded result."""
     return _corners(unit, rng, count)
 
 
@@ -207,7 +210,7 @@ def _variants():
             ChordSetupUnit,
             _measure,
             f"{LOCAL}, {LONG}",
-            note="of N.L and u at any pixel that the differences lead to; exact: the quadratic",
+            note="errors of N.L and u at any pixel, by the differences; the quadratic counts as exact",
         ),
     )
     for lights, interval in (*((1, i) for i in (1, 2, 4, 6, 9, 18)), (2, 3), (3, 18)):
@@ -236,26 +239,32 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("highlight_0_slope_out_of_range", "out_of_range"),
-        "The fault writes the word too often. The word is read only on the cycle after the right write.",
+        "The fault writes the register too often. The word is read only on the cycle after the right write.",
     )
     | dict.fromkeys(
         ("diffuse_0_curvature_exact", "highlight_0_ends"),
-        "The fault keeps a wrong word. The word is read only on the cycle after a write.",
+        "The fault changes a word that is kept. The word is read only on the cycle after it was written.",
     )
     | {
-        "multiplier_1_1": "A reciprocal and its square are normalised: the first bit is 1 already.",
-        "reciprocals_word": "A reciprocal is normalised: the first bit is 1 already.",
-        "o__payload": "A second difference is twice a number: its last bit is 0 already.",
+        "multiplier_1_1": "A reciprocal and its square are normalised, so their first bits are 1 already.",
+        "reciprocals_word": "A reciprocal is normalised, so its first bit is 1 already.",
+        "o__payload": "A second difference is twice a number, so its last bit is 0 already.",
     },
     still={
-        "twice a number is even": "{diffuse,highlight}_0_second[0] top.spare[47] top.spare[141]",
-        "a reciprocal is normalised, and so is its square, so that the first bit is 1": (
+        "a second difference is twice a number, so its last bit is 0": (
+            "{diffuse,highlight}_0_second[0] top.spare[47] top.spare[141]"
+        ),
+        "a reciprocal and its square are normalised, so their first bits are 1": (
             "reciprocals_word[16] reciprocals.port__data[16] reciprocal[16] square[16] square_rounded[16]"
         ),
-        "the largest square in the table is under 1 by 62 steps": "square_rounded[17]",
-        "a length of 12 bits takes shifts up to 12, and its square up to 25": "shift[4] square_shift[5]",
-        "a reciprocal or its square, of 17 bits, is not negative": "multiplier_{0,1}_{1,b}[17]",
-        "u's slope times 1/(m - 1) has five fraction bits less than the shifted word": "shifter_0_0[0-4]",
-        "the other products have twelve or thirteen fraction bits less": "shifter_1_0[0-11]",
+        "the largest square of a reciprocal is 62 steps less than 1": "square_rounded[17]",
+        "for a length of 12 bits the shift is at most 12, and the square's shift at most 25": (
+            "shift[4] square_shift[5]"
+        ),
+        "a reciprocal, and its square, has 17 bits and is not negative": "multiplier_{0,1}_{1,b}[17]",
+        "the shifter has five fraction bits more than the slope of u times 1/(m - 1)": "shifter_0_0[0-4]",
+        "the shifter has twelve or thirteen fraction bits more than the other products": (
+            "shifter_1_0[0-11]"
+        ),
     },
 )

@@ -15,11 +15,14 @@ __all__ = ["RECORD", "chord_of"]
 
 FORMAT = HalfChord.OPERAND_FORMAT
 LARGEST = 1 << 35
-"""Code of the squared chord of a right angle, 2. The supplement serves larger angles."""
+"""Code of 2, the squared chord of a right angle. For a larger angle the unit gets the supplement's chord."""
 
 
 def chord_of(left: np.ndarray, right: np.ndarray) -> tuple[Fixed, np.ndarray]:
-    """Squared chord between vectors, or to the opposite vector if this is shorter, and a flag for this."""
+    """Squared chord between two vectors, or to the opposite vector if this chord is shorter.
+
+    The second result is a flag for the opposite vector.
+    """
     obtuse = dot(left, right) < 0
     chord = np.where(obtuse[:, np.newaxis], left + right, left - right)
     return Fixed(FORMAT, np.minimum(dot(chord, chord), LARGEST)), obtuse
@@ -29,7 +32,7 @@ def _measure(rng, count):
     chord, obtuse = chord_of(*span_ends(rng, count, 180.0))
     unit = HalfChord()
     found = unit.compute(chord, obtuse)
-    # Interpolated table and polynomial, in words of the hardware, without further rounding.
+    # The formula: interpolated table and polynomial, from the words of the hardware, without rounding.
     z = chord.codes * 2.0**-36
     halvings = np.clip(np.floor(-np.frexp(z)[1] / 2), 0, 17)
     position = z * 4.0**halvings * 2**unit.ADDRESS_BITS
@@ -58,7 +61,7 @@ def _chords(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Powers of two, powers of two minus 1, the largest chords, chords over 2, and every size."""
+    """Powers of two, the codes before them, the largest chords, chords over 2, and chords of every size."""
     powers = 1 << np.arange(36)
     ends = np.r_[0, powers, powers - 1, FORMAT.max_code, LARGEST + 1, LARGEST - 2, LARGEST + (1 << 17)]
     size = np.trunc(2.0 ** rng.uniform(0, 36, count)).astype(np.int64)
@@ -66,7 +69,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many chords, because the last bits of table, products and sums are rounded off and rarely matter."""
+    """Many chords, because the last bits of table, products and sums rarely change a rounded result."""
     size = np.trunc(2.0 ** rng.uniform(0, 35, count // 4)).astype(np.int64)
     return _case(rng, np.r_[size, rng.integers(0, LARGEST, count - len(size))])
 
@@ -81,7 +84,7 @@ RECORD = Record(
             _measure,
             "angles 0 to 180 degrees",
             "turn",
-            note="model: the root by linear interpolation, the factor by its polynomial",
+            note="model error: of the root by linear interpolation, and of the factor by its polynomial",
         ),
         **{
             f"interval {interval}": Variant(partial(HalfChordUnit, initiation_interval=interval))
@@ -96,13 +99,15 @@ RECORD = Record(
     },
     axis="angle, degrees",
     waivers={
-        "operands": "While the output is stalled, the operands are from an earlier beat that has been read.",
-        "multiplier_0_?_0": "The operands that share the multiplier are not negative.",
+        "operands": (
+            "The fault changes operands only while the output is stalled. They have been read by then."
+        ),
+        "multiplier_0_?_0": "No operand of the multiplier is negative, so the sign is 0 already.",
     },
     still={
         "operands are not negative, and less than 1": ("multiplier_0_?[17] multiplier_0_product*[34-35]"),
         "from 0 to 90 degrees the factor is 0.636 to 0.708": "total[14-18] factor[14-16]",
-        "inner sums of the polynomial are smaller still": "total_3[15-16] total_2[16]",
-        "a root is 1 at most, and only by rounding": "root_sum[21] root_rounded[18]",
+        "earlier sums of the factor's polynomial are smaller": "total_3[15-16] total_2[16]",
+        "a root is at most 1, and reaches 1 only by rounding": "root_sum[21] root_rounded[18]",
     },
 )

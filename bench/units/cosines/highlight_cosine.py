@@ -35,7 +35,7 @@ def _measure(rng, count, unit):
     words = _words({"phase": phase, "step": step, "cos_beta": beta})
     found = unit.compute(*words, np.arange(count), pixel)
     turns = (phase - pixel * step) / 2.0**40
-    # Linear interpolation between the table's words, without further rounding.
+    # The formula: linear interpolation between the words of the table, without rounding.
     quarters = np.abs(turns - np.rint(turns)) * 4
     back = quarters > 1
     position = np.where(back, 2 - quarters, quarters) * 2**unit.address_bits
@@ -66,8 +66,8 @@ def _spans(unit, rng, count):
 def spans_of(rng: np.random.Generator, length: np.ndarray) -> Case:
     """Input of spans of given lengths.
 
-    Phases are near a peak, at the ends of each quarter of the wave, and the smallest and largest codes. Steps
-    are extreme codes or give carries. cos beta is up to 2.
+    Some phases are near a peak, at an end of a quarter of the wave, or extreme codes. Some steps are extreme
+    codes, and some give a carry at the second pixel. cos beta is up to 2.
     """
     count = len(length)
     phase = rng.integers(-(1 << 39), 1 << 39, count)
@@ -75,7 +75,7 @@ def spans_of(rng: np.random.Generator, length: np.ndarray) -> Case:
     phase[2::8] = rng.choice([-(1 << 39), (1 << 39) - 1, -(1 << 38), 1 << 38, -1, 0, 1], len(phase[2::8]))
     step = np.trunc(2.0 ** rng.uniform(0, 39, count)).astype(np.int64)
     step[::17] = rng.choice([0, (1 << 40) - 1, 1 << 38, 1 << 39], len(step[::17]))
-    # A carry out of the bits below the address changes the address of the second pixel.
+    # At the second pixel a carry from the bits below the address changes the address.
     bit = rng.integers(0, 15, len(phase[4::8]))
     phase[4::8] = (phase[4::8] >> 15 << 15) + (1 << bit)
     step[4::8] = (1 << bit) + rng.integers(0, 2, len(bit))
@@ -85,12 +85,12 @@ def spans_of(rng: np.random.Generator, length: np.ndarray) -> Case:
 
 
 def _corners(unit, rng, count):
-    """Short spans with the phases and steps of `spans_of`."""
+    """Short spans. Phases are near a peak, at an end of a quarter, or any. Some steps give carries."""
     return spans_of(rng, rng.integers(0, 40, count // 20))
 
 
 def _last_bits(unit, rng, count):
-    """Lengths that set every bit, and many short spans. The last bits of products rarely change a result."""
+    """Lengths that set every bit, and many short spans, as last bits of products rarely change a result."""
     powers = 1 << np.arange(12)
     return spans_of(rng, np.r_[powers, powers + 1, rng.integers(1, 4, count // 2)])
 
@@ -112,8 +112,8 @@ RECORD = Record(
     title="1 - cos gamma along a great circle by a table of cosines",
     source="docs/theory/interpolation.md#angular-method; [T] 3.2",
     variants={
-        "interpolated": _variant(True, "model: the cosine, interpolated linearly from the table"),
-        "table alone": _variant(False, "model: the table"),
+        "interpolated": _variant(True, "model error: of linear interpolation in the table"),
+        "table alone": _variant(False, "model error: of the table"),
         "64 words": Variant(partial(HighlightCosineUnit, HighlightCosine(address_bits=6))),
     },
     expect=_expect,
@@ -125,7 +125,7 @@ RECORD = Record(
     axis="angle, degrees",
     waivers={},
     still={
-        "the table's last value plus its whole rise is a step less than 1": "wave.v_6[22]",
-        "a factor less than 1 times a factor of at most 1 is less than 2": "wave.term_10[26]",
+        "the last value of the table and its whole rise have a sum of 1 less a step": "wave.v_6[22]",
+        "a product is less than 2 if its factors are less than 1 and at most 1": "wave.term_10[26]",
     },
 )

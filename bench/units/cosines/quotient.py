@@ -17,7 +17,7 @@ __all__ = ["RECORD"]
 
 
 def _words_of(model, beats) -> PixelWords:
-    """Words of pixels in beats."""
+    """Words of the pixels that beats describe."""
     format, count = model.square_format, len(beats["rest"])
     none = np.zeros((count, 0), dtype=np.int64)
     numerator = Fixed(format, beats["numerator"] if model.highlights else none)
@@ -40,9 +40,9 @@ def _expect(unit, case):
 
 
 def _squares(model, rng, count):
-    """Squares x^2 + y^2 and z^2 of vectors of lengths 1/8 to 1.
+    """``m = x^2 + y^2`` and ``w = z^2`` of vectors of lengths 1/8 to 1, and the squared sine ``m/(m + w)``.
 
-    The log of the angle to z or xy is uniform.
+    In half of the vectors the logarithm of the squared sine is uniform. Some are replaced by 1 minus it.
     """
     length = 2.0 ** rng.uniform(-3, 0, count)
     sine = np.where(rng.random(count) < 0.5, 2.0 ** -rng.uniform(0, 20, count), rng.uniform(0, 1, count))
@@ -65,7 +65,7 @@ def _pixels(model, rng, squares, cosine) -> PixelWords:
 
 
 def _vectors(unit, rng, count):
-    """Vectors of every direction, some at a highlight's peak, some across it, some facing away."""
+    """Vectors of every direction. Some are at the peak of a highlight or orthogonal to it. Some face away."""
     p = unit.model.spans
     *squares, _ = _squares(p, rng, count)
     pixels = _pixels(p, rng, squares, rng.uniform(-1, 1, (count, p.lights)))
@@ -77,7 +77,7 @@ def _beats(unit, pixels, count):
 
 
 def _words(unit, rng, count):
-    """Words of every size and sign, with ends and powers of two, so that q is often too small or wraps."""
+    """Words of every size and sign, with extreme codes and powers of two. q is often too small, or wraps."""
     p = unit.model.spans
     squares = any_codes(rng, p.square_format, count, p.lights * p.highlights + 1)
     squares = np.where(rng.random(squares.shape) < 0.7, np.abs(squares), squares)
@@ -92,7 +92,7 @@ def _words(unit, rng, count):
 
 
 def _measure(rng, count, model):
-    """N·L, and sin^2 by its place. The error of sin^2 is relative to the smaller of sin^2 and cos^2."""
+    """N·L, and sin^2 from its place. The error of sin^2 is relative to the smaller of sin^2 and cos^2."""
     m, w, sine = _squares(model.spans, rng, count)
     exact = rng.uniform(-1, 1, (count, 1))
     pixels = _pixels(model.spans, rng, (m, w), exact)
@@ -123,7 +123,7 @@ RECORD = Record(
             partial(QuotientUnit, _DEFAULT),
             partial(_measure, model=_DEFAULT),
             "vectors of lengths 1/8 to 1 in every direction",
-            note="N.L; and sin^2, relative to itself or to cos^2",
+            note="errors of N.L, and of sin^2 relative to the smaller of sin^2 and cos^2",
         ),
         "R.V": Variant(partial(QuotientUnit, Quotient(QuotientSpans(mirror=True)))),
         "2 lights": Variant(partial(QuotientUnit, Quotient(QuotientSpans(2))), long=True),
@@ -140,11 +140,11 @@ RECORD = Record(
     axis="length of the vector",
     logarithmic=True,
     still={
-        "r is 1/2 at least": (
+        "the reciprocal root r is at least 1/2, so its first bit is 1": (
             "{roots_word,roots,port__data}[18] {root,cosine_0_b,square_root_a,square_root_b}[16]"
         ),
-        "no square has bit 1": "square_root[1]",
-        "shifts of q and m are even": "octave_0[0]",
-        "the smaller of m and w is under q": "octaves_0[5]",
+        "a square is 0 or 1 modulo 4": "square_root[1]",
+        "the shifts of q and m are even": "octave_0[0]",
+        "the smaller of m and w is less than q": "octaves_0[5]",
     },
 )

@@ -17,16 +17,19 @@ __all__ = ["RECORD", "any_vectors", "line_directions", "pixel_word_beats"]
 def any_vectors(
     rng: np.random.Generator, model: QuotientSpans, length: np.ndarray, near: bool = False
 ) -> SpanVectors:
-    """Vectors of spans of given lengths, within a source's limits of the ends' ratio and angle.
+    """Vectors of spans of given lengths.
+
+    As from a source, the vectors at both ends of a span have a ratio of lengths up to 2 and an angle up to 90
+    degrees.
 
     Parameters
     ----------
     rng : Generator
-        Of the random numbers.
+        Generator of the random numbers.
     model : QuotientSpans
-        The components of a span.
+        The components that a span has.
     length : int array, shape (spans,)
-        Pixels. The step of a span of two pixels is 0.
+        Pixels of each span. The step of a span of two pixels is 0.
     near : bool
         Whether all vectors are near the z axis of the first light.
     """
@@ -44,14 +47,17 @@ def any_vectors(
 
 
 def line_directions(rng: np.random.Generator, lights: int) -> np.ndarray:
-    """Codes of ``sin a`` and ``cos a`` of lights, shape (lights, 2). Some are at the viewer, some behind."""
+    """Codes of ``sin a`` and ``cos a`` of lights, shape (lights, 2). Some angles a are 0 or 90 degrees."""
     angle = rng.choice([0, np.pi / 2, np.nan], lights)
     angle = np.where(np.isnan(angle), rng.uniform(0, np.pi / 2, lights), angle)
     return QuotientSpans().codes_of(np.sin(angle), np.cos(angle))
 
 
 def pixel_word_beats(unit, pixels, span: np.ndarray) -> np.ndarray:
-    """Words of pixels as beats. ``span`` is the index of each pixel's span."""
+    """Words of pixels as output beats of a `QuotientSpansUnit`, or as input beats of another unit.
+
+    ``span`` is the index of each pixel's span.
+    """
     stream = unit.o if isinstance(unit, QuotientSpansUnit) else unit.i
     beats = np.zeros(len(span), dtype_of(stream.payload.shape()))
     beats["rest"], beats["line"], beats["span"] = pixels.rest.codes, pixels.line.codes, 1 - span % 2
@@ -76,14 +82,14 @@ def _case(unit, vectors, length, constants):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, most short, with ends in ratios to 1:2 and angles to 90 degrees."""
+    """Spans of every length, most of them short. The ends have ratios up to 2 and angles up to 90 degrees."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     vectors = any_vectors(rng, unit.model, length)
     return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
 def _words(unit, rng, count):
-    """Extreme codes in every component and light, with any steps and exponents, so that sums wrap."""
+    """Extreme codes in every component and light, with any steps and exponents. Sums wrap."""
     length = np.maximum(rng.choice([1, 1, 1, 2, 3, 4, 5, 6, 7, 9, 40], count) % (1 << unit.length_bits), 1)
     shape = count, len(unit.model.components)
     start, step = (np.maximum(word_ends(rng, *shape), 1 - (1 << 17)) for _ in range(2))
@@ -92,7 +98,7 @@ def _words(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of differences count."""
+    """Spans of 3000 to 4095 pixels, where the last bits of differences change the words."""
     length = np.maximum(rng.integers(3000, 4096, 8) % (1 << unit.length_bits), 1)
     vectors = any_vectors(rng, unit.model, length)
     return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
@@ -123,7 +129,7 @@ RECORD = Record(
             partial(_measure, model=_DEFAULT),
             "ends to 1:2 and 90 degrees, 1 to 4095 pixels",
             beat={"length": 64},
-            note="q, relative; exact: the vectors' codes",
+            note="relative error of q, for the codes of the vectors",
         ),
         "R.V": Variant(partial(QuotientSpansUnit, QuotientSpans(mirror=True)), long=True),
         "2 lights": Variant(partial(QuotientSpansUnit, QuotientSpans(2), 9), long=True),
@@ -147,8 +153,8 @@ RECORD = Record(
     axis="pixels of the span",
     logarithmic=True,
     still={
-        "w's second difference is positive and under 2": "second[97] change_1[48]",
-        "z's second difference is a multiple of 2^3": "second[98-100]",
+        "the second difference of w is positive and less than 2": "second[97] change_1[48]",
+        "the second difference of z is a multiple of 8": "second[98-100]",
         "cos a is not negative": "line_z0_b[17]",
     },
 )

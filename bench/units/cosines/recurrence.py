@@ -23,7 +23,7 @@ def _measure(rng, count, unit, shortcut=False):
     step = psi / (length - 1)
     phase = rng.uniform(-np.pi, np.pi, len(length))
     amplitude = rng.uniform(0, 1 - 2.0**-16, len(length))
-    # The shortcut for cos d, computed from its half angle, because a cosine near d = 0 has lost its digits.
+    # The shortcut is cos d = 1 - (1 - cos psi)/(m - 1)^2. Its half angle gives d without loss of digits.
     taken = 2 * np.arcsin(np.sin(psi / 2) / (length - 1)) if shortcut else step
     states = unit.states(*unit.start(amplitude, phase, step), *unit.coefficient(taken), int(length.max()))
     k = np.arange(len(states.codes))[:, np.newaxis]
@@ -33,7 +33,7 @@ def _measure(rng, count, unit, shortcut=False):
         first, second = (amplitude * np.cos(phase - n * step) for n in (0, 1))
         rise = second - first + 2 * first * np.square(np.sin(taken / 2))
         ratio = k * np.sinc(k * taken / np.pi) / np.sinc(taken / np.pi)
-        # If the span is wide, this is up to 1.1, which is out of the result's word.
+        # In a wide span this is up to 1.1. The word of a result does not hold 1.1.
         limit = unit.result_format.max_code * unit.result_format.step
         formula = np.clip((first * np.cos(k * taken) + rise * ratio)[inside], -1, limit)
     pixel = np.broadcast_to(k, inside.shape)[inside]
@@ -63,7 +63,7 @@ def _beats(unit, starts, coefficient, shift, length) -> dict:
 
 
 def spans_of(unit: RecurrenceUnit, rng: np.random.Generator, length: np.ndarray) -> Case:
-    """Input of spans of given lengths and up to 89 degrees, whose words do not wrap."""
+    """Input of spans of given lengths and angles up to 89 degrees. Their words do not wrap."""
     p, count = unit.model, len(length)
     step = np.radians(rng.uniform(0, 89, count)) / np.maximum(length - 1, 1)
     coefficient, shift = p.coefficient(step)
@@ -75,12 +75,12 @@ def spans_of(unit: RecurrenceUnit, rng: np.random.Generator, length: np.ndarray)
 
 
 def _spans(unit, rng, count):
-    """Cosines of spans to 89 degrees, whose words do not wrap. Most are short, and some have no pixel."""
+    """Spans up to 89 degrees, whose words do not wrap. Most are short, and some have no pixel."""
     return spans_of(unit, rng, short_lengths(rng, count))
 
 
 def _words(unit, rng, count):
-    """Cosines of lengths 0 to 39. Every third span has random codes, every 15th has extreme codes."""
+    """Spans of 0 to 39 pixels. Every third span has random codes, and every 15th span has extreme codes."""
     beats = spans_of(unit, rng, rng.integers(0, 40, count // 20)).beats
     any_size = np.arange(0, len(beats["length"]), 3)
     p = unit.model
@@ -102,7 +102,7 @@ def _longest(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Spans with nearly no angle, at a border of the result's rounding, where one step changes the result."""
+    """Spans with nearly no angle, at the border of a result's rounding. One step of a state changes it."""
     p, length = unit.model, np.full(count // 12, 12)
     cut = p.state_format.fraction_bits - p.result_format.fraction_bits
     starts = []
@@ -115,7 +115,7 @@ def _borders(unit, rng, count):
 
 
 MEASURED = [f"{form}{phases}" for form in RECURRENCE_FORMS for phases in ("", ", interleaved")]
-"""Variants of the tables of errors."""
+"""Variants that the tables of errors show."""
 
 
 def _variants():
@@ -161,9 +161,11 @@ RECORD = Record(
     axis="pixel of the span",
     logarithmic=True,
     waivers={
-        "result": "A state is not less than -2. So if the sign is set, one of the next two bits is set.",
-        "*_coarse": "While the output is stalled, the register holds a word that has been read, or 0.",
-        "*_product": "While the output is stalled, the register holds a word that has been read, or 0.",
-    },
+        "result": "A state is at least -2. So in a negative state one of the two bits after the sign is 1.",
+    }
+    | dict.fromkeys(
+        ("*_coarse", "*_product"),
+        "The fault changes the register only while the output is stalled. Its word is 0, or has been read.",
+    ),
     still={},
 )

@@ -71,14 +71,17 @@ def _vectors(unit, rng):
 
 
 def _spans(unit, rng, count):
-    """Normals at any distance, lengths with a uniform logarithm. Every 16th pair has random codes."""
+    """Normals at any angle, and lengths with a uniform logarithm. Every 16th pair has random codes."""
     left, right = any_pairs(rng, count)
     beats = {"normal_left": left, "normal_right": right, "length": any_lengths(rng, count)}
     return Case(beats, light_constants(unit, *_vectors(unit, rng)))
 
 
 def _corners(unit, rng, count):
-    """Angles about 90 degrees, extreme codes, N at the peak of a highlight, equal normals at the peak."""
+    """Angles up to and over 90 degrees, extreme codes, and N at the peak of a highlight.
+
+    In ten spans both normals are at the peak.
+    """
     beats = setup_spans(rng, count, 90, 90.1)
     direction, halfway = _vectors(unit, rng)
     beats["normal_left"][:50] = beats["normal_right"][:10] = halfway[0]
@@ -86,7 +89,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many spans, because the last bits of products and sums are rounded off and rarely matter."""
+    """Many spans, because the last bits of products and sums rarely change a rounded result."""
     return Case(setup_spans(rng, count, 90, 90.1), light_constants(unit, *_vectors(unit, rng)))
 
 
@@ -101,7 +104,7 @@ RECORD = Record(
             RecurrenceSetupUnit,
             _measure,
             "spans to 90 degrees, 1 to 4095 pixels",
-            note="of cos gamma at any pixel that its words lead to; the tables count as arithmetic",
+            note="error of cos gamma at any pixel; errors of the tables count as arithmetic error",
         ),
         "interval 1": Variant(partial(RecurrenceSetupUnit, initiation_interval=1), long=True),
         "interval 46": Variant(partial(RecurrenceSetupUnit, initiation_interval=46), long=True),
@@ -115,18 +118,25 @@ RECORD = Record(
         "last bits": Stimulus(_last_bits, 3000, stalled=False, repeats=2),
     },
     waivers={
-        "*_first": "The bit is below a cosine's bits, where the word has zeros, or the word has been read.",
+        "*_first": (
+            "The bit is below the bits of a cosine, where the word has zeros. Or the word has been read by "
+            "then."
+        ),
         "*_x_0": "The controlling bit is below the bits of a cosine, where x has zeros.",
-        "reciprocal_square": "While the output is stalled, the register holds a word that has been read.",
-        "span_aligned": "Three squares, each up to 2^34, times 4 at most, are less than 2^38: the bit is 0.",
-        "span_square_total": "While the output is stalled, the register holds a word that has been read.",
-        "rho_rounded": "A word under 1 is rounded to 1 at most, and the bit stands for 2: it is 0.",
-    },
+        "span_aligned": (
+            "Four times a sum of three squares of at most 2^34 is less than 2^38, so the bit is 0 already."
+        ),
+        "rho_rounded": "A word less than 1 is rounded to at most 1, so the bit of 2 is 0 already.",
+    }
+    | dict.fromkeys(
+        ("reciprocal_square", "span_square_total"),
+        "The fault changes the register only while the output is stalled. Its word has been read by then.",
+    ),
     still={
-        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
+        "a sum of three squares of at most 2^34 is not negative, and less than 2^36": (
             "span_square_partial[36] span_square_total[36-37] span_aligned[38-39]"
         ),
-        "all words that are read from a table have the same bit there": (
+        "all words that are read from a table agree in this bit": (
             "chord_entry[12-13] chord_entry[34-35] chord_entry[49] "
             "step_entry[10-13] step_entry[34-35] step_entry[47-49] step_entry[71] "
             "phase_entry[10-13] phase_entry[35] "
@@ -134,33 +144,33 @@ RECORD = Record(
             "step_tables.port__data[10-13] step_tables.port__data[34-35] step_tables.port__data[47-49] "
             "step_tables.port__data[71] phase_tables.port__data[10-13] phase_tables.port__data[35]"
         ),
-        "the excess of an angle's square is less than 1/4, and the excess of an angle less than 1": (
+        "psi^2/(2 q) - 1 is less than 1/4, and psi/sin psi - 1 is less than 1": (
             "chord_0_sum[20-22] chord_0_rounded[15-18] chord_0[15-16] chord_1_sum[22] chord_1_rounded[17-18]"
         ),
-        "for a step 1 - k is under 1/4 and 1 - sin d/d under 1/2; for four steps 1 - k is under 1/2": (
+        "1 - k is less than 1/4 for d and less than 1/2 for 4 d, and 1 - sin d/d is less than 1/2": (
             "step_0_sum[20-22] step_0_rounded[15-18] step_0[15-16] "
             "step_1_sum[21-22] step_1_rounded[16-18] step_1[16] "
             "phase_0_sum[21-22] phase_0_rounded[16-18] phase_0[16]"
         ),
-        "a reciprocal and its square are normalised, so that their first bit is 1": (
+        "a reciprocal and its square are normalised, so their first bits are 1": (
             "reciprocal_entry[16] reciprocal_entry[33] reciprocal[16] reciprocal_square[16] "
             "reciprocals.port__data[16] reciprocals.port__data[33]"
         ),
-        "a square rounds up to 1 only in one span of 2^17": "psi_square_rounded[17]",
-        "an eighth of Q is at most 0.31, so that its word, which is 1/2 or more, is shifted": "step_fine[27]",
-        "K is not negative, and is less than 1 also when it is rounded": (
+        "a square is rounded up to 1 in only 1 of 2^17 spans": "psi_square_rounded[17]",
+        "Q/8 is at most 0.31 and its word at least 1/2, so the word is always shifted": "step_fine[27]",
+        "K is not negative, and is less than 1 even after rounding": (
             "*_coefficient_exact[34] *_coefficient_rounded[17-18]"
         ),
         "psi/sin psi - 1 is at least 1 - sin d/d": "excess_difference[17]",
-        "rho is less than 2; its word, halved where rho is 1 or more, is 1/2 or more": (
+        "rho is less than 2; its word is at least 1/2, and is rho/2 for a rho of 1 or more": (
             "rho_exact[35] rho_halved[35] rho_rounded[18] rho[16]"
         ),
-        "a cosine has ten bits less than x": (
+        "a cosine has ten fraction bits less than x": (
             "top.spare[0-9] top.spare[368-377] {diffuse,highlight}_0_x_0[0-9] *_0_start_0_first[0-9]"
         ),
-        "a value that is shifted ends in zeros": "shifter_{2-4}_0[0-12]",
-        "a cosine and twice a difference are even": "*_0_sum_1[0]",
-        "rho, coefficients and fractions, the only second operands of these multipliers, are not negative": (
+        "the values that these shifters take end in zeros": "shifter_{2-4}_0[0-12]",
+        "the sum of a cosine and twice a difference is even": "*_0_sum_1[0]",
+        "these multipliers multiply by rho, coefficients and fractions, and none of them is negative": (
             "multiplier_{8-11}_{1,b}[17]"
         ),
     },

@@ -29,14 +29,14 @@ def _expect(unit, case):
 
 
 def _words(unit, rng, count):
-    """Cosines from -1 to 1, and words of every size, their ends among them."""
+    """Cosines from -1 to 1, and words of every size with extreme codes."""
     codes = any_codes(rng, unit.model.operand_format, count)
     codes[::2] = rng.integers(-ONE * ONE, ONE * ONE, len(codes[::2]), endpoint=True)
     return Case(codes)
 
 
 def _corners(unit, rng, count):
-    """Cosines of 0 and 1, ties of rounding, first saturated codes, extreme codes, and neighbours of all."""
+    """Cosines of 0 and 1, ties of rounding, saturated words, and the codes next to them; extreme codes."""
     format, step = unit.model.operand_format, 1 << 17
     centres = np.array([0, ONE_SQUARED.codes.item(), 1 << 34, (1 << 34) - step, step // 2, 3 * step // 2])
     codes = np.r_[(centres[:, np.newaxis] + [-1, 0, 1]).ravel(), format.min_code, format.max_code]

@@ -29,7 +29,7 @@ def _expect(unit, case):
 
 
 def _words(unit, rng, count):
-    """Words of every size, with their ends, and factors of 0 and 1 with any term."""
+    """Words of every size, with extreme codes. Some factors are 0 or 1."""
     beats = {name: any_codes(rng, FORMAT, count) for name in unit.i.payload.shape().members}
     if unit.has_factor:
         beats["factor"][::8] = FORMAT.max_code
@@ -42,10 +42,10 @@ RECORD = Record(
     title="Specular term of a light that fades, times its factor",
     source="docs/theory/chord.md#local-lights",
     variants={
-        "": Variant(FactorUnit, _measure, "a and S 0 to 1"),
+        "": Variant(FactorUnit, _measure, "factor a and specular term S 0 to 1"),
         "without a factor": Variant(partial(FactorUnit, has_factor=False), long=True),
     },
     expect=_expect,
     stimuli={"words": Stimulus(_words, 1500)},
-    axis="a",
+    axis="factor a",
 )

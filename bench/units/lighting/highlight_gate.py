@@ -33,7 +33,7 @@ _GATE = HighlightGate(_METHOD.gate_limits)
 
 
 def _measure(rng, count):
-    """Decisions: spans that the gate lets through, and spans with a term at any pixel."""
+    """Decisions whether the gate lets a span through, and whether a pixel of the span has a term over 0."""
     gate, interpolator = _GATE, _METHOD
 
     def samples():
@@ -72,20 +72,20 @@ def _expect(unit, case):
 
 
 def spans_about(rng, halfway, cosine, degrees, spread):
-    """Unit normals of spans of given angles. The largest N·H on a span's great circle is about a cosine.
+    """Unit normals of spans of given angles. The largest N·H on a span's great circle is near a cosine.
 
     Parameters
     ----------
     rng : Generator
-        Of the random numbers.
+        Generator of the random numbers.
     halfway : array, shape (spans, 3)
         Unit vector H of each span.
     cosine : array, shape (spans,)
-        The largest N·H.
+        The cosine of each span.
     degrees : array, shape (spans,)
         Angles of the spans.
     spread : float
-        Mean deviation of N·H from the cosine.
+        Standard deviation of the largest N·H from the cosine.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def _near(unit, rng, count, exponent, spread, degrees):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Spans of every angle to 90 degrees with a largest N·H about the threshold, and extreme codes."""
+    """Spans of up to 90 degrees. The largest N·H is near the threshold. Some ends have extreme codes."""
     degrees = rng.choice([0, 1e-3, 1, 10, 30, 44.9, 45.1, 75, 90], count)
     case = _near(unit, rng, count, exponent, 1e-3, degrees)
     format = unit.model.component_format
@@ -131,17 +131,17 @@ def _spans(unit, rng, count, exponent=EXPONENT):
 
 
 def _any(unit, rng, count):
-    """Spans about the threshold, with another exponent in each run: a power of two, the largest, or any."""
+    """Spans near the threshold, with another exponent in each run: a power of two, the largest, or any."""
     return _spans(unit, rng, count, any_exponent(rng))
 
 
 def _last_bits(unit, rng, count):
-    """Spans as near to the threshold as rounding allows, so that last bits of products and sums decide."""
+    """Spans as near to the threshold as rounding allows, so the last bits of products and sums decide."""
     return _near(unit, rng, count, any_exponent(rng), 1e-5, np.geomspace(0.1, 45, count))
 
 
 def _ties(unit, rng, count):
-    """Spans whose decision changes if a dot product is off by 2^9 of its last bits, chosen from many."""
+    """Spans, chosen from many, whose decision changes if a dot product changes by 2^9 steps."""
     p, exponent = unit.model, any_exponent(rng)
     case = _near(unit, rng, count, exponent, 1e-5, 45 * rng.random(count) ** rng.choice([1, 3]))
     left, right = (Fixed(p.component_format, case.beats[f"normal_{end}"]) for end in ("left", "right"))
@@ -166,7 +166,8 @@ def _variants():
             _measure,
             "spans to 45 degrees, 1 to 16 pixels, N_l within twice the highlight's radius of H, n 1 to 1000",
             "rate",
-            note="of all spans; model: let through without a lit pixel; arithmetic: stopped with a lit pixel",
+            note="shares of all spans; model error: let through without a lit pixel; arithmetic error: "
+            "stopped with a lit pixel",
         ),
     )
     for interval in (1, 2, 3, 5, 8, 15):
@@ -197,17 +198,19 @@ RECORD = Record(
     },
     waivers={
         "a_0": (
-            "The fault turns a negative cosine into 256 steps. On a span to 45 degrees the cosine then "
+            "The fault turns a negative cosine into 256 steps. In a span of up to 45 degrees the cosine then "
             "reaches less than 400 steps."
         ),
-        "difference": "Once in 2^15 spans the bit changes a carry past the bits that are cut off.",
-        "partial_0": "T (2 - u) is not negative, and less than 2: the controlling bit is 0.",
-        "total_0": "The bit is cut off. It carries into the kept bits once in 2^14 spans.",
-        "cut": "1 - N_l·N_r is less than 4, also of words that are no unit vectors.",
-        "$auto$ff.cc:*": "All beats begin on the same turn, as the unit waits on its results' turn only.",
+        "difference": "The bit is cut off. Its carry changes a kept bit in only 1 of 2^15 spans.",
+        "partial_0": "T (2 - u) is not negative, and less than 2, so the controlling bit is 0.",
+        "total_0": "The bit is cut off. Its carry changes a kept bit in only 1 of 2^14 spans.",
+        "cut": "1 - N_l·N_r is less than 4 for any words of normals, so the bit is 0 already.",
+        "$auto$ff.cc:*": (
+            "The unit waits only on the turn on which its results come. So all beats begin on the same turn."
+        ),
     },
     still={
-        "the exponent is constant in a run, so no bit of a word made from it falls": (
+        "the exponent is constant in a run, so no bit of its threshold falls": (
             "datapath.threshold[0-16] thresholds.port__data[0-16]"
         ),
         "T (2 - u) is not negative, and less than 2": "partial_0[36-48]",

@@ -14,7 +14,7 @@ __all__ = ["RECORD"]
 
 _COLOR, _TERM = Intensity.COLOR_FORMAT, Intensity.TERM_FORMAT
 _FULL = 255 << _COLOR.fraction_bits
-"""Colour operand of the full channel."""
+"""Colour operand of a full channel."""
 
 _COLORED = {
     "albedo": Intensity(has_albedo=True),
@@ -73,7 +73,7 @@ def _case(unit, rng, terms, ambient, colors):
     beats = dict(zip(unit.kinds, terms, strict=False))
     constants = {"ambient": ambient, "diffuse": colors[0], "specular": colors[1]}
     if unit.model.has_albedo:
-        # Colours of any size, of which some are black and some white.
+        # Albedos of any size. Some are black, and some are white.
         albedo = rng.integers(0, 1 << 16, (len(terms[0]), 3)) >> rng.integers(0, 12, (len(terms[0]), 1))
         albedo[::8] = rng.choice([0, 1 << 16], albedo[::8].shape)
         beats["albedo"] = albedo
@@ -84,7 +84,10 @@ def _case(unit, rng, terms, ambient, colors):
 
 
 def _terms(unit, rng, count, brightness=1):
-    """Terms of which some or all are 0, or all are the largest, with colours up to a full channel."""
+    """Any terms of all lights, with colours up to a full channel.
+
+    In some pixels some or all terms are 0, or all terms have the largest code.
+    """
     lights = unit.model.lights
     terms = rng.integers(0, _TERM.max_code, (2, count, lights), endpoint=True)
     terms *= rng.random(terms.shape) < rng.random((1, count, 1))
@@ -96,17 +99,20 @@ def _terms(unit, rng, count, brightness=1):
 
 
 def _bright(unit, rng, count):
-    """The same terms with colours up to eight full channels, for saturation and every bit of a colour."""
+    """Any terms of all lights, with colours up to eight full channels.
+
+    Channels saturate, and every bit of a colour is used.
+    """
     return _terms(unit, rng, count, 8)
 
 
 def _colors(unit, rng, count):
-    """Light of up to eight full channels on surfaces of every albedo, for the limit of light on a surface."""
+    """Light of up to eight full channels, over the limit of light, on surfaces of every albedo."""
     return _terms(unit, rng, count, 8)
 
 
 def _sizes(unit, rng, count):
-    """Terms and colours of every size, for the last bits of products, which are rounded off."""
+    """Many terms and colours of every size, because the last bits of products rarely change a channel."""
     terms = rng.integers(0, _TERM.max_code, (2, count, 1), endpoint=True)
     terms >>= rng.integers(0, 12, terms.shape)
     ambient, *colors = rng.integers(0, _FULL * rng.choice([1, 2, 8]), (3, 1, 3))
@@ -114,11 +120,11 @@ def _sizes(unit, rng, count):
 
 
 def _halves(unit, rng, count):
-    """Sums of half an LSB, and sums a step smaller, where every bit of a product and of the sum counts."""
+    """Sums that end in half an LSB, or a step less. Every bit of products and sum changes a channel."""
     colors = np.repeat([[[8191]], [[6003]]], 3, axis=-1)
     ambient = np.array([3, 100, 40]) * 64 + 5
     wanted = (1 << 22) - np.arange(2)[:, np.newaxis]
-    # About 1 in 64 specular terms has a diffuse term with which the sum is as wanted.
+    # About 1 in 64 specular terms has a diffuse term that gives the wanted sum.
     specular = rng.integers(0, _TERM.max_code, (2, 40 * count), endpoint=True)
     # The term of an odd colour can give any bits below the bits of the ambient light.
     diffuse = (wanted - 6003 * specular) * pow(8191, -1, 1 << 17) % (1 << 17)
@@ -171,11 +177,11 @@ RECORD = Record(
     axis="exact sum, LSB",
     waivers={
         "diffuse_0_r_?": (
-            "Where the controlling bit is set, the product is 256 or more, and the channel saturates."
+            "If the controlling bit is 1, the product is 256 or more, and the channel saturates."
         ),
         "specular_0_b_?": (
-            "Where the controlling bit is set, the product is 1024 or more, and the channel saturates."
+            "If the controlling bit is 1, the product is 1024 or more, and the channel saturates."
         ),
     },
-    still={"three terms of 8 times the full channel are 6120, less than 2^13": "rounded_{r,g,b}[13]"},
+    still={"the largest sum, of three terms of 8 full channels, is 6120": "rounded_{r,g,b}[13]"},
 )

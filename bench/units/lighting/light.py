@@ -31,7 +31,7 @@ __all__ = ["RECORD"]
 
 
 def _measure(rng, count):
-    """Both terms of normals about H. The exact term of the highlight is Blinn's."""
+    """Diffuse and specular term of normals near H. The exact specular term is Blinn's power."""
     unit, product = Specular(), DotProduct()
 
     def samples():
@@ -74,7 +74,10 @@ def _expect(unit, case):
 
 
 def _operands(unit, rng, count, exponent=None):
-    """N.L and the highlight's operand anywhere, half of N.L near 0, and runs of spans without highlight."""
+    """Any N·L and any specular operand. A quarter of N·L is near 0.
+
+    If there is a gate, it turns off the highlight in runs of 20 beats.
+    """
     case = highlights(unit, rng, count, exponent)
     cosine = any_codes(rng, _cosine_format(unit), count)
     cosine[::4] >>= 20
@@ -92,7 +95,7 @@ def _exponents(unit, rng, count):
 
 
 def _terminator(unit, rng, count):
-    """A highlight's peak with N·L at 0, next to 0, of one bit, or under 0, so that N·L switches it."""
+    """The peak of a highlight, with N·L of 0, of a single bit, or less than 0. N·L switches the highlight."""
     bits = 1 << np.arange(34)
     cosine = rng.permutation(np.r_[0, bits, -bits, _cosine_format(unit).min_code])
     highlight = np.full(len(cosine), ONE**2)
@@ -100,7 +103,7 @@ def _terminator(unit, rng, count):
 
 
 def _black(unit, rng, count):
-    """A light with L and H of 0."""
+    """A light whose L and H are 0."""
     zero = np.zeros(count, dtype=np.int64)
     return Case({"cosine": zero, "highlight": zero}, {"exponent": 1})
 
@@ -150,15 +153,20 @@ RECORD = Record(
     axis="n (1 - cos γ)",
     logarithmic=True,
     waivers={
-        "lit": "No exponent's boundary is the largest code, of which all bits are 1.",
-        "product": "The slope, n of 10 bits normalised to 17, ends in seven zeros, and so does its product.",
-        "argument": "The bit serves the saturation at 2. An argument of 2 is dark at every exponent.",
+        "lit": "The bit is 1 only if all bits of the boundary are 1. No exponent has this boundary.",
+        "product": (
+            "The slope is n of 10 bits, normalised to 17 bits. So slope and product end in seven zeros."
+        ),
+        "argument": (
+            "The bit decides whether the argument saturates at 2. An argument of 2 is dark at every exponent."
+        ),
         "stages": (
-            "The table is also read while the output is stalled. As the exponent stays, the word stays."
+            "The fault reads the table while the output is stalled, too. The exponent stays, so the word "
+            "stays."
         ),
         "shifted": (
-            "The bit serves the saturation at 2. This is over the boundary of every exponent, so the product "
-            "is not read."
+            "The bit decides whether the word saturates at 2. A word of 2 is over the boundary of every "
+            "exponent, so its product is not read."
         ),
     },
 )

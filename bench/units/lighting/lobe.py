@@ -35,7 +35,7 @@ def _parameters(rng, model, count):
 
 
 def _measure(rng, count, lobe):
-    """Terms over all octaves of 1 - N·H. The exact terms are the reflection model's, in float64."""
+    """Terms over all octaves of 1 - N·H. The reflection model in float64 gives the exact terms."""
 
     def samples():
         for parameter, share in _parameters(rng, lobe.reflection, count):
@@ -52,7 +52,7 @@ def _measure(rng, count, lobe):
 
 
 def _operands(model, rng, count):
-    """``count`` operands: corner cases, any codes, ends of every table step, and codes of every octave."""
+    """``count`` operands: corner cases, any codes, both ends of each step of the table, and every octave."""
     if model.operand == "place":
         return _places(model, rng, count)
     format, bits = model.operand_format, model.fraction_bits
@@ -69,7 +69,7 @@ def _operands(model, rng, count):
 
 
 def _places(model, rng, count):
-    """``count`` places: both ends of every step in all parts of the table, any, and past the end."""
+    """``count`` places: both ends of each step of the table, any places, and places past its end."""
     format, rows = model.operand_format, model.rows * model.steps
     steps = np.arange(rows) << model.fraction_format.width
     past = (rows << model.fraction_format.width) + np.r_[0, 1, 1 << rng.integers(0, 12, 6)]
@@ -106,9 +106,9 @@ def _highlights(unit, rng, count):
 
 
 def _tables(unit, rng, count):
-    """Tables of any curve, other tables in each run. A later table replaces a table.
+    """Tables of any curve, with other tables in each run. Further writes come before and after the tables.
 
-    Some writes make no word.
+    A table before is replaced. The writes after change no table.
     """
     p = unit.model
     tables = []
@@ -221,11 +221,13 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("last", "active"),
-        "There is one bank. So a table that ends too late writes only past the end of the memory.",
+        "The fault lets a table end too late. With one bank the memory has no word for further values.",
     )
     | {
-        "memory.follows": "Writes of a run come without gaps. A test of the unit has gaps.",
-        "memory.$signature__addr": "After the number of a missing bank the unit writes no word.",
+        "memory.follows": "In a run writes come without gaps. A test of the unit has writes with gaps.",
+        "memory.$signature__addr": (
+            "The fault changes the address after the number of a missing bank. No word is written then."
+        ),
         "table__word": "No bank is written while beats read it, so the register may change on a write.",
     },
     still={"with one bank the last address is the same for every table": "memory.last[0-8]"},

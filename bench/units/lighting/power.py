@@ -19,12 +19,12 @@ __all__ = ["RECORD"]
 
 
 def _last_bits(unit, rng, count):
-    """Many operands, because the last bits of products are rounded off and decide once in thousands."""
+    """Many operands, because the last bits of products change a rounded result only once in thousands."""
     return exponent_bits(unit, rng, count)
 
 
 def _ties(unit, rng, count):
-    """Operands whose complement is a few last bits from the next step of the result, chosen from many."""
+    """Operands, chosen from many, whose complement is within 4 of its steps from a step of the result."""
     p = unit.model
     case = highlights(unit, rng, count, int(rng.integers(1, 1001)))
     operand = Fixed(p.operand_format, case.beats["operand"])
@@ -62,11 +62,11 @@ RECORD = Record(
     logarithmic=True,
     waivers=dict.fromkeys(
         ("s_*", "x_?_sum", "x_?_difference"),
-        "The bit is the lowest of 17 bits that are cut off. It carries past them once in 2^17 terms.",
+        "The bit is the lowest of 17 bits that are cut off. Its carry changes a kept bit in 1 of 2^17 terms.",
     )
-    | {"x_9": "The bit serves the saturation, but p + q - pq never saturates."},
+    | {"x_9": "The bit decides whether p + q - p q saturates, and p + q - p q never saturates."},
     still={
-        "the second bit of a square is 0": "x_{0-8}_product[1]",
-        "twice a number is even": "x_{0-8}_sum[0]",
+        "a square is 0 or 1 modulo 4": "x_{0-8}_product[1]",
+        "the sum of two equal numbers is even": "x_{0-8}_sum[0]",
     },
 )

@@ -29,7 +29,7 @@ HIGHLIGHTS = "n 1 to 1000, N.H 0 to 1"
 
 
 def measure_highlights(rng, count, model):
-    """Terms of cosines in the highlight, about its end, and anywhere. The exact term is Blinn's power."""
+    """Terms of cosines in the highlight, near its end, and anywhere. The exact term is Blinn's power."""
 
     def samples():
         for exponent, share in exponents(rng, count):
@@ -53,7 +53,7 @@ def any_exponent(rng) -> int:
 
 
 def exponent_of(unit, constants) -> int:
-    """Exponent of a run: fixed at build time, a constant, or an exponent with the given slope."""
+    """Exponent of a run: fixed at build time, or from the constants: the exponent itself, or its slope."""
     if constants is None:
         return unit.exponent
     if "exponent" in constants:
@@ -68,7 +68,7 @@ def _slopes(model, exponent):
 
 
 def highlights(unit, rng, count, exponent=None):
-    """Operands in the highlight, at its end and anywhere, for an exponent. A tenth of the beats is dark."""
+    """Operands in the highlight, at its end and anywhere, for one exponent. A tenth of the beats is dark."""
     exponent = getattr(unit, "exponent", None) or exponent or EXPONENT
     constants = {"exponent": exponent}
     if "constants" not in unit.signature.members:
@@ -132,7 +132,7 @@ def _others():
                 partial(SpecularUnit, p),
                 partial(measure_highlights, model=p),
                 HIGHLIGHTS,
-                note="comparator on the square, so that the parabola's second lobe shows",
+                note="the comparator reads the square, so the second lobe of the parabola shows",
                 source=p.reflection.source,
                 as_published=True,
                 long=name != "cosquad",
@@ -198,17 +198,17 @@ RECORD = Record(
     axis="n (1 - cos γ)",
     logarithmic=True,
     still={
-        "a slope is n / 2, and n of 10 bits, normalised to 17, ends in seven zeros": (
+        "a slope is n/2, and n of 10 bits, normalised to 17 bits, ends in seven zeros": (
             "datapath.slope.slope_word[0-16] datapath.slope.scale[0-6] datapath.product[0-6]"
         ),
-        "the exponent is constant in a run, so no bit of a word made from it falls": (
+        "the exponent is constant in a run, so no bit of its slope and boundary falls": (
             "slope_word[17-26] slope.scale[7-16] slope.shift[0-3] slope.{read,boundary}[0-16] "
             "boundaries.port__data[0-16]"
         ),
-        "the second bit of a square is 0": "datapath.square[1]",
+        "a square is 0 or 1 modulo 4": "datapath.square[1]",
     },
     waivers={
-        "argument": ("An argument of 1 or more is lit only under an exponent of 1. Then the bit is cut off."),
-        "slope_word": "The slope is n / 2. The 17 bits from its first bit on leave out the lowest bit.",
+        "argument": "An argument of 1 or more is lit only at an exponent of 1. Then the bit is cut off.",
+        "slope_word": "The slope is n/2. Its lowest bit is not among the 17 bits that the unit uses.",
     },
 )

@@ -30,12 +30,12 @@ def _expect(unit, case):
 
 
 def _beats(rng, light):
-    """Beats whose channels have the same light in orders of their own."""
+    """Beats with the same values of light in each channel, in another order in each channel."""
     return Case({name: rng.permutation(light) for name in "rgb"})
 
 
 def _octaves(unit, rng, count):
-    """Light of every octave, with its ends."""
+    """Light in every octave, and at both ends of each octave."""
     ends = 1 << np.arange(FORMAT.width)
     light = np.r_[0, ends, ends - 1, FORMAT.max_code, 2 ** rng.uniform(0, FORMAT.width, count)]
     return _beats(rng, light[:count].astype(np.int64))

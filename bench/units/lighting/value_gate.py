@@ -29,21 +29,21 @@ FORMAT = ChordSetup.HIGHLIGHT_FORMAT
 
 
 def parabolas_near(rng: np.random.Generator, least: np.ndarray, largest_bulge: float = 2.0**-5) -> np.ndarray:
-    """Codes of three values of u on parabolas of any size, with a least value near a given value.
+    """Codes of three values of u on parabolas of any size with given least values.
 
     Parameters
     ----------
     rng : Generator
-        Of the random numbers.
+        Generator of the random numbers.
     least : float64 array, shape (count,)
-        Least value of u on the span, or along the whole parabola if its vertex is on the span.
+        Least value of the parabola on each span.
     largest_bulge : float
         Largest ``|u_l + u_r - 2 u_m|``.
     """
     count = len(least)
     curvature = 2 * largest_bulge * 10.0 ** rng.uniform(-6, 0, count)
     curvature[::3] *= -1
-    # The place of the vertex. It is on the span, or far off, and then the parabola is nearly a line.
+    # The vertex is on the span, or far away from it. A parabola with a far vertex is nearly a line.
     vertex = rng.uniform(0, 1, count)
     vertex[::4] = rng.choice([-1, 1], len(vertex[::4])) * 10.0 ** rng.uniform(0, 2, len(vertex[::4]))
     three = curvature[:, None] * np.square(np.array([0, 0.5, 1]) - vertex[:, None])
@@ -54,7 +54,7 @@ def parabolas_near(rng: np.random.Generator, least: np.ndarray, largest_bulge: f
 
 
 def _measure(rng, count):
-    """Decisions: spans that the gate lets through, and spans with a term at any pixel."""
+    """Decisions whether the gate lets a span through, and whether a pixel of the span has a term over 0."""
     gate, method = ValueGate(), LocalChordInterpolator()
 
     def samples():
@@ -98,19 +98,19 @@ def _near(unit, rng, count, exponent, spread, largest_bulge=2.0**-5):
 
 
 def _spans(unit, rng, count, exponent=EXPONENT):
-    """Parabolas of every size, with the least u near the threshold. Every eighth has any codes."""
+    """Parabolas of every size, with the least u near the threshold. Every eighth span has any codes."""
     values, exponent = _near(unit, rng, count, exponent, 1e-3, 2.0**-4)
     values[::8] = any_codes(rng, FORMAT, *values[::8].shape)
     return _case(unit, values, exponent)
 
 
 def _exponents(unit, rng, count):
-    """Spans about the threshold, with another exponent in each run: a power of two, the largest, or any."""
+    """Spans near the threshold, with another exponent in each run: a power of two, the largest, or any."""
     return _spans(unit, rng, count, any_exponent(rng))
 
 
 def _last_bits(unit, rng, count):
-    """The least u a few codes off the threshold, so that the last bits of the sums decide."""
+    """Spans whose least u is a few codes from the threshold, so the last bits of the sums decide."""
     values, exponent = _near(unit, rng, count, any_exponent(rng), 2 * FORMAT.step)
     return _case(unit, values, exponent)
 
@@ -129,7 +129,7 @@ def _borders(unit, rng, count):
 
 
 def _thresholds(unit, rng, count):
-    """Thresholds that belong to no exponent, with the least and largest code, and a least u near them."""
+    """Thresholds that no exponent has, with the extreme codes. The least u is near the threshold."""
     format = unit.model.THRESHOLD_FORMAT
     code = rng.choice([0, 1, format.max_code, rng.integers(format.max_code), 1 << rng.integers(format.width)])
     nearest = min(code * format.step / 2, 2.0)
@@ -146,7 +146,8 @@ def _variants():
             _measure,
             "spans of 3 to 19 pixels, least u to twice the highlight's, n 1 to 1000",
             "rate",
-            note="of all spans; model: let through without a lit pixel; arithmetic: stopped with a lit pixel",
+            note="shares of all spans; model error: let through without a lit pixel; arithmetic error: "
+            "stopped with a lit pixel",
         ),
     )
     for name, specular in (
@@ -175,13 +176,15 @@ RECORD = Record(
     axis="n u in the middle of the span",
     logarithmic=True,
     waivers={
-        "threshold": "No exponent sets the controlling bit: its threshold would be 4 or more.",
-        "least_0": "The fault changes the sign of the bulge for a single value only, a power of two.",
+        "threshold": (
+            "The controlling bit is 1 only in a threshold of 4 or more. No exponent has this threshold."
+        ),
+        "least_0": "The fault changes the sign of the bulge only for a single value, a power of two.",
     },
     still={
-        "the exponent is constant in a run, so no bit of a word made from it falls": (
+        "the exponent is constant in a run, so no bit of its threshold falls": (
             "threshold[0-16] thresholds.port__data[0-16]"
         ),
-        "an exponent of 1 or more has a threshold under 4": "threshold[17] thresholds.port__data[17]",
+        "an exponent of 1 or more has a threshold less than 4": "threshold[17] thresholds.port__data[17]",
     },
 )

@@ -25,7 +25,10 @@ def _pole(unit, rng, count):
 
 
 def _longest_words(unit, rng, count):
-    """Normals and L whose codes are longest by rounding: opposite, at 60 and at 90 degrees."""
+    """Normals and L with the longest codes that rounding gives.
+
+    Some normals are opposite, at 60 degrees or at 90 degrees.
+    """
 
     def rounded(about):
         codes = np.rint(normalise(about + rng.uniform(-0.002, 0.002, (200_000, 3))) * ONE).astype(int)
@@ -33,7 +36,7 @@ def _longest_words(unit, rng, count):
 
     vector = rounded(np.sqrt(1 / 3))[0]
     about = normalise(vector)
-    # Each component changes by one step. At most one end is a unit vector up to its last bits.
+    # The ends of these spans differ by a step in each component. So at most one end has length 1.
     step = np.floor(normalise(vector + rng.integers(-100, 101, (200_000, 3))) * ONE).astype(int)
     excess = np.linalg.norm(step, axis=-1) - ONE
     step = step[np.argsort(np.abs(excess + np.sqrt(3) / 2))[:40]]
@@ -75,11 +78,16 @@ RECORD = Record(
     stimuli=STIMULI
     | {"pole": Stimulus(_pole, 200), "longest words": Stimulus(_longest_words, 400, stalled=False)},
     waivers={
-        "cordic_*": "The controlling bit of 1 and more is 0: the axes are at most 0.71 and the root of 2.",
-        "minor_operand": "While the output is stalled, the register holds a word that has been read.",
+        "cordic_*": (
+            "The controlling bit is above the bits of the axes, which are at most 0.71 and the root of 2. So "
+            "it is 0."
+        ),
+        "minor_operand": (
+            "The fault changes the register only while the output is stalled. Its word has been read by then."
+        ),
     },
     still={
-        "half an angle of 36 bits has 37": "top.{spare,payload}[0-2]",
-        "an angle is half a turn at most, and a step is less": "top.{spare,payload}[79]",
+        "half of an angle has 37 fraction bits, and the phase has 40": "top.{spare,payload}[0-2]",
+        "an angle is at most half a turn, and a step is less than half a turn": "top.{spare,payload}[79]",
     },
 )

@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 SPAN = {"normal_left": AXIS, "normal_right": AXIS, "length": 64}
-"""Beat for the simulation that finds the times."""
+"""Input beat of the simulation that finds latency and interval."""
 
 _GROUPS = 32
 """Number of lights of a measurement. The spans are divided into as many parts, with a light each."""
@@ -52,7 +52,7 @@ _GROUPS = 32
 
 
 def _measure(rng, count, method):
-    """N·L and 1 - N·H along spans. Equal unit vectors have the product 1."""
+    """N·L and 1 - N·H along spans. The dot product of two equal unit vectors counts as 1."""
 
     def samples():
         for length in np.array_split(span_lengths(rng, count), _GROUPS):
@@ -103,7 +103,7 @@ def measured(method: Interpolator, note: str = "", **facts) -> Variant:
         partial(_measure, method=method),
         f"spans to {min(method.MAX_ANGLE, 45):g} degrees, 1 to 4095 pixels",
         beat=SPAN,
-        note=f"of N.L and 1 - N.H; exact: normalised interpolation{note}",
+        note=f"errors of N.L and 1 - N.H; normalised interpolation counts as exact{note}",
         **facts,
     )
 
@@ -130,11 +130,11 @@ def options(method: Interpolator, lights: int = 1, *, as_published: bool = False
 
 
 def operand_beats(unit: Component, operands: Operands, **others: np.ndarray) -> np.ndarray:
-    """Output beats of a unit with these operands, and with codes of the other fields."""
+    """Output beats of a unit with these operands. ``others`` has the codes of further fields."""
     beats = np.zeros(operands.cosine.codes.shape, dtype_of(unit.o.payload.shape().elem_shape))
     for name in beats.dtype.names:
         if name == "factor":
-            # Factors of the lights that fade. Other lights have the factor 0.
+            # Lights that do not fade have the factor 0.
             beats[name][:, list(unit.factors)] = operands.factor.codes
         else:
             beats[name] = others[name] if name in others else getattr(operands, name).codes
@@ -154,7 +154,7 @@ def expect(unit: Component, case: Case) -> np.ndarray:
 
 
 def status(unit: Component, case: Case) -> dict[str, int]:
-    """Number of spans that the model flags."""
+    """Number of spans that the model flags as out of range."""
     return {"out_of_range": int(np.count_nonzero(_operands(unit, case).out_of_range))}
 
 
@@ -164,7 +164,7 @@ def status(unit: Component, case: Case) -> dict[str, int]:
 def case_of(
     unit: Component, rng: np.random.Generator, left: np.ndarray, right: np.ndarray, length: np.ndarray
 ) -> Case:
-    """Spans between normals of these codes, with lights from any side. H of the first light is a normal."""
+    """Spans between given normals, with lights on any side. H of the first light is one of the normals."""
     length = np.maximum(length % (1 << unit.length_bits), 1)
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[0] = left[len(left) // 2]
@@ -186,8 +186,9 @@ def _angles(unit, rng, count):
 
 
 def long_lengths(rng: np.random.Generator, pixels: int) -> np.ndarray:
-    """Lengths of spans of about ``pixels`` pixels in all. Spans of 3000 to 4095 pixels are followed
-    by shorter spans.
+    """Lengths of spans of about ``pixels`` pixels in all.
+
+    Every span of 3000 to 4095 pixels is followed by a shorter span.
     """
     length = rng.integers(3000, 4096, (pixels // 3800, 2))
     length[:, 1] = np.floor(2000 ** rng.random(len(length)))
@@ -196,7 +197,7 @@ def long_lengths(rng: np.random.Generator, pixels: int) -> np.ndarray:
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels in range, where last bits of differences count, and shorter spans."""
+    """Spans of 3000 to 4095 pixels in range, in which last bits of differences count; and shorter spans."""
     length = long_lengths(rng, count)
     left = sphere(rng, len(length))
     angles = unit.model.MAX_ANGLE * 10.0 ** rng.uniform(-3, 0, len(length))
@@ -204,7 +205,7 @@ def _long_spans(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Many short spans, because a bit that is rounded off decides a result once in thousands."""
+    """Many short spans, because a last bit changes a rounded result only once in thousands."""
     left = sphere(rng, count)
     angles = unit.model.MAX_ANGLE * rng.choice([10.0 ** rng.uniform(-5, 0, count), rng.random(count)])
     return case_of(unit, rng, quantise(left), quantise(turned(rng, left, angles)), rng.integers(1, 8, count))
@@ -225,7 +226,7 @@ def of_setup(record: Record, count: int = 500) -> Stimulus:
     record : Record
         Record of the setup.
     count : int
-        Spans.
+        Number of spans.
     """
     return Stimulus(partial(_of_setup, make=record.stimuli["corners"].make), count, repeats=6)
 

@@ -25,7 +25,10 @@ def _expect(unit, case):
 
 
 def _normals(unit, rng, count):
-    """Unit normals, some equal or opposite to a light's vectors; extreme codes; H = L; no H; an axis."""
+    """Unit normals. Some are equal or opposite to L or H of a light, and some have extreme codes.
+
+    The first light has H = L, the second an H of 0, and the third has L and H along axes.
+    """
     direction, halfway = (unit_codes(rng, unit.lights) for _ in range(2))
     halfway[0] = direction[0]
     halfway[1:2] = 0
@@ -39,7 +42,7 @@ def _normals(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Vectors and normals of extreme codes, so that every difference and product is largest."""
+    """Vectors and normals of extreme codes. Their differences and products are the largest."""
     vectors = (word_ends(rng, unit.lights, 3) for _ in range(2))
     return Case(word_ends(rng, count, 3), light_constants(unit, *vectors))
 
@@ -64,11 +67,11 @@ RECORD = Record(
     stimuli={"normals": Stimulus(_normals, 1000, repeats=2), "corners": Stimulus(_corners, 300, repeats=16)},
     axis="",
     still={
-        "L and H are constant in a run, so no bit of a word made from them falls": (
+        "L and H are constant in a run, so no bit of these factors falls": (
             "multiplier_?_b[0-17] multiplier_?[0-17]"
         ),
-        "the second bit of a square is 0": "multiplier_{3-5}_product[1]",
-        "a sum of three squares, each up to 2^34, is not negative, and less than 2^36": (
+        "a square is 0 or 1 modulo 4": "multiplier_{3-5}_product[1]",
+        "a sum of three squares of at most 2^34 is not negative, and less than 2^36": (
             "multiplier_{3-5}_product[35] highlight_0_square_partial[36] highlight_0_square_total[36-37] "
             "highlight_0_aligned[38-39]"
         ),

@@ -14,7 +14,7 @@ _LINE = LinearInterpolator()
 
 
 def _flags(unit, rng, count):
-    """Spans out of range, spans in range, then both kinds mixed."""
+    """Spans out of range, then spans in range, then both kinds in random order."""
     left, right = code_pairs_at(rng, 8 * count, rng.uniform(0, 180, 8 * count))
     some = rng.random(8 * count) < 0.4
     left[some], right[some] = rng.choice([0, 1, -1, ONE // 2, ONE], (2, np.count_nonzero(some), 3))
@@ -41,9 +41,12 @@ RECORD = Record(
     status=status,
     stimuli=STIMULI | {"flags": Stimulus(_flags, 100, variants=("linear",))},
     waivers={
-        "spare": "A straight line has no second difference: the bit is 0 already.",
-        "payload": "A straight line has no second difference: the bit is 0 already.",
-        "*_second_difference": "A straight line has no second difference: the bit is 0 already.",
-        "values": "The bit serves the saturation below -1. No component of a unit normal reaches it.",
-    },
+        "values": (
+            "The bit decides whether a word saturates at -1. No component of a unit normal is less than -1."
+        ),
+    }
+    | dict.fromkeys(
+        ("spare", "payload", "*_second_difference"),
+        "The second difference of a straight line is 0, so the bit is 0 already.",
+    ),
 )

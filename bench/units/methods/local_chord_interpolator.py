@@ -38,8 +38,10 @@ EXPONENT = 60
 """Exponent of a run that needs only one exponent."""
 
 _STILL = {
-    "twice a number is even": "{diffuse,highlight}_0_second_difference[0]",
-    "spans come while under 28 spans and 12 long spans are counted inside; three more come uncounted": (
+    "a second difference is twice a number, so its last bit is 0": (
+        "{diffuse,highlight}_0_second_difference[0]"
+    ),
+    "spans come while fewer than 28 spans and 12 long spans are counted; 3 more are not counted yet": (
         "spans_inside[5] lengths.inner_level[5] long_inside[4] behind[4]"
     ),
 }
@@ -49,7 +51,7 @@ _METHOD = LocalChordInterpolator()
 
 
 def _measure(rng, count):
-    """N·L and 1 - N·H along spans. Equal unit vectors have the product 1."""
+    """N·L and 1 - N·H along spans. The dot product of two equal unit vectors counts as 1."""
     length = span_lengths(rng, count)
     curves = local_curves(rng, len(length))
     values, codes = three_values(curves, len(length))
@@ -59,7 +61,7 @@ def _measure(rng, count):
     found = np.stack([operands.cosine.values[:, 0], operands.highlight.values[:, 0]]) / ONE_SQUARED.values
     kept = ~operands.out_of_range[span]
     exact, formula = curves(span, t), parabola(values[:, span], t)
-    # Between its three values a parabola may be less than 0, the least value of the word.
+    # Between its three values a parabola may be less than 0. The least value of the word is 0.
     formula[1] = np.maximum(formula[1], 0)
     return Sample(found[:, kept], exact[:, kept], formula[:, kept], pixel[kept])
 
@@ -72,7 +74,7 @@ def gated(lights: int, exponent: int | None = None, *, takes_threshold: bool = F
     lights : int
         Number of lights.
     exponent, takes_threshold
-        As for `ValueGateUnit`.
+        As in `ValueGateUnit`.
     """
     return ValueGateUnit(ValueGate(), lights, exponent=exponent, takes_threshold=takes_threshold)
 
@@ -85,10 +87,10 @@ def _gated_beats(
     exponent: int,
     threshold: int | None = None,
 ) -> np.ndarray:
-    """Output beats of a unit with these operands, and the decisions of its gate, if it has one.
+    """Output beats of a unit with these operands. If the unit has a gate, they have its decisions, too.
 
-    In a span of one or two pixels the gate decides each pixel by its own u. In a longer span it decides all
-    pixels together. It uses the threshold's code, if present, in place of the exponent.
+    In a span of one or two pixels the gate decides each pixel by the pixel's u. In a longer span it decides
+    all pixels together. If ``threshold`` is given, the gate takes this code in place of the exponent.
     """
     if unit.gate is None:
         return operand_beats(unit, operands)
@@ -141,14 +143,14 @@ def _spans(unit, rng, count):
 
 
 def _short_spans(unit, rng, count):
-    """Spans of 1 to 4 pixels, in runs and mixed. In every second span u fits, in others it is arbitrary."""
+    """Spans of 1 to 4 pixels, in runs and mixed. In every second span the values of u are any codes."""
     values = any_values(rng, count, unit.lights)
     values.highlight[::2] = any_codes(rng, FORMATS["highlight"], *values.highlight[::2].shape)
     return _case(unit, rng, mixed_lengths(rng, count), values)
 
 
 def _gate(unit, rng, count):
-    """Spans of 1 to 40 pixels with the least u about the threshold of the gate, for any exponent."""
+    """Spans of 1 to 40 pixels with the least u near the threshold of the gate, for any exponent."""
     exponent = unit.gate.exponent or any_exponent(rng)
     nearest = min(unit.gate.model.thresholds.values[exponent] / 2, 2.0)
     least = nearest + 1e-3 * rng.normal(size=count * unit.lights)
@@ -158,12 +160,12 @@ def _gate(unit, rng, count):
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of differences count, and shorter spans."""
+    """Spans of 3000 to 4095 pixels, in which the last bits of differences count; and shorter spans."""
     return _case(unit, rng, long_lengths(rng, count))
 
 
 def _last_bits(unit, rng, count):
-    """Many short spans, because a bit that is rounded off decides a result once in thousands."""
+    """Many short spans, because a last bit changes a rounded result only once in thousands."""
     return _case(unit, rng, rng.integers(1, 8, count))
 
 
@@ -196,7 +198,8 @@ RECORD = Record(
             _measure,
             f"{LOCAL}, 1 to 4095 pixels",
             beat={"length": 64},
-            note="of N.L and 1 - N.H; exact: normalised interpolation, L and H of the pixel",
+            note="errors of N.L and 1 - N.H; normalised interpolation, with L and H of the pixel, counts as "
+            "exact",
         ),
         "2 lights, interval 1": options(_METHOD, 2, setup_interval=1),
         "3 lights, interval 6": options(_METHOD, 3, setup_interval=6),

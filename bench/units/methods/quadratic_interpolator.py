@@ -37,13 +37,19 @@ RECORD = Record(
     status=status,
     stimuli=STIMULI,
     waivers={
-        "values": "The bit serves the saturation below -1. No component of a unit normal reaches it.",
-        "square": "The bit serves the saturation at 1. The largest word of the table is 2048/2049.",
-        "first_order_0": "While the output is stalled, the register holds no word that is still read.",
-        "middle_2": "The bit counts at 2 and more. A middle normal is at most 1 long, plus a rounding.",
+        "values": (
+            "The bit decides whether a word saturates at -1. No component of a unit normal is less than -1."
+        ),
+        "square": (
+            "The bit decides whether a word saturates at 1. The largest word of the table is 2048/2049."
+        ),
+        "first_order_0": (
+            "The fault changes the register only while the output is stalled. Its word is not read any more."
+        ),
+        "middle_2": "The bit is 1 only in a word of 2 or more. A middle normal has length 1.",
     },
     still={
-        "at most 8 spans are in the middle normal and 2 in GPQ; 3 of them are outside the inner FIFO": (
+        "at most 8 spans are in the middle normal and 2 in GPQ; 3 of these are not in the inner FIFO": (
             "lengths.inner_level[3]"
         ),
     },

@@ -20,7 +20,7 @@ _METHOD = QuotientInterpolator()
 def any_span_vectors(
     rng: np.random.Generator, method: QuotientInterpolator, lights: int, highlights: bool, length: np.ndarray
 ) -> SpanVectors:
-    """Vectors of spans. Some pass by 0, so that they are out of range."""
+    """Vectors of spans of given lengths. A twentieth are too short, so these spans are out of range."""
     vectors = any_vectors(rng, method.spans(lights, highlights), length)
     lost = rng.random(len(length)) < 0.05
     vectors.start[lost] >>= 12
@@ -44,7 +44,10 @@ def _status(unit, case):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, ends to the limits of the method, some too small, lights from all sides."""
+    """Spans of every length, with ends up to the limits of the method, and lights on all sides.
+
+    A twentieth of the vectors are too short.
+    """
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     vectors = any_span_vectors(rng, unit.model, unit.lights, unit.highlights, length)
     directions = np.insert(line_directions(rng, unit.lights), 1, 0, axis=1)

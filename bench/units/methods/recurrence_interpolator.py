@@ -22,7 +22,7 @@ _RECURRENCE = RecurrenceInterpolator()
 
 
 def _words(unit, rng, count):
-    """Vectors L and H of any length, so that results saturate. No later span may change."""
+    """L and H of extreme codes. Results saturate, and must not change a later span."""
     ends = word_ends(rng, 2, count, 3)
     ends[:, ::2] = unit_codes(rng, 2 * len(ends[0, ::2])).reshape(2, -1, 3)
     case = case_of(unit, rng, *ends, rng.integers(1, 20, count))
@@ -33,7 +33,7 @@ def _words(unit, rng, count):
 
 
 def _radian(unit, rng, count):
-    """Spans of a radian. Half its square is 1/2 except for rounding, which makes some words 1."""
+    """Spans of one radian. Half of the square of the angle is 1/2. Rounding makes some words 1."""
     return case_of(unit, rng, *code_pairs_at(rng, count, np.degrees(1)), rng.integers(1, 20, count))
 
 
@@ -57,10 +57,13 @@ RECORD = Record(
     },
     waivers=SETUP.waivers
     | {
-        "phase_entry": "While the output is stalled, only the value in the register has not been read yet.",
-        "recurrence_0.*": "The signal tells the last pixel of a span. Nothing reads this signal.",
+        "phase_entry": (
+            "The fault changes the register only while the output is stalled. Of its word only the value is "
+            "still to be read."
+        ),
+        "recurrence_0.*": "The signal marks the last pixel of a span. Nothing reads this signal.",
     },
     still={
-        "a cosine has ten bits less than x": "top.{spare,payload}[0-9] top.{spare,payload}[368-377]",
+        "a cosine has ten fraction bits less than x": "top.{spare,payload}[0-9] top.{spare,payload}[368-377]",
     },
 )

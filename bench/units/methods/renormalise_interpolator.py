@@ -32,7 +32,10 @@ _LARGEST = 120.0
 
 
 def _measure(rng, count):
-    """N·L and 1 - N·H along spans with ends of ratios to 1:4. Equal unit vectors have the product 1."""
+    """N·L and 1 - N·H along spans whose ends have lengths of 1/4 to 1.
+
+    The dot product of two equal unit vectors counts as 1.
+    """
     length = span_lengths(rng, count)
     spans = len(length)
     around = sphere(rng, 1)
@@ -70,7 +73,7 @@ def _status(unit, case):
 def _case(unit, rng, length):
     length = np.maximum(length % (1 << unit.length_bits), 1)
     left, right = any_lines(rng, len(length))
-    # Nearly opposite ends of equal length: the line passes by 0.
+    # The ends are nearly opposite and have nearly equal lengths. So the line passes near 0.
     left[1::16] = -right[1::16] + rng.integers(-20_000, 20_000, right[1::16].shape)
     limit = _METHOD.END_FORMAT.max_code
     beats = {"normal_left": np.clip(left, -limit, limit), "normal_right": right, "length": length}
@@ -78,17 +81,17 @@ def _case(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Ends in any proportion and at any angle, some nearly opposite. Most spans are short."""
+    """Ends with any ratio of lengths and any angle. Some are nearly opposite. Most spans are short."""
     return _case(unit, rng, short_lengths(rng, count, 1))
 
 
 def _long_spans(unit, rng, count):
-    """Spans of 3000 to 4095 pixels, where the last bits of the step count, and shorter spans."""
+    """Spans of 3000 to 4095 pixels, in which the last bits of the step count; and shorter spans."""
     return _case(unit, rng, long_lengths(rng, count))
 
 
 def _last_bits(unit, rng, count):
-    """Many short spans, because a bit that is rounded off decides a result once in thousands."""
+    """Many short spans, because a last bit changes a rounded result only once in thousands."""
     return _case(unit, rng, rng.integers(1, 8, count))
 
 
@@ -100,9 +103,9 @@ RECORD = Record(
         "renormalise": Variant(
             partial(RenormaliseInterpolatorUnit, _METHOD, 1),
             _measure,
-            f"spans to {_LARGEST:g} degrees, ends of lengths to 1:4, 1 to 4095 pixels",
+            f"spans to {_LARGEST:g} degrees, ends of lengths 1/4 to 1, 1 to 4095 pixels",
             beat={"length": 64},
-            note="of N.L and 1 - N.H; exact: the true line",
+            note="errors of N.L and 1 - N.H; the true line counts as exact",
         ),
         "2 lights, interval 1": options(_METHOD, 2, setup_interval=1, length_bits=9),
         "interval 9, compact": options(_METHOD, setup_interval=9, product_interval=3),
@@ -117,5 +120,5 @@ RECORD = Record(
         "long spans": Stimulus(_long_spans, 240_000, stalled=False),
         "last bits": Stimulus(_last_bits, 4000, stalled=False),
     },
-    still={"a straight line has no second difference": "vector_{0-2}_second_difference[0-41]"},
+    still={"the second difference of a straight line is 0": "vector_{0-2}_second_difference[0-41]"},
 )
