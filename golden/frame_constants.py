@@ -152,7 +152,7 @@ class FrameConstants:
             If the constants have no table.
         """
         if self.lobe is None:
-            raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
+            raise ValueError("a lobe needs a table; constants_of gives a scene's constants their tables")
         return self.lobe
 
     @property

@@ -80,7 +80,7 @@ def albedo_bound(
 class _Light(NamedTuple):
     """Light on a material: its errors, its largest value, and the rounding of its operands.
 
-    ``surface`` is all that the albedo multiplies, ``other`` all else.
+    ``surface`` is for the light that the albedo multiplies, ``other`` for all other light.
     """
 
     surface_error: np.ndarray
@@ -146,7 +146,7 @@ def albedo_errors(scene: Scene, albedo: Albedo, cut: Raster) -> Iterator[_Errors
 def _sample_errors(samples: Samples, off: np.ndarray) -> np.ndarray:
     """Bounds of the errors of samples whose texture coordinates are off by some texels, shape (samples, 3).
 
-    The texels are those of all places that are as far off.
+    A bound covers the texels of all places up to this far off.
     """
     texture, nearest = samples.texture, samples.texture.filter == "nearest"
     error = np.empty((len(off), 3))

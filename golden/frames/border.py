@@ -25,8 +25,8 @@ _CHUNK = 1 << 15
 def highlight_step(scene: Scene, model: ReflectionModel) -> float:
     """Largest step of a light's highlight at N·H = 0 in LSB of linear light; 0 if it is a quarter or less.
 
-    ``ggx`` at a large roughness does not end in 0 there, and a curve of a file may not. Polynomials of a
-    small exponent go on behind, so they have no step.
+    ``ggx`` at a large roughness does not end in 0 there, and a curve from a file may not. Polynomials with a
+    small exponent go on beyond N·H = 0, so they have no step.
     """
     brightest = max((max(light.color) for light in scene.lights), default=0.0)
     steps = [0.0]
@@ -39,7 +39,7 @@ def highlight_step(scene: Scene, model: ReflectionModel) -> float:
 
 
 def border_name(scene: Scene, model: ReflectionModel) -> str:
-    """What is at most `BORDER` at a border, in words, see `border_mask`."""
+    """The quantities that are at most `BORDER` at a border, in words, see `border_mask`."""
     parts = ["|N.L|"]
     if highlight_step(scene, model):
         parts.append("|N.H|")

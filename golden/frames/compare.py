@@ -87,7 +87,8 @@ class Comparison:
     visible_pixels : int
         Pixels that show the surface.
     border : str
-        What is near 0 at a border, such as ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see `border_name`.
+        Quantities that are near 0 at a border, such as ``"|N.L|"`` or ``"|N.L| or |N.H|"``, see
+        `border_name`.
     step_lsb : float
         See `highlight_step`; in LSB of linear light.
     border_pixels : int

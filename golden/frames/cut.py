@@ -204,7 +204,7 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
 def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
     """Halve spans whose ends N/W differ by more than a ratio in length, or by over 90 degrees in direction.
 
-    Spans of two pixels become two spans of one pixel, for all ends.
+    Spans of two pixels become two spans of one pixel, whatever their ends.
 
     Parameters
     ----------

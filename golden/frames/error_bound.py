@@ -37,8 +37,8 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
         arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
 
     The half is the rounding of the pixel. The quarter is the tolerance of cut spans. For codes of sRGB
-    ``chord-local`` divides it by a slope of the transfer, see `HighlightLimits`. It is checked at some
-    places of a span; a proof for all places is missing (docs/theory/chord.md#where-spans-are-cut). The
+    ``chord-local`` divides it by a slope of the transfer, see `HighlightLimits`. The tolerance is checked at
+    some places of a span; a proof for all places is missing (docs/theory/chord.md#where-spans-are-cut). The
     sixteenth holds the rounding of operands and terms. It is at least 1/128, for the ambient operand.
 
     The bound holds for spans from software, and off the border of every light, see `border_mask`.
@@ -112,9 +112,10 @@ def triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> fl
 def encoded_bound(bound: ArrayLike, least: ArrayLike, transfer: str) -> float:
     """Bound in LSB of a transfer's codes, from a bound in LSB of linear light.
 
-    Before the transfer a colour is at most ``e`` off, the bound without the half LSB of its own rounding, but
-    with 1/128 LSB of the rounding of the transfer's input. The slope of the transfer never rises. So the
-    bound is the slope at the least colour that may occur, times e, plus the half LSB of the code.
+    Before the transfer a colour is off by at most e. This is the bound, without the half LSB for the rounding
+    of the pixel, but with 1/128 LSB for the rounding of the transfer's input. The slope of the transfer never
+    rises. So the bound is the slope at the least colour that may occur, times e, plus the half LSB of the
+    code.
 
     Parameters
     ----------
@@ -167,7 +168,7 @@ class _PixelBounds:
         if brightness is None:
             return None
         share = (1 / 16 + _tolerance(self.scene, self.design)) / 255
-        # The tolerance is one of the whole light.
+        # The tolerance holds for the whole light, diffuse and specular together.
         return self._by([LightErrors(np.zeros(3), share * of) for of in brightness])
 
     def _by(self, errors: Sequence[LightErrors]) -> np.ndarray | None:
@@ -177,7 +178,7 @@ class _PixelBounds:
 
 @dataclass(frozen=True)
 class _TriangleBounds:
-    """Bounds the error of a picture by triangles, see `ErrorBounds`; no tolerance tells of its spans."""
+    """Bounds the error of a picture by triangles, see `ErrorBounds`. No tolerance bounds its spans."""
 
     scene: Scene
     renderer: Renderer

@@ -47,7 +47,7 @@ class Pieces:
     def off(
         self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray, turn: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Whether the curve with its words is too far off, and whether the words are; see `missed_pieces`."""
+        """Whether the curve with its words is too far off, and whether the words alone are too far off."""
         turn = turn[:, np.newaxis]
         curves = {name: _Quadratic.of(self.places, name) for name in ("diffuse", "highlight")}
         words = {
@@ -226,11 +226,11 @@ class _Quadratic:
 
     @classmethod
     def of(cls, places: Sequence[SurfacePoints], name: str) -> "_Quadratic":
-        """Through the values at t = 0, 1/2 and 1."""
+        """Quadratics through the values at t = 0, 1/2 and 1."""
         left, middle, right = (getattr(places[k], name) for k in (0, 2, 4))
         curvature = 2 * (left + right - 2 * middle)
         slope = right - left - curvature
-        # The quadratic at its vertex, if that is on the span.
+        # The quadratic at its vertex, if the vertex is on the span.
         t = np.clip(-slope / np.where(curvature, 2 * curvature, 1.0), 0, 1)
         vertex = left + t * (slope + t * curvature)
         three = left, right, vertex

@@ -30,7 +30,7 @@ MOST_TEXELS = 62
 """Texels that a span of several pixels crosses at most, along u and along v. Its range is then at most 5."""
 
 _WHITE = Texture(np.ones((1, 1, 3)), filter="nearest")
-"""Texture of materials that have none."""
+"""Texture of materials without a texture."""
 
 _LEAST_DEPTH = 1536
 """Words of a bank that hold 64x64 texels and their levels."""
@@ -88,7 +88,7 @@ def check_albedo(scene: Scene, design: ShadingPipeline) -> None:
     Raises
     ------
     ValueError
-        If the design lacks what the scene needs.
+        If the design lacks a part that the scene needs.
     """
     albedo = design.albedo
     tinted = any(of.tinted for of in scene.materials) and bool(design.specular and design.lights)

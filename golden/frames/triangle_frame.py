@@ -58,7 +58,7 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     Parameters
     ----------
     scene : Scene
-        What to draw.
+        Scene to be drawn.
     renderer : Renderer
         Geometry and shading.
     angle : float, optional

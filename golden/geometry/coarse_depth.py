@@ -22,7 +22,8 @@ class CoarseDepth:
     """Bounds of the depths in blocks of pixels. A span behind the bounds of all its blocks is hidden.
 
     A block has a bound b, a candidate c and a mask. No depth that `DepthTester` has stored in the block is
-    deeper than b. Depth is linear, so a span's pixels in the block lie between ``lo`` and ``hi``.
+    deeper than b. Depth is linear, so a span's pixels in the block lie between two depths ``lo`` and ``hi``,
+    at their ends.
 
     - If ``lo > b``, they are hidden.
     - If ``hi < b``, they are marked in the mask, and c becomes the larger of c and ``hi``. When all pixels of
@@ -42,8 +43,8 @@ class CoarseDepth:
     Parameters
     ----------
     width, height : int
-        Size of the largest picture, 1 to 4096. A span that goes out of it counts as visible, and changes no
-        bound.
+        Size of the largest picture, 1 to 4096. A span that leaves this picture counts as visible, and changes
+        no bound.
     block : int
         Pixels of a block, one of `BLOCKS`. Pixels of the last block outside the picture count as marked.
     depth_bits : int

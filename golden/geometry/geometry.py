@@ -28,7 +28,7 @@ COUNTERS = ("empty", "zero_area", "culled", "sliver", "cut", "repaired")
 
 @dataclass(frozen=True)
 class Geometry:
-    """The bit-accurate models in a row, from `VertexSort` to `EdgeNormals`, `LineAdapter` or `VectorAdapter`.
+    """A chain of bit-accurate models, from `VertexSort` to `EdgeNormals`, `LineAdapter` or `VectorAdapter`.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ class PlaneAssembler:
         least : int64 array, shape (T,)
             From `AttributeSerialiser`, in 2^-11.
         frame : FrameSettings
-            FrameSettings whose ``limit`` counts.
+            Settings of the frame. Only ``limit`` is used.
         """
         if not self.cuts:
             return Planes(gradients, np.full(len(least), self.LARGEST))

@@ -37,16 +37,16 @@ class LineSpans(PlacedSpans):
 class LineAdapter:
     """Ends of a span's true line for `LineSetup`: N/W at both, shifted together and rounded.
 
-    The six components are shifted left by the same number of places: the sign copies that all of them have,
-    at most `LARGEST_SHIFT`. If ``flip`` is set, they are negated. They are rounded half up to 22 fraction
-    bits, and saturate to ``+-(1 - 2^-22)``. A factor that all six share does not change a direction. So the
-    unit normals along the line are those of N/W:
+    The six components are shifted left by the same number of places: the number of bits that repeat the sign
+    in all of them, at most `LARGEST_SHIFT`. If ``flip`` is set, they are negated. They are rounded half up to
+    22 fraction bits, and saturate to ``+-(1 - 2^-22)``. A factor that all six share does not change a
+    direction. So the unit normals along the line are those of N/W:
 
     ========== ============ =====================================================================
     word       format       why
     ========== ============ =====================================================================
     N/W        SQ(1, 26)    of `SpanAttributes`
-    ends       SQ(1, 22)    of `LineSetup`; the largest component is 1/2 or more where the shift reaches
+    ends       SQ(1, 22)    of `LineSetup`; the largest component is 1/2 or more if the shift is not limited
     ========== ============ =====================================================================
 
     Rounding moves a component of an end by at most `ERROR`, 2^-23. Saturation moves components within 2^-23

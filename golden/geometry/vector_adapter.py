@@ -40,12 +40,12 @@ class VectorSpans(PlacedSpans):
 class VectorAdapter:
     """Words of `SpanVectors` from N/W at both ends of a span and its step: shifts and roundings alone.
 
-    The components of both ends and of the step are shifted left by the same number s of places: the sign
-    copies that all components of the ends have, `SpanHalver.shift`. Then each word x becomes ``x - 2^-14 x``,
-    cut. This leaves a margin of 8 steps of 2^-17 to 1. No pixel may reach 1, and nothing saturates. The step
-    is shifted left by e more places. e is the largest number up to 15 that leaves the step under 1. If
-    ``flip`` is set, the start is negated. If exactly one of ``flip`` and ``turned`` is set, the step is
-    negated. Both are rounded half up to 17 fraction bits.
+    The components of both ends and of the step are shifted left by the same number s of places: the number of
+    bits that repeat the sign in all components of the ends, `SpanHalver.shift`. Then each word x becomes ``x
+    - 2^-14 x``, cut. This leaves a margin of 8 steps of 2^-17 to 1. No pixel may reach 1, and nothing
+    saturates. The step is shifted left by e more places. e is the largest number up to 15 that leaves the
+    step under 1. If ``flip`` is set, the start is negated. If exactly one of ``flip`` and ``turned`` is set,
+    the step is negated. Both are rounded half up to 17 fraction bits.
 
     ========== ============ =====================================================================
     word       format       why
@@ -53,7 +53,7 @@ class VectorAdapter:
     N/W        SQ(1, 26)    of `SpanAttributes`
     its step   SQ(2, 32)    of `SpanAttributes`; under 1 after the shift, see below
     start      SQ(1, 17)    of `QuotientSpans`; the largest component of both ends is ``1/2 - 2^-15`` or
-                            more where the shift reaches
+                            more if the shift is not limited
     step       SQ(1, 17)    in steps of ``2^-e``
     exponent   UQ(4, 0)     e
     ========== ============ =====================================================================

@@ -21,8 +21,8 @@ class Intensity:
 
     The products ``k I`` are inputs, *colour operands* in LSB of the 8-bit channel. Their format is
     ``UQ(11, 6)``, 17 bits for the multipliers. So a term may reach 2047.98 LSB, eight times the full channel.
-    The sum is exact. Only the operands and the result are rounded: by 2^-7 LSB each times a term of at most
-    1, and by 1/2 LSB, or with 6 fraction bits by 2^-7 LSB.
+    The sum is exact. The rounding of an operand adds 2^-7 LSB times a term of at most 1. The rounding of the
+    result adds 1/2 LSB, or 2^-7 LSB with 6 fraction bits.
 
     *Albedo.* With ``has_albedo`` the colour ``a`` of the surface at a pixel multiplies ambient and diffuse
     light, and E is emitted light: ``I = a (k_a I_a + sum_i I_i k_d D_i) + E + sum_i I_i k_s S_i``. On a
@@ -43,7 +43,7 @@ class Intensity:
     tints : bool
         Whether a constant tells if a material is tinted.
     fraction_bits : int
-        Fraction bits of the result: 0 for the codes of a picture in linear light, 6 for a `Transfer` behind.
+        Fraction bits of the result: 0 for the codes of a picture in linear light, 6 if a `Transfer` follows.
 
     Raises
     ------
@@ -67,7 +67,7 @@ class Intensity:
     SURFACE_FORMAT = UQ(12, 6)
 
     PADDING = 2
-    """Cycles from the last product of the light on the surface to the albedo's, beyond the next."""
+    """Extra cycles between the last product of the light on the surface and the product with the albedo."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.lights <= MAX_LIGHTS:
@@ -134,7 +134,8 @@ class Intensity:
         Raises
         ------
         ValueError
-            If an operand has another format. If an operand of the albedo is missing or not taken.
+            If an operand has another format. If an operand for the albedo is missing, or the unit has no
+            albedo.
         """
         for color in (ambient, diffuse_color, specular_color, emission):
             if color is not None and color.format != self.COLOR_FORMAT:
@@ -172,8 +173,8 @@ class Intensity:
     def cycles(self, diffuse: Fixed, specular: Fixed, tinted: bool = False) -> np.ndarray:
         """Cycles that each pixel takes in the compact unit.
 
-        These are ``channels max(1, T)``, T terms not 0, and with an albedo ``channels (1 + T)``. A single
-        channel with an albedo takes two more if a term is multiplied by the albedo.
+        These are ``channels max(1, T)`` for T terms that are not 0, with an albedo ``channels (1 + T)``. A
+        single channel with an albedo takes two more if a term is multiplied by the albedo.
 
         Parameters
         ----------

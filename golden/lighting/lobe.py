@@ -154,7 +154,9 @@ class Lobe(HighlightOperand):
         if not 0 <= self.cutoff < 1:
             raise ValueError(f"cutoff must be at least 0 and under 1, not {self.cutoff}")
         if self.scale < 0 or (self.scale and self.operand == "cosine"):
-            raise ValueError(f"scale must be 0, or more of the operand one_minus_cosine, not {self.scale}")
+            raise ValueError(
+                f"scale must be 0, or over 0 with the operand one_minus_cosine, not {self.scale}"
+            )
         if self.fixed is not None:
             object.__setattr__(self, "fixed", tuple(self.fixed))
             if len(self.fixed) != self.banks:
@@ -240,8 +242,9 @@ class Lobe(HighlightOperand):
         """Table of the model for one parameter.
 
         Two lines meet at an entry. An entry is the value of the curve, moved against the error of these
-        lines. This error is measured in the middle of each line. It is moved by half of the larger error, but
-        at most twice the smaller error. If one line is too high and the other too low, the entry stays.
+        lines. This error is measured in the middle of each line. The entry is moved by half of the larger
+        error, but by at most twice the smaller error. If one line is too high and the other too low, the
+        entry stays.
 
         Parameters
         ----------
@@ -389,7 +392,7 @@ class Lobe(HighlightOperand):
             If ``table`` is refused.
         """
         if not isinstance(table, LobeTable):
-            raise ValueError("a lobe needs a table; constants_of gives the constants of a scene theirs")
+            raise ValueError("a lobe needs a table; constants_of gives a scene's constants their tables")
         given, own = ((lobe.octaves, lobe.steps) for lobe in (table.lobe, self))
         if given != own or table.lobe.entries != self.entries:
             raise ValueError("the table has {} octaves of {} steps, the unit {} of {}".format(*given, *own))
@@ -453,8 +456,8 @@ class LobeTable:
         Returns
         -------
         dict
-            ``value``, 17 bits, and ``begins``, one: int64 arrays, shape (entries + 2,). In a word of 18 bits
-            ``begins`` is the highest.
+            ``value``, 17 bits, and ``begins``, 1 bit: int64 arrays, shape (entries + 2,). In a word of 18
+            bits ``begins`` is the highest.
 
         Raises
         ------

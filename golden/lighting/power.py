@@ -64,7 +64,7 @@ class Power(HighlightOperand):
     def last_lit_arguments(self) -> np.ndarray:
         """Argument with ``c^n = 2^-17``, because the result is never too large.
 
-        One more step is for float64.
+        A further step allows for the rounding of float64.
         """
         exponent = np.arange(1 << self.EXPONENT_BITS)
         argument = -np.expm1(-17 * np.log(2) / np.maximum(exponent, 1)) / self.ARGUMENT_FORMAT.step

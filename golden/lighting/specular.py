@@ -96,7 +96,7 @@ class Specular(HighlightOperand):
     1 - cos gamma UQ(1, 25)  at n = 1000 the shift takes up 9 of the fraction bits; saturates
     k             UQ(9, 18)  at most 511.5; ``n/2`` and ``7n/16`` are exact
     K             UQ(0, 17)  multiplier operand; cut
-    shifted       UQ(1, 16)  multiplier operand; cut, saturates (anything from 1/K on is dark)
+    shifted       UQ(1, 16)  multiplier operand; cut, saturates (from 1/K on the term is 0)
     base          UQ(0, 17)  ``1 - 2^-17 - p`` is the product p, cut, with its bits inverted
     squares       UQ(0, 17)  cut
     16 p          UQ(5, 17)  of ``exp``

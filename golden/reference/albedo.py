@@ -21,7 +21,7 @@ class Samples(NamedTuple):
     texture : Texture
         The texture.
     which : int64 array, shape (samples,)
-        Places of the fragments among those that are asked for.
+        Index of each sample's fragment among the chosen fragments.
     coordinates : float64 array, shape (samples, 2)
         u and v.
     level : int64 array, shape (samples,)
@@ -46,7 +46,7 @@ class Samples(NamedTuple):
 
 
 def fragment_colors(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:
-    """Perspective-correct vertex colours of fragments; 1 in a scene without.
+    """Perspective-correct vertex colours of fragments; 1 in a scene without vertex colours.
 
     Parameters
     ----------

@@ -68,12 +68,12 @@ class Camera:
             )
 
     def scaled(self, shift: int) -> "Camera":
-        """The camera in a mesh whose unit has been multiplied by ``2**shift``.
+        """The camera for a mesh whose coordinates have been multiplied by ``2**shift``.
 
         Raises
         ------
         OverflowError
-            If it is too far away.
+            If the camera is too far away.
         """
         position, target = (
             (math.ldexp(x, shift), math.ldexp(y, shift), math.ldexp(z, shift))

@@ -16,9 +16,9 @@ def span_levels(
     """Level of each span, by its largest texel step.
 
     With the weights q of the corners, texture coordinates are ``u = q·u_corners / w`` with ``w = sum q``.
-    Their exact derivative along x is ``(q_x·u_corners - u w_x) / w``, and so along y. The largest magnitude
-    of the four derivatives of u and v at both ends, times the texture's columns or rows, is the step that
-    `Texture.level_of` takes.
+    Their exact derivative along x is ``(q_x·u_corners - u w_x) / w``, and in the same way along y. The
+    largest magnitude of the four derivatives of u and v at both ends, times the texture's columns or rows, is
+    the step that `Texture.level_of` takes.
 
     Parameters
     ----------

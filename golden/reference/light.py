@@ -54,7 +54,7 @@ def color_triple(
     Raises
     ------
     ValueError
-        If it is no colour, or a channel is out of range.
+        If the value is not a colour, or a channel is out of range.
     """
     if isinstance(value, int | float | np.number) and not isinstance(value, bool):
         value = [value] * 3
@@ -220,7 +220,7 @@ class Light:
         return replace(self, direction=tuple(turn(self.direction).tolist()))
 
     def scaled(self, shift: int) -> "Light":
-        """The light in a mesh whose unit has been multiplied by ``2**shift``.
+        """The light for a mesh whose coordinates have been multiplied by ``2**shift``.
 
         A position is also multiplied by this power of two. ``k_1 d`` and ``k_2 d^2`` stay.
 

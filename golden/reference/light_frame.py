@@ -55,7 +55,8 @@ def light_frame(direction: np.ndarray, viewer: np.ndarray) -> LightFrame:
     direction, viewer = (np.asarray(vector, dtype=np.float64) for vector in (direction, viewer))
     total, difference = direction + viewer, direction - viewer
     cosine, sine = (float(np.linalg.norm(vector)) / 2 for vector in (total, difference))
-    # The longer of the two is exact up to rounding. The shorter is made perpendicular to the longer.
+    # The longer of sum and difference is exact up to rounding. The shorter is made perpendicular to the
+    # longer.
     if cosine >= sine:
         z = normalise(total)
         x = _across(difference, z)

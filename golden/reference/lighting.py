@@ -377,7 +377,7 @@ def intensity_of_cosines(
     Parameters
     ----------
     material, lights, ambient_light, model
-        As for `intensity`. Of lights only the colours are read, and the directions for Fresnel's reflection.
+        As for `intensity`. Only colours of lights are read, and their directions for Fresnel's reflection.
     cosine, highlight_cosine : arrays, shape (..., lights)
         N·L, for a light that fades times its factor; and N·H.
     viewer : array, shape (3,), optional

@@ -279,7 +279,7 @@ def rasterise(scene: Scene) -> Raster:
     Parameters
     ----------
     scene : Scene
-        What to draw.
+        Scene to be drawn.
 
     Returns
     -------

@@ -300,7 +300,7 @@ def coscos_scale(exponent: float, power: int, rule: str = "taylor") -> float:
         lobe = np.cos(scale * angle) ** power * np.sin(angle)
         return float(half * (weights @ lobe)) - 1 / (exponent + 1)
 
-    # Its import takes half a second, and only one model needs a root.
+    # The import takes half a second, and only one model needs a root.
     from scipy.optimize import brentq
 
     # At a = 1/2 the lobe covers the sphere; far out it falls like 0.6/a^2 at most.

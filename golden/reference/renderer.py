@@ -181,7 +181,7 @@ def render(
     Parameters
     ----------
     scene : Scene
-        What to draw.
+        Scene to be drawn.
     shading : str
         One of `SHADINGS`.
     model : ReflectionModel
@@ -240,7 +240,7 @@ def visible_mask(scene: Scene, raster: Raster) -> np.ndarray:
 
 
 class _NodeColors:
-    """Colors at a few points of every triangle that shows, and their interpolation."""
+    """Colours at a few points of every triangle that shows, and their interpolation."""
 
     def __init__(self, scene: Scene, raster: Raster, shading: str, model: ReflectionModel):
         self.raster, self.shading = raster, shading
@@ -264,14 +264,14 @@ class _NodeColors:
         back[self.place] = raster.back
         back &= scene.flips[shown]
         normals = np.where(back[:, np.newaxis, np.newaxis], -normals, normals)
-        # The intensity is a line of the albedo: it is known by its values at black and at white.
+        # The intensity is linear in the albedo. So its values at black and at white give all values.
         self.white = _shade(scene, normals, model, shown, slice(None), points=points)
         if scene.has_albedo:
             black = np.zeros_like(normals)
             self.black = _shade(scene, normals, model, shown, slice(None), points=points, albedo=black)
 
     def interpolate(self, which: np.ndarray, albedo: np.ndarray | None) -> np.ndarray:
-        """Colors of fragments with their albedo, each of shape (count, 3)."""
+        """Colours of fragments with their albedo, each of shape (count, 3)."""
         place = self.place[self.raster.span[which]]
         colors = self.white[place]
         if albedo is not None:

@@ -45,7 +45,7 @@ class Scene:
         I_a, at least 0: of each channel, one number for all channels, or ``"#rrggbb"`` in sRGB.
         Stored as three floats of linear light.
     background : three floats, float or str
-        Color of the pixels that show no surface, in [0, 1], in the same forms.
+        Colour of the pixels that show no surface, in [0, 1], in the same forms.
     back_faces : {"flip", "show", "cull"}
         Treatment of a triangle seen from behind (its corners are clockwise).
 

@@ -42,7 +42,7 @@ class BandBuffer:
     Raises
     ------
     ValueError
-        If ``lines`` is another number, or the bits or the background are out of range.
+        If ``lines`` is not such a number, or the bits or the background are out of range.
 
     Source: docs/theory/video.md#bands.
     """

@@ -91,7 +91,7 @@ def clock_plan(reference: int, pixel_rate: float, draw_rate: float) -> ClockPlan
     for input_divider in range(1, min(DIVIDERS, reference // PHASE_DETECTOR) + 1):
         step = Fraction(reference, input_divider)
         for serial in range(1, DIVIDERS // SERIAL + 1):
-            # The oscillator is a whole number of steps, each within 0.5 % of what the pixel clock wants.
+            # The rate of the oscillator is the whole number of steps that is nearest to the rate asked for.
             steps = round(asked * SERIAL * serial / step)
             vco = steps * step
             if not VCO[0] <= vco <= VCO[1]:

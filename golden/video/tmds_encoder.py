@@ -10,7 +10,10 @@ BITS = 10
 """Bits of a word; bit 0 is sent first."""
 
 CONTROL_WORDS = (0b1101010100, 0b0010101011, 0b0101010100, 0b1010101011)
-"""Words outside the picture, by ``c0 + 2 c1``. Unlike words of colour they have seven transitions or more."""
+"""Words outside the picture, by ``c0 + 2 c1`` of the control bits c0 and c1.
+
+Unlike words of colour they have seven transitions or more.
+"""
 
 CLOCK_WORD = 0b1111100000
 """Word that the clock's lane repeats. A word begins with its falling edge."""
@@ -92,8 +95,8 @@ class TmdsEncoder:
         states = np.arange(-MAX_DISPARITY, MAX_DISPARITY + 2, 2)
         middle = len(states) // 2
         word, after = self.step(self.chain(np.arange(256))[:, np.newaxis], states)
-        # Each beat maps the disparity before it to that after it; prefixes of them by doubling. A disparity
-        # of more than the bound is not reached, so its place may be anything.
+        # Each beat maps the disparity before it to the disparity after it. Doubling composes the maps of all
+        # beats up to each beat. A disparity over the bound does not occur, so its entry has no effect.
         table = np.clip(after // 2 + middle, 0, len(states) - 1).astype(np.int8)
         reach = np.where(active[:, np.newaxis], table[data], np.int8(middle))
         shift = 1

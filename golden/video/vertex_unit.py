@@ -115,7 +115,7 @@ class VertexTransform:
     Raises
     ------
     ValueError
-        If ``scale_bits`` is another number.
+        If ``scale_bits`` is not 4 to 11.
 
     Source: docs/theory/video.md#vertices; not in the documents.
     """

@@ -93,7 +93,7 @@ def test_frames(model, roughness):
             lambda: preset("chord-local", "cosquad", scale=3),
             r"^a scale of 1 - N·H needs a lobe with a table$",
         ),
-        (lambda: Lobe(scale=2), r"^scale must be 0, or more of the operand one_minus_cosine, not 2$"),
+        (lambda: Lobe(scale=2), r"^scale must be 0, or over 0 with the operand one_minus_cosine, not 2$"),
         (
             lambda: replace(GGX, scale=6).check(GGX.table(0.05)),
             r"^the table is of 2\^0 u, the unit of 2\^6 u$",
