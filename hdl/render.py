@@ -87,10 +87,10 @@ class RendererUnit(wiring.Component):
     `Build` has the styles, the lanes of triangle setup and the coarse test.
 
     Frame constants are written while no span is inside. Spans of another material than the span before wait
-    until the pipeline is empty, see `ShadingPipelineUnit`. Behind the FIFO `LightAdapterUnit` and, with
-    highlights of R·V, `MirrorAdapterUnit` make the components of vectors that geometry does not have.
-    `LightAdapterUnit` has its own memories for the axes of further lights. `MirrorAdapterUnit` reads L of the
-    first light. Write both before the frame's first triangle.
+    until the pipeline is empty, see `ShadingPipelineUnit`. Behind the FIFO up to two units make the
+    components of vectors that geometry does not have: `LightAdapterUnit`, and with highlights of R·V
+    `MirrorAdapterUnit`. `LightAdapterUnit` has its own memories for the axes of further lights.
+    `MirrorAdapterUnit` reads L of the first light. Write both before the frame's first triangle.
 
     Parameters
     ----------

@@ -50,8 +50,8 @@ class AttributesUnit(PipelinedUnit):
     texture coordinates, 6 for both. With an initiation interval of 1 each product has a multiplier. With a
     longer interval the products share ``ceil(products / initiation_interval)`` multipliers. Without
     perspective there are neither products nor a table. The latency follows from the graph. At intervals of 1
-    to 6 it is 12, 16, 17, 17, 17, 20 cycles with both kinds of attributes, and 11, 15, 15, 17, 17, 17 with
-    colours alone. Without perspective it is 2 at an interval of 1.
+    to 6 it is 12, 16, 17, 17, 17, 20 cycles with both kinds of attributes. With colours alone it is 11, 15,
+    15, 17, 17, 17 cycles. Without perspective it is 2 at an interval of 1.
 
     Parameters
     ----------

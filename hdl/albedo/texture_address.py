@@ -53,8 +53,8 @@ class TextureAddressUnit(PipelinedUnit):
     """Finds the four texels around a place, with wrapping, and their weights.
 
     `TextureAddress`, the bit-accurate model, has the rules. The latency is 7 cycles, and the initiation
-    interval is 1. There is no multiplier. The adders are those of a coordinate's half texel, of the next
-    column and row, of the levels' sizes, and of the weights.
+    interval is 1. There is no multiplier. Adders find the half texel, the next column and row, the sizes of
+    levels, and the weights.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ class TextureAddressUnit(PipelinedUnit):
 
         def flags(index, mask):
             wrap, negative = self.constants.wrap[axis], index[-1]
-            # The bit above those of the mask tells whether a tile is mirrored.
+            # The bit of the index above the mask tells whether a tile is mirrored.
             above = Cat(Const(1, 1), mask) & ~Cat(mask, Const(0, 1))
             inverted = (wrap == _MIRROR) & (index[: _INDEX_BITS + 1] & above).any()
             beyond = index[_INDEX_BITS:-1].any() | (index[:_INDEX_BITS] & ~mask).any()

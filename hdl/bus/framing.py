@@ -136,7 +136,7 @@ class FramingUnit(wiring.Component):
         return m
 
     def _give(self, m: Module, empty: Value) -> Value:
-        """The beat that is held back, the beat at the output, and whether the frame has left."""
+        """Hold a beat back, and give the beat before it. Returns whether the frame has left."""
         made, shape = self.core.o, self.core.o.payload.shape()
         held, waiting = Signal(shape, name="held_back", reset_less=True), Signal(name="waiting")
         word, valid = Signal(self.o.payload.shape(), name="word", reset_less=True), Signal(name="valid")

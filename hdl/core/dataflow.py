@@ -158,7 +158,7 @@ class Dataflow:
         Parameters
         ----------
         name : str
-            Of the word.
+            Name of the word.
         function : callable
             Takes the values of ``words``, and returns the value of the register.
         *words : Word
@@ -202,7 +202,7 @@ class Dataflow:
         functional_unit : FunctionalUnit
             From `share`.
         name : str
-            Of the word.
+            Name of the word.
         words : sequence of Word
             Words of the operands.
         operands : callable
@@ -245,7 +245,7 @@ class Dataflow:
         Parameters
         ----------
         name : str
-            Of the word.
+            Name of the word.
         a, b : Word
             Operands.
         left, right : callable
@@ -300,7 +300,7 @@ class Dataflow:
         Parameters
         ----------
         name : str
-            Of the table.
+            Name of the table.
         words : sequence of int
             Words of the table. Their number is a power of two.
         width : int

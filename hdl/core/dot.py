@@ -36,7 +36,7 @@ def dot(
     graph : Dataflow
         Graph that gets the words.
     name : str
-        Of the result.
+        Name of the result.
     a : Word
         A vector.
     b : Word or callable

@@ -175,39 +175,39 @@ class FixedValue(ValueCastable):
         return self._aligned(other, self.format - other.format)
 
     def __lt__(self, other: "FixedValue") -> Value:
-        """Comparison of the values."""
+        """Whether the value is less than ``other``."""
         a, b = self._compared(other)
         return a < b
 
     def __le__(self, other: "FixedValue") -> Value:
-        """Comparison of the values."""
+        """Whether the value is at most ``other``."""
         a, b = self._compared(other)
         return a <= b
 
     def __gt__(self, other: "FixedValue") -> Value:
-        """Comparison of the values."""
+        """Whether the value is greater than ``other``."""
         a, b = self._compared(other)
         return a > b
 
     def __ge__(self, other: "FixedValue") -> Value:
-        """Comparison of the values."""
+        """Whether the value is at least ``other``."""
         a, b = self._compared(other)
         return a >= b
 
     def __eq__(self, other: "FixedValue") -> Value:
-        """Comparison of the values."""
+        """Whether the value is equal to ``other``."""
         a, b = self._compared(other)
         return a == b
 
     def __ne__(self, other: "FixedValue") -> Value:
-        """Comparison of the values."""
+        """Whether the value is different from ``other``."""
         a, b = self._compared(other)
         return a != b
 
     __hash__ = None
 
     def scale(self, exponent: int) -> "FixedValue":
-        """Times ``2**exponent``, exactly: the binary point moves, the code stays."""
+        """The value times ``2**exponent``, exactly. The binary point moves, and the code stays."""
         return FixedValue(self.format.scaled(exponent), self._code)
 
     def truncate(self, fraction_bits: int) -> "FixedValue":

@@ -149,7 +149,7 @@ def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Sig
     m : Module
         Module that gets the register. The memory is its submodule.
     name : str
-        Of the memory and of the register.
+        Name of the memory and of the register.
     value : Value
         The word, of any shape.
     cycles : int

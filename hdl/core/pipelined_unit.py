@@ -63,7 +63,7 @@ class PipelinedUnit(wiring.Component):
     advance : Signal
         The common enable, from `elaborate` on, for logic of the unit outside its data path.
     latency, initiation_interval, skid, stands
-        As given.
+        The arguments of the constructor.
     """
 
     def __init__(

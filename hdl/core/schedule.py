@@ -33,7 +33,7 @@ class Operation:
     Parameters
     ----------
     name : str
-        Of the result.
+        Name of the result.
     operands : tuple of Operation
         Operations whose results it reads, all on the same cycle.
     latency : int
@@ -120,7 +120,7 @@ def place(operations: Sequence[Operation], interval: int, spaced: bool = False) 
     Returns
     -------
     schedule : Schedule
-        Of all operations.
+        Schedule of all operations.
     """
     resources = list(dict.fromkeys(o.resource for o in operations if o.resource is not None))
     found = _greedy(operations, interval, spaced)

@@ -18,7 +18,7 @@ def connect_register(m: Module, name: str, source: stream.Interface, sink: strea
     m, source, sink
         As for `connect`.
     name : str
-        Of the registers.
+        Common part of the registers' names.
 
     Raises
     ------

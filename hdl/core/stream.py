@@ -112,8 +112,8 @@ def skid_buffer(
     ready of the unit before. A beat that is not accepted on its first cycle moves into the spare register.
     The beat behind it moves into the output registers and waits there.
 
-    This costs a register and a multiplexer for each bit of the payload, and no cycle: a beat is on the output
-    on the cycle on which ``valid`` rises. The payload is held while it waits. Reset empties the spare
+    This costs a register and a multiplexer for each bit of the payload. It costs no cycle: a beat is on the
+    output on the cycle on which ``valid`` rises. The payload is held while it waits. Reset empties the spare
     register.
 
     A payload that *stands* stays the same at the next ``advance``, and no payload follows it there. Then the
@@ -232,7 +232,7 @@ def moving(
     m : Module
         Module that gets the counter, of at most 1023.
     name : str
-        Of the counter.
+        First part of the counter's name.
     source, sink : stream.Interface
         Streams at which payloads go in and come out.
     last : ValueLike

@@ -30,8 +30,8 @@ class AngularSetupUnit(PipelinedUnit):
 
     `AngularSetup`, the bit-accurate model, has equations, tables, formats and the error bound.
 
-    A beat needs 26 multiplications: three for each of five dot products, six for the half chord, two for
-    further interpolations, and one each for x, y and the step. With the initiation interval I they share
+    A beat needs 26 multiplications. Five dot products take three each, and the half chord takes six. Two are
+    for further interpolations, and one each for x, y and the step. With the initiation interval I they share
     ``ceil(26/I)`` multipliers (`dataflow`). With ``angle="arccos"`` the pipelined arccos unit takes the place
     of the half chord. It has two multipliers of its own. One multiplication from radians to turns takes the
     place of six. There are then ``2 + ceil(21/I)`` multipliers. Results are the same for every I.
@@ -45,9 +45,9 @@ class AngularSetupUnit(PipelinedUnit):
     multipliers         23 13 9  8  7  6
     =================== == == == == == ==
 
-    There are four tables: two of 512 words of 36 bits (by arccos one), one of 512 words of 34 bits, one of
-    2048 words of 17 bits. CORDIC is unrolled to 22 steps of three adders. The sum that divides by its gain is
-    unrolled, too.
+    There are four tables. Two have 512 words of 36 bits (by arccos one table). One has 512 words of 34 bits,
+    and one has 2048 words of 17 bits. CORDIC is unrolled to 22 steps of three adders. The sum that divides by
+    its gain is unrolled, too.
 
     Parameters
     ----------

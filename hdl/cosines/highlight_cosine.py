@@ -38,7 +38,7 @@ class HighlightCosineUnit(wiring.Component):
     table and its register, rise, sum, operand, product, alignment, rounding, sum, saturation. The values of
     the other pixels come in the following cycles, unless the output is stalled. The next span is accepted
     early enough to leave no gap. A span of length 0 takes one cycle and has no value. The unit has a
-    multiplier of 17 x 17 bits and, with interpolation, a multiplier of 14 x 14.
+    multiplier of 17 x 17 bits. With interpolation it also has a multiplier of 14 x 14 bits.
 
     Parameters
     ----------

@@ -50,10 +50,11 @@ class QuotientSpansUnit(wiring.Component):
     registers behind the shifts, and starts wait in a memory of `DEPTH` words. So the differences of a span
     pass the starts of the spans before it.
 
-    *Serial setup.* One multiplier makes all products of a span one after the other, in three turns: for
-    second differences, for first differences, for the start. Each turn waits until the words of its kind from
-    the span before were taken. A turn has P products: two for each line and one for each square. A span takes
-    3 P cycles, or ``P + 6`` if it has one pixel. All sums share one shifter, and a start waits in registers.
+    *Serial setup.* One multiplier makes all products of a span one after the other. There are three turns:
+    for second differences, for first differences, for the start. Each turn waits until the words of its kind
+    from the span before were taken. A turn has P products: two for each line and one for each square. A span
+    takes 3 P cycles, or ``P + 6`` if it has one pixel. All sums share one shifter, and a start waits in
+    registers.
 
     *Accumulators.* Second differences are taken while the last three pixels of a span leave. First
     differences are taken with the last two pixels, the start with the last pixel. So spans follow each other

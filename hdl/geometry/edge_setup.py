@@ -74,8 +74,8 @@ class EdgeSetupUnit(PipelinedUnit):
         Quotient bits that a divider finds in a cycle: 1 or 2.
     initiation_interval : int or None
         Least number of cycles from a triangle to the next. ``None`` stands for the least possible interval,
-        `least_interval`. With 1/256 pixel this is 16 for three dividers of two bits, 37 for one divider of
-        two bits, and 67 for one divider of one bit.
+        `least_interval`. With 1/256 pixel this is 16 for three dividers of two bits. It is 37 for one divider
+        of two bits, and 67 for one divider of one bit.
     skid : bool
         As in `PipelinedUnit`.
 

@@ -160,14 +160,14 @@ class GeometryUnit(wiring.Component):
     """Triangles to spans, at most a triangle in 8 or 16 cycles and a span a cycle. `Geometry` is the model.
 
     The unit has the units of this package in a row. The corners of a sorted triangle go to the edge setup.
-    They also go, one attribute after the other, to a FIFO, where the attributes wait for the scales of their
+    They also go to a FIFO, one attribute after the other. There the attributes wait for the scales of their
     triangle. The edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits
-    before each lane, so neither lane keeps the other from its turn.
+    before each lane, so no lane keeps the other lane from its turn.
 
     In the *compact* style one divider serves all edges. One multiplier serves the gradients of all
-    attributes. Attributes take turns along the spans, too, and so do the normals of a span. With vectors one
-    unit cuts a span and makes the words of its pieces. In this style only the attributes have a FIFO in the
-    setup. Other words wait in registers.
+    attributes. Attributes also take turns along the spans, and the normals of a span take turns. With vectors
+    one unit cuts a span and makes the words of its pieces. In this style only the attributes have a FIFO in
+    the setup. Other words wait in registers.
 
     The units work on several triangles at the same time, and the slowest unit sets the pace. A triangle
     takes:

@@ -30,7 +30,7 @@ def attribute_shape() -> data.StructLayout:
 
 
 def gradient_shape() -> data.StructLayout:
-    """Shape of `Gradients.beats`, of one attribute, with the triangle's bound."""
+    """Shape of `Gradients.beats` for one attribute, with the triangle's bound."""
     p = GradientSetup
     steps = {name: FixedShape(p.FORMAT) for name in ("short", "long", "inward")}
     rest = {"size": unsigned(p.SIZE_BITS), "least": unsigned(LEAST_BITS)}

@@ -37,7 +37,8 @@ class MirrorAdapterUnit(wiring.Component):
     i : :py:`In(stream.Signature(shape))`
         Spans of `VectorAdapterUnit` or `LightAdapterUnit`.
     o : :py:`Out(stream.Signature(with_components(shape, components + 1)))`
-        The same spans, with the components x, y cos a, z, the components of further lights, y sin a.
+        The same spans. The components of a vector are x, y cos a, z, the components of further lights, and y
+        sin a.
     constants : :py:`In(mirror_constants_shape())`
         sin a and cos a, constant while spans are inside.
 

@@ -49,8 +49,8 @@ class SpanHalverUnit(wiring.Component):
     i : :py:`In(stream.Signature(whole_spans_shape()))`
         Spans of `SpanAttributesUnit` with ``whole``.
     o : :py:`Out(stream.Signature(halved_spans_shape()))`
-        Pieces of the spans, with N/W at the first pixel, the attributes' step away from the long edge, and
-        the places of the shift of both.
+        Pieces of the spans: N/W at the first pixel, the attributes' step away from the long edge, and the
+        number of places by which both are shifted.
     status : :py:`Out(counters_shape("cut"))`
         Number of spans that were cut, since the reset.
 

@@ -126,8 +126,8 @@ class _Issue(NamedTuple):
     Parameters
     ----------
     busy, first, ends_channel, colored : Signal
-        Whether there is a product; whether it is the first product of its channel in the pass, and the last;
-        whether the pass is the second, that of the albedo.
+        ``busy``: there is a product. ``first`` and ``ends_channel``: it is the first product, or the last, of
+        its channel in the pass. ``colored``: the pass is the second, that of the albedo.
     channel : Signal
         Channel of the product.
     operands : pair of Value
@@ -233,7 +233,8 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
     def _park(self, m: Module, advance, added: data.View, total: FixedValue, channel, surface: Signal):
         """Keep the light on the surface of each channel until the albedo multiplies it.
 
-        If the light of a channel is needed on the cycle on which it is parked, it is passed on directly.
+        If the light of a channel is needed on the cycle on which it is parked, the light is passed on
+        directly.
         """
         now = _limited(total.round_half_up(_SURFACE.fraction_bits), self.model).as_value()
         of_light, parked = Signal(name="of_light"), []

@@ -130,7 +130,7 @@ class LightUnit(wiring.Component):
         Exponent that is fixed at build time; see `SpecularUnit`.
     shares_slope : bool
         Whether slope and boundary come from a `SlopeUnit` outside. For a lobe, whether tables come from a
-        `LobeMemory` outside. `Power` needs neither.
+        `LobeMemory` outside. A `Power` needs no unit outside.
     gated : bool
         Whether there is a highlight gate.
     factor : FactorUnit or None

@@ -46,11 +46,11 @@ class LobeMemory(wiring.Component):
     """Tables of `Lobe` in one memory, with a read port for each served unit.
 
     With E octaves of M steps there are ``banks (E + 1) M`` words of 35 bits, up to 512 in a block RAM of 512
-    by 36. If two units, of two lights, read the same written tables, Yosys makes a copy for each port. Tables
+    by 36. If the units of two lights read the same written tables, Yosys makes a copy for each port. Tables
     that are fixed at build time need no copy: up to 1024 words take two block RAMs of 1024 by 18 for both
     ports.
 
-    A write is taken on every cycle. The first write of a table, with ``begins``, tells its bank. The values
+    A write is taken on every cycle. The first write of a table has ``begins``, and tells the bank. The values
     follow in order. Each value but the first makes the word of the value before it. This word is in the
     memory two cycles after the write was taken. Values beyond the end of a table are lost, and so are all
     values of a missing bank. An incomplete table keeps the other words of the table before. Reset ends a

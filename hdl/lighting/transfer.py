@@ -20,8 +20,8 @@ class TransferUnit(PipelinedUnit):
 
     With an initiation interval of 1 the latency is 4 cycles: address, two for the word, sum. The table has a
     read port for each channel. On an ECP5 three ports take two block RAMs of 1024 by 18 bits, and a single
-    port takes one. With an interval of 3 a single port serves the channels one after the other, and the
-    latency is 8 cycles. There is no multiplier.
+    port takes one block RAM. With an interval of 3 a single port serves the channels one after the other, and
+    the latency is 8 cycles. There is no multiplier.
 
     Parameters
     ----------

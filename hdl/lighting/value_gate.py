@@ -38,7 +38,7 @@ class ValueGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light. Bit 0 is the first light.
     constants : :py:`In(10)` or :py:`In(18)`
-        The exponent or the threshold, as a port, constant from 2 cycles before a beat on.
+        The exponent or the threshold, if it is a port. It is constant from 2 cycles before a beat on.
 
     Source: docs/theory/units.md#highlight-gate.
     """

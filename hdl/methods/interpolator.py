@@ -67,7 +67,7 @@ def flag_spans(m: Module, accepted: Value, pixel: data.View) -> Signal:
 
 
 class InterpolatorUnit(wiring.Component):
-    """A method of the pipeline, from spans to the operands of their pixels, first pixel first.
+    """A method of the pipeline. It turns spans into the operands of their pixels, first pixel first.
 
     Each method has a subclass, which names the class of its bit-accurate model::
 

@@ -37,10 +37,10 @@ class AdaptiveNormaliserUnit(wiring.Component):
     3. The last part gives a normal in every cycle, from a span's first to its last, unless the output waits.
        It begins a span when the FIFO has all segments of the span.
 
-    `preparation` is the number of cycles from a span to its first normal, if all parts are free: 63 for k =
-    0, 77 for k = 1, 142 for k = 2. Spans with at most `interval` pixels follow each other in `interval`
-    cycles: 33 for k = 0, 42 for k = 1, 70 for k = 2. For a span of one or two pixels k is 0. For a span of
-    three pixels k is at most 1. A span of length 0 takes one cycle and gives nothing.
+    `preparation` is the number of cycles from a span to its first normal, if all parts are free. It is 63 for
+    k = 0, 77 for k = 1, 142 for k = 2. Spans with at most `interval` pixels follow each other in `interval`
+    cycles. These are 33 for k = 0, 42 for k = 1, 70 for k = 2. For a span of one or two pixels k is 0. For a
+    span of three pixels k is at most 1. A span of length 0 takes one cycle and gives nothing.
 
     The unit has three multipliers: two in the bisection unit, and one for the square of q and for the
     segments. A memory of ``2^(depth + 2)`` words of 54 bits holds the segment ends of two spans. A FIFO of

@@ -56,7 +56,7 @@ class BandBufferUnit(wiring.Component):
     Members
     -------
     request : :py:`Out(stream.Signature(band))`
-        Bands to draw, in the order of the picture, without bands whose slot has begun.
+        Bands to draw, in the order of the picture. A band whose slot has begun is left out.
     pixels : :py:`In(stream.Signature(band_pixel_shape(model)))`
         Pixels of the last requested band. A pixel outside the band is lost.
     done : :py:`In(stream.Signature(band))`
