@@ -9,7 +9,7 @@ import numpy as np
 
 from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.beats import Pixels, Spans
-from blysk.golden.build import Build
+from blysk.golden.build import Build, BuildError
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import MAX_MATERIALS, FrameConstants, by_material
 from blysk.golden.lighting.diffuse import Diffuse
@@ -77,7 +77,8 @@ class ShadingPipeline:
         - the method has a scale, but there is no lobe;
         - factors are not different lights in order, or lack specular light or a method that takes values;
         - the transfer is unknown;
-        - the albedo has tints, but there is no specular light.
+        - the albedo has tints, but there is no specular light;
+        - texels are outside of several pipelines, or of a core on a bus (a `BuildError`).
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -116,6 +117,10 @@ class ShadingPipeline:
             raise ValueError(f"transfer must be one of {', '.join(TRANSFERS)}, not {self.transfer!r}")
         if self.albedo is not None and self.albedo.tints and not (self.specular and self.lights):
             raise ValueError("an albedo with tints needs specular light")
+        if self.texels_outside and (self.build.pipes > 1 or self.build.bus != "native"):
+            option = "pipes" if self.build.pipes > 1 else "bus"
+            remedy = f"leave out {option}, or take a texel memory inside"
+            raise BuildError(option, "only a single native core has texels outside", remedy)
         object.__setattr__(self, "factors", tuple(self.factors))
         if self.factors:
             self._check_factors()

@@ -26,7 +26,7 @@ class PixelPipelines:
     Raises
     ------
     ValueError
-        If there are more pipelines than scanlines, or texels are outside of the pipelines.
+        If there are more pipelines than scanlines.
 
     Source: docs/theory/units.md#pipeline.
     """
@@ -37,8 +37,6 @@ class PixelPipelines:
         if self.pipes > 1 << self.design.y_bits:
             rows = 1 << self.design.y_bits
             raise ValueError(f"pipes must be at most the number of scanlines, {rows}, not {self.pipes}")
-        if self.pipes > 1 and self.design.texels_outside:
-            raise ValueError("several pipelines need their texels inside: take a memory that is not external")
 
     @property
     def pipes(self) -> int:

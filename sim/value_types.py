@@ -19,6 +19,7 @@ __all__ = [
     "Number",
     "OutputFile",
     "PartError",
+    "Several",
     "Size",
     "Truth",
     "Value",
@@ -320,6 +321,36 @@ class Choice(Value):
         if not isinstance(value, str) or value not in self.names:
             raise ValueError("unknown")
         return value
+
+
+class Several(Choice):
+    """One or more of a few names, each once, with commas between them."""
+
+    def __init__(self, kind: str, names: Iterable[str]):
+        super().__init__(kind, names)
+        self.remedy = f"give one or more of {', '.join(self.names)}"
+
+    @property
+    def in_python(self) -> str:
+        """A text, or a list of names."""
+        return f"{self.remedy}, as a list or with commas between them"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """The names, as many as wanted."""
+        return f"[{'|'.join(self.names)}],..."
+
+    def parse(self, text: str) -> Any:
+        """The names between the commas."""
+        return [name.strip() for name in text.split(",")]
+
+    def check(self, value: Any) -> Any:
+        """A tuple of the names, in the order of ``names``."""
+        if not isinstance(value, list | tuple) or not value:
+            raise ValueError("unknown")
+        given = [super(Several, self).check(name) for name in value]
+        if len(set(given)) < len(given):
+            raise ValueError("a name comes twice")
+        return tuple(name for name in self.names if name in given)
 
 
 class OutputFile(click.Path):

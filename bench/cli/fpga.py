@@ -8,9 +8,8 @@ import click
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F
 from blysk.bench.units.names import UNITS
-from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.sim.api.design import built, design
-from blysk.sim.api.options import BUILD, DESIGN
+from blysk.sim.api.options import BUILD, DESIGN, NEEDS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.errors import InputError
 from blysk.sim.output import check_writable
@@ -19,6 +18,7 @@ from blysk.sim.value_types import Choice, OutputFile, Whole
 __all__ = ["command"]
 
 _BUILD = {name: BUILD[name] for name in ("pipes", "top", "setups")}
+_NEEDS = {name: NEEDS[name] for name in ("lights", "albedo")}
 # The committed figures are of linear light.
 _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
 
@@ -26,6 +26,7 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
 @click.command()
 @options_of(_DESIGN)
 @options_of(_BUILD)
+@options_of(_NEEDS)
 @click.option(
     "--family",
     "family_name",
@@ -34,7 +35,6 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
     + "; ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
     + ".  [default: ecp5; for several pipelines ecp5-85f]",
 )
-@click.option("--lights", type=Whole(1, MAX_LIGHTS), default=1, show_default=True, help="Number of lights.")
 @click.option("--every-method", is_flag=True, help="Place the pipeline of every method.")
 @click.option(
     "--unit",
@@ -78,7 +78,6 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
 def command(
     context,
     family_name,
-    lights,
     every_method,
     units,
     target,
@@ -108,11 +107,12 @@ def command(
         blysk fpga --seeds 3 --json quotient.json
         blysk fpga --family nexus --unit specular
         blysk fpga --pipes 4 --seeds 1
+        blysk fpga --albedo colors,bilinear --transfer srgb
         blysk fpga --top render --style compact --target 115 --seeds 1
         blysk fpga --top render --style compact --by-unit
     """
-    chosen, build = given_options(context, _DESIGN), given_options(context, _BUILD)
-    given = [*chosen, *build, *given_options(context, ["lights", "every_method"])]
+    chosen, build = given_options(context, [*_DESIGN, *_NEEDS]), given_options(context, _BUILD)
+    given = [*chosen, *build, *given_options(context, ["every_method"])]
     if units and given:
         option = f"--{given[0].replace('_', '-')}"
         raise InputError(option, "is for the pipeline", f"leave out {option} or --unit")
@@ -129,13 +129,13 @@ def command(
         raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
     if not units:
         # Of every method the default stands for all: it serves each core.
-        built(design(lights=lights, **chosen), build)
+        built(design(**chosen), build)
     several = build.get("pipes", 1) > 1
     family = DEVICES[family_name] if family_name else ECP5_85F if several else ECP5
     family = replace(family, target=target)
     from blysk.bench.tools.fpga import about, count_by_unit, pipelines_of, place, units_of
 
-    designs = list(units_of(units) if units else pipelines_of(chosen, lights, every_method, build))
+    designs = list(units_of(units) if units else pipelines_of(chosen, every_method, build))
     # Report a missing tool before the work.
     about(family)
     if by_unit:

@@ -142,6 +142,7 @@ def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
     name += [f"{design.lights} lights" if design.lights != 1 else "1 light"]
     name += [operand] if operand else []
     name += ["gate"] if design.gate else []
+    name += [" and ".join(design.albedo.parts)] if design.albedo else []
     name += [design.transfer] if design.transfer != "linear" else []
     default = vars(Build(top=build.top))
     changed = {option: value for option, value in vars(build).items() if value != default[option]}
@@ -150,9 +151,9 @@ def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
 
 
 def pipelines_of(
-    given: Mapping[str, Any], lights: int, every: bool, build: Mapping[str, Any] | None = None
+    given: Mapping[str, Any], every: bool, build: Mapping[str, Any] | None = None
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """The core by options of design and build, with one method, or with every method that serves it.
+    """The core by arguments of `design` and options of its build, with one method or every serving method.
 
     By default its pixels are linear light.
 
@@ -162,7 +163,7 @@ def pipelines_of(
         If a value is not accepted, or the only method does not serve the core.
     """
     for method in METHODS if every else (given.get("method"),):
-        made = design(lights=lights, **{"transfer": "linear", **given, "method": method})
+        made = design(**{"transfer": "linear", **given, "method": method})
         try:
             made = built(made, build or {})
         except OptionError as error:

@@ -1,6 +1,6 @@
 """The albedo path of a pipeline: the colour of the surface at every pixel, and its bit-accurate model."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans, SpanAttributes
 from blysk.golden.albedo.attributes import Attributes
-from blysk.golden.albedo.texel_memory import LoadedTextures, TextureDescriptor
+from blysk.golden.albedo.texel_memory import LoadedTextures, TexelMemory, TextureDescriptor
 from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.number.fixed import UQ, Fixed
 from blysk.golden.number.spans import pixels_of
@@ -49,9 +49,54 @@ class Albedo:
 
     FORMAT = UQ(1, 16)
 
+    PARTS = ("colors", "nearest", "bilinear", "outside", "tinted", "orthographic")
+    """Words that `of_parts` takes."""
+
     def __post_init__(self) -> None:
         if not (self.colors or self.texture):
             raise ValueError("an albedo needs vertex colours or textures")
+
+    @classmethod
+    def of_parts(cls, parts: Collection[str]) -> "Albedo":
+        """The albedo path that some words describe.
+
+        Parameters
+        ----------
+        parts : collection of str
+            Words of `PARTS`. ``colors``: vertex colours. ``nearest`` or ``bilinear``: textures with this
+            filter. ``outside``: texels in a memory outside of the design. ``tinted``: metals.
+            ``orthographic``: only for cameras without perspective, whose attributes are not over W.
+
+        Raises
+        ------
+        ValueError
+            If the words exclude each other, or need another word. The message ends in a remedy, after a
+            semicolon.
+        """
+        textured = not {"nearest", "bilinear"}.isdisjoint(parts)
+        if {"nearest", "bilinear"} <= set(parts):
+            raise ValueError("a bilinear unit also serves nearest textures; leave out nearest")
+        if "outside" in parts and not textured:
+            raise ValueError("texels need textures; also give nearest or bilinear")
+        if not textured and "colors" not in parts:
+            raise ValueError("there is no colour of a pixel; also give colors, nearest or bilinear")
+        memory = TexelMemory(external="outside" in parts)
+        texture = TextureSampler(memory, bilinear="bilinear" in parts) if textured else None
+        return cls("colors" in parts, texture, "orthographic" not in parts, "tinted" in parts)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The words that describe it, see `of_parts`."""
+        texture = self.texture
+        has = (
+            self.colors,
+            texture is not None and not texture.bilinear,
+            texture is not None and texture.bilinear,
+            texture is not None and texture.memory.external,
+            self.tints,
+            not self.perspective,
+        )
+        return tuple(word for word, given in zip(self.PARTS, has, strict=True) if given)
 
     @property
     def has_product(self) -> bool:

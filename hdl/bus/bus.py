@@ -153,13 +153,7 @@ def core_of(design: ShadingPipeline) -> wiring.Component:
     Raises
     ------
     ValueError
-        In one of these cases:
-
-        - the design does not fit triangles (see `Renderer`);
-        - it has fewer scanlines than pipelines;
-        - a core on a bus has its texels outside.
+        If the design does not fit triangles (see `Renderer`), or has fewer scanlines than pipelines.
     """
     build = design.build
-    if build.bus != "native" and design.texels_outside:
-        raise ValueError("a core on a bus needs its texels inside: take a memory that is not external")
     return TOPS[build.top].unit(design) if build.bus == "native" else BusUnit(design)

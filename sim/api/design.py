@@ -1,10 +1,11 @@
 """Designs made from the options of the command line."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, TypeVar, Unpack, cast
 
+from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.build import BuildError
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.lighting.lobe import Lobe
@@ -13,7 +14,7 @@ from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED, preset
 from blysk.golden.render import Renderer
 from blysk.sim.api import costed_design
-from blysk.sim.api.options import BUILD, COUNTS, DESIGN, DesignOptions
+from blysk.sim.api.options import BUILD, DESIGN, NEEDS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
 from blysk.sim.api.signature import with_options
 from blysk.sim.errors import OptionError
@@ -23,9 +24,14 @@ __all__ = ["built", "design", "design_of", "refused_counts"]
 AnyDesign = TypeVar("AnyDesign", bound=ShadingPipeline)
 
 
-@with_options({**COUNTS, **DESIGN})
+@with_options({**NEEDS, **DESIGN})
 def design(
-    *, lights: int = 1, materials: int = 1, factors: int = 0, **options: Unpack[DesignOptions]
+    *,
+    lights: int = 1,
+    materials: int = 1,
+    factors: int = 0,
+    albedo: str | Sequence[str] | None = None,
+    **options: Unpack[DesignOptions],
 ) -> costed_design.Design:
     """A pipeline with the defaults of the command line.
 
@@ -35,6 +41,8 @@ def design(
         Numbers of lights and materials that it serves: 1 to 16 and 1 to 1024.
     factors : int
         Number of lights that fade, by distance or as spots. They are the first lights. Needs ``chord-local``.
+    albedo : str or sequence of str, optional
+        Colours of pixels: words of `Albedo.PARTS`, see `Albedo.of_parts`. By default there are none.
     method : str
         Method of interpolation along a span: one of `METHODS`; by default see `default_method`.
     model : str
@@ -55,14 +63,22 @@ def design(
     InputError
         If there is no such pipeline.
     """
-    counts = {"lights": lights, "materials": materials, "factors": factors}
-    settings = read_settings("", {**options, **counts}, {**DESIGN, **COUNTS})
+    needs = {"lights": lights, "materials": materials, "factors": factors, "albedo": albedo}
+    settings = read_settings("", {**options, **needs}, {**DESIGN, **NEEDS})
     made = design_of(settings, settings["lights"], settings["materials"])
     try:
-        return replace(made, factors=tuple(range(settings["factors"])))
+        made = replace(made, factors=tuple(range(settings["factors"])))
     except ValueError as error:
         remedy = "use chord-local, and at most as many factors as lights"
         raise settings.refuse("factors", str(error), remedy) from None
+    if settings["albedo"] is None:
+        return made
+    try:
+        return replace(made, albedo=Albedo.of_parts(settings["albedo"]))
+    except ValueError as error:
+        reason, _, remedy = str(error).partition("; ")
+        remedy = remedy or "leave out tinted, or use a model with a highlight"
+        raise settings.refuse("albedo", reason, remedy, ",".join(settings["albedo"])) from None
 
 
 def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_design.Design:

@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
 
+from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.build import PIPES, PORTS, SETUPS, STYLES, TOPS, Style
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
@@ -25,6 +26,7 @@ from blysk.sim.value_types import (
     Color,
     Few,
     Number,
+    Several,
     Size,
     Truth,
     Value,
@@ -38,12 +40,12 @@ if TYPE_CHECKING:
 __all__ = [
     "BUILD",
     "COEFFICIENTS",
-    "COUNTS",
     "DESIGN",
     "DOCUMENTS",
     "GEOMETRIES",
     "LIGHTS",
     "MAX_FRAMES",
+    "NEEDS",
     "RENDERING",
     "SCENE",
     "SLOW_SIZE",
@@ -288,7 +290,7 @@ DESIGN: dict[str, Option] = {
 }
 """Options of a design, without its counts; ``setup_interval`` and ``style`` are fields of `Build`."""
 
-COUNTS: dict[str, Option] = {
+NEEDS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
     "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials. They share up to 64 lobe tables."),
     "factors": Option(
@@ -297,8 +299,15 @@ COUNTS: dict[str, Option] = {
         "Number of lights that fade, by distance or as spots. They are the first lights. Needs --method "
         "chord-local.",
     ),
+    "albedo": Option(
+        Several("part", Albedo.PARTS),
+        None,
+        "Colours of pixels. colors: vertex colours. nearest, bilinear: textures with this filter. outside: "
+        "texels in a memory outside of the core. tinted: metals, whose colour also multiplies the highlight. "
+        "orthographic: only for cameras without perspective.  [default: none]",
+    ),
 }
-"""Counts of a design, for commands without a scene. A scene has its own counts."""
+"""What a scene decides in a design, for commands without a scene."""
 
 BUILD: dict[str, Option] = {
     "geometry": Option(

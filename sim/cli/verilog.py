@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
-from blysk.golden.build import Build
+from blysk.golden.pipeline import ShadingPipeline
 from blysk.sim.api.design import built, design
-from blysk.sim.api.options import BUILD, COUNTS, DESIGN, DOCUMENTS
+from blysk.sim.api.options import BUILD, DESIGN, DOCUMENTS, NEEDS
 from blysk.sim.cli.options import given_options, options_of
 from blysk.sim.cli.outputs import check_outputs
 from blysk.sim.errors import InputError
@@ -18,8 +18,11 @@ from blysk.sim.value_types import OutputFile
 __all__ = ["command"]
 
 
-def _check_testbench(build: Build) -> None:
+def _check_testbench(made: ShadingPipeline) -> None:
     """Refuse cores that the test bench does not drive."""
+    if made.albedo:
+        raise InputError("--testbench", "its bench sends spans without colours", "leave out --albedo")
+    build = made.build
     if build.pipes > 1 and not build.merged:
         raise InputError("--testbench", "its bench takes one stream of pixels", "also give --merged")
     if build.bus != "native":
@@ -33,7 +36,7 @@ def _check_testbench(build: Build) -> None:
 
 @click.command()
 @options_of(DESIGN)
-@options_of(COUNTS)
+@options_of(NEEDS)
 @options_of(BUILD)
 @click.option("--name", default="blysk", show_default=True, help="Name of the top module.")
 @click.option(
@@ -61,12 +64,13 @@ def command(context, name, output, testbench, **_):
         blysk verilog --model phong --testbench bench
         blysk verilog --geometry hardware -o render.v
         blysk verilog --pipes 4 -o four.v
+        blysk verilog --albedo colors,bilinear -o textured.v
         blysk verilog --top render --bus axi -o core.v
     """
-    made = built(design(**given_options(context, [*DESIGN, *COUNTS])), given_options(context, BUILD))
+    made = built(design(**given_options(context, [*DESIGN, *NEEDS])), given_options(context, BUILD))
     build = made.build
     if testbench is not None:
-        _check_testbench(build)
+        _check_testbench(made)
     if output and build.bus != "native" and not output.endswith(".v"):
         raise InputError(
             f"-o {output}", "X.md, X.h and X.svd are written beside X.v", "use a name that ends in .v"

@@ -15,12 +15,11 @@ from blysk.bench.units.pipeline_spans import any_constants, any_spans
 from blysk.bench.units.record import UnitRun
 from blysk.golden.albedo.texel_memory import TexelMemory
 from blysk.golden.albedo.texture_sampler import TextureSampler
+from blysk.golden.build import BuildError
 from blysk.golden.frame_constants import TEXELS_ADDRESS
-from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.albedo.texel_memory import TexelMemoryUnit
-from blysk.hdl.bus.bus import core_of
 from blysk.hdl.core.stream import connect, connect_fifo
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
@@ -89,10 +88,9 @@ def test_texels_outside():
 def test_texels_outside_are_refused_where_they_have_no_port():
     design = RECORD.variants["albedo, both, without lights, 2 materials"].unit().model
     outside = replace(design, albedo=replace(design.albedo, texture=TextureSampler(TexelMemory(8, True))))
-    with pytest.raises(ValueError, match=r"^several pipelines need their texels inside: take a memory"):
-        PixelPipelines(outside.built(pipes=2))
-    with pytest.raises(ValueError, match=r"^a core on a bus needs its texels inside: take a memory"):
-        core_of(outside.built(bus="axi"))
+    for option, value in (("pipes", 2), ("bus", "axi")):
+        with pytest.raises(BuildError, match=rf"^{option}: only a single native core has texels out"):
+            outside.built(**{option: value})
     with pytest.raises(ValueError, match=r"^hardware geometry has no vertex colours and no textures; leave"):
         Renderer(design)
 

@@ -163,10 +163,13 @@ def test_designs():
     assert forms == [f"quadratic_evaluator {form}" for form in QUADRATIC_FORMS]
     full = {"method": "quadratic", "style": "compact", "setup_interval": 7, "gate": True}
     whole = "pipeline quadratic, blinn, 2 lights, gate, compact, interval 7"
-    assert names(fpga.pipelines_of(full, 2, False)) == [whole]
-    assert names(fpga.pipelines_of({}, 1, False)) == ["pipeline quotient, blinn, 1 light"]
-    assert names(fpga.pipelines_of({"model": "exp"}, 1, False)) == ["pipeline renormalise, exp, 1 light"]
-    assert names(fpga.pipelines_of({}, 1, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
+    assert names(fpga.pipelines_of({**full, "lights": 2}, False)) == [whole]
+    assert names(fpga.pipelines_of({}, False)) == ["pipeline quotient, blinn, 1 light"]
+    textured = {"albedo": "colors,bilinear", "transfer": "srgb"}
+    whole = "pipeline quotient, blinn, 1 light, colors and bilinear, srgb"
+    assert names(fpga.pipelines_of(textured, False)) == [whole]
+    assert names(fpga.pipelines_of({"model": "exp"}, False)) == ["pipeline renormalise, exp, 1 light"]
+    assert names(fpga.pipelines_of({}, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
 
 
 @pytest.mark.parametrize(

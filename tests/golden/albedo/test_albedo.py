@@ -65,3 +65,35 @@ def test_refused():
     text = "an albedo with textures needs texels and a texture of each material"
     with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):
         path.compute(spans, np.array([5]), np.array([0]))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("colors",),
+        ("bilinear", "tinted"),
+        ("nearest", "outside", "orthographic"),
+        ("colors", "bilinear", "outside", "tinted", "orthographic"),
+    ],
+)
+def test_words_describe_a_path(words):
+    path = Albedo.of_parts(words)
+    assert path.parts == words
+    assert (path.colors, path.tints, path.perspective) == (
+        "colors" in words,
+        "tinted" in words,
+        "orthographic" not in words,
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("tinted",), "there is no colour of a pixel; also give colors, nearest or bilinear"),
+        (("nearest", "bilinear"), "a bilinear unit also serves nearest textures; leave out nearest"),
+        (("colors", "outside"), "texels need textures; also give nearest or bilinear"),
+    ],
+)
+def test_words_that_describe_none(words, says):
+    with pytest.raises(ValueError, match=re.escape(says)):
+        Albedo.of_parts(words)

@@ -12,7 +12,7 @@ from PIL import Image
 import blysk
 from blysk.golden.presets import METHODS, PUBLISHED, preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.sim.api.options import COUNTS, DESIGN, RENDERING, SCENE
+from blysk.sim.api.options import DESIGN, NEEDS, RENDERING, SCENE
 from blysk.sim.api.placed import read_store
 from blysk.sim.meshes.mesh import given_mesh, load_mesh
 
@@ -190,8 +190,8 @@ def test_help_has_every_option_with_its_default():
     assert not re.search("--[a-z]", text)
     assert 'needs method="chord-local"' in " ".join(text.split())
     assert 'setup_interval="' not in text
-    assert inspect.signature(blysk.design).parameters.keys() == COUNTS.keys() | DESIGN.keys()
-    for function, options in ((blysk.scene, SCENE), (blysk.design, {**COUNTS, **DESIGN})):
+    assert inspect.signature(blysk.design).parameters.keys() == NEEDS.keys() | DESIGN.keys()
+    for function, options in ((blysk.scene, SCENE), (blysk.design, {**NEEDS, **DESIGN})):
         described = re.findall(r"^\s*([a-z_, ]+)( : .*)?$", function.__doc__, re.MULTILINE)
         assert options.keys() <= {name for names, _ in described for name in names.split(", ")}
 
