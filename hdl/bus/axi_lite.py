@@ -42,8 +42,8 @@ class AxiLite(wiring.Signature):
 class AxiLiteUnit(wiring.Component):
     """Adapter from AXI4-Lite to accesses, one at a time. If a read and a write wait, they take turns.
 
-    An address and a word wait in a register each. So every ready and every valid is a register, and no path
-    leads from one to another. A refused access gets the answer SLVERR.
+    An address and a word wait in a register each. So every ready and every valid is a register, and no
+    combinational path joins two of them. A refused access gets the answer SLVERR.
 
     Members
     -------

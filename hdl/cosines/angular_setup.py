@@ -238,7 +238,7 @@ class AngularSetupUnit(PipelinedUnit):
         )
 
     def _major(self, major: Word, chord: Word) -> Word:
-        """Word of ``major/2 (1 + e)``, which is x up to 90 degrees."""
+        """Word of ``major/2 (1 + e)``, which is x for spans up to 90 degrees."""
         g, p = self._graph, self.model
 
         def clamped(chord):
@@ -257,7 +257,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register("x", lambda half, x: (half + x).wrap(p.AXIS_FORMAT), half, product)
 
     def _minor(self, minor: Word, shift: Word, v: Word) -> Word:
-        """Word of ``minor 2^j T``, which is y up to 90 degrees."""
+        """Word of ``minor 2^j T``, which is y for spans up to 90 degrees."""
         g, p = self._graph, self.model
         operand = self._address("reciprocal", v, 36)
         reciprocal = self._looked_up("inverse_roots", p.reciprocals, *operand, -1, p.RECIPROCAL_FORMAT)
@@ -378,5 +378,5 @@ def _halved(a, times):
 
 
 def _added(a, b, negate):
-    """``a - b`` if ``negate``, else ``a + b``, with one adder: -b is the inverse of b and a carry."""
+    """``a - b`` if ``negate``, else ``a + b``, with one adder: -b is the inverted b plus a carry."""
     return (Cat(Const(1, 1), a) + Cat(negate, b ^ negate.replicate(len(b))))[1 : len(a) + 1]

@@ -48,7 +48,7 @@ class RecurrenceUnit(wiring.Component):
         ``reinsch``, x(1) in ``direct``. If interleaved, they are arrays of four, see `Recurrence.start`.
         The coefficient, the shift (only in ``reinsch``), and the length, 0 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "highlight", "last"})))`
-        Both cosines in `Recurrence.result_format`. ``last``: the last pixel of its span.
+        Both cosines in `Recurrence.result_format`. ``last``: the pixel is the last of its span.
 
     Source: docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5.
     """

@@ -36,10 +36,10 @@ def serial_attribute_shape() -> data.StructLayout:
 class AttributeSerialiserUnit(wiring.Component):
     """The four attributes of each triangle, one after the other. `AttributeSerialiser` is the model.
 
-    The first attribute is offered 9 cycles after the triangle is taken in, the others on the next three
-    cycles, unless the output waits. The next triangle is taken in on the cycle of the last attribute. So the
-    initiation interval is 12 cycles. Without a skid buffer attributes come every second cycle, and the
-    interval is 15. The unit has no multipliers.
+    The first attribute is offered 9 cycles after the triangle is taken in. The other attributes follow on the
+    next three cycles, unless the output waits. The next triangle is taken in on the cycle of the last
+    attribute. So the initiation interval is 12 cycles. Without a skid buffer attributes come every second
+    cycle, and the interval is 15. The unit has no multipliers.
 
     Parameters
     ----------

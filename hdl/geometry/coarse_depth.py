@@ -17,7 +17,7 @@ from blysk.hdl.core.views import copy, copy_fields
 
 __all__ = ["CoarseDepthUnit", "deep_span_shape"]
 
-# As in the depth test, this has more bits than a depth or a step.
+# A sum of depths has more bits than a depth or a step, as in the depth test.
 _SUM_BITS = 37
 
 
@@ -54,12 +54,12 @@ class CoarseDepthUnit(wiring.Component):
         Spans of one pixel or more. A span that goes out of the largest picture counts as visible, and changes
         no bound.
     o : :py:`Out(stream.Signature(1))`
-        For each span, in order, 1 if it is hidden.
+        Answers in the order of the spans: 1 if the span is hidden.
 
     Attributes
     ----------
     idle : Signal
-        No span is inside, and no word is swept.
+        High while no span is inside and no word is swept.
 
     Raises
     ------
@@ -242,7 +242,7 @@ class CoarseDepthUnit(wiring.Component):
         return block, following_valid | block.valid
 
     def _bounds(self, m: Module, bits: int, advance: Signal, block: data.View) -> tuple[data.View, ...]:
-        """Three stages: depth changes to both ends of a part; depths there; the least and the largest."""
+        """Three stages: depth changes to both ends of a part, depths there, least and largest depth."""
         given, last = self.model, self.model.block - 1
         common = {"valid": 1, "begins": 1, "ends": 1, "place": range(given.blocks), "mask": given.block}
         copied = ("valid", "begins", "ends", "place", "depth", "outside")

@@ -89,14 +89,15 @@ class DepthTesterUnit(wiring.Component):
 
     With ``clears`` the unit writes `DepthTester.CLEARED` to each place of the picture, one a cycle. It does
     so when the first pixel comes after a reset, and after each change of ``picture.number``. Pixels wait
-    meanwhile. Without ``clears`` the unit draws one picture only. Clear its memory outside between pictures.
+    meanwhile. Without ``clears`` the unit draws one picture only. Clear the memory outside before
+    each further picture.
 
     Parameters
     ----------
     x_bits, y_bits : int
         Bits of a column and of a scanline.
     size : (int, int) or None
-        Width and height of a memory inside the unit, at most 2^x_bits and 2^y_bits, which is clear at
+        Width and height of a memory inside the unit, at most 2^x_bits and 2^y_bits. The memory is clear at
         power-up. A pixel outside this memory changes no depth, and is compared only with the last pixels at
         its place. ``None``: the memory is outside, at the port ``memory``.
     clears : bool
@@ -119,7 +120,7 @@ class DepthTesterUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        No pixel is inside.
+        High while no pixel is inside.
 
     Source: docs/theory/geometry.md#depth; not in the documents.
     """

@@ -95,7 +95,7 @@ class EdgeNormalsUnit(wiring.Component):
     def _send(self, m: Module, normaliser, rest) -> None:
         """Send the left vector of the piece in the register.
 
-        If it has several pixels, also send the right vector.
+        If the piece has several pixels, also send the right vector.
         """
         busy, turn, last = Signal(name="busy"), Signal(name="turn"), Signal(name="last_turn")
         piece, moves = Signal(self.i.payload.shape(), name="piece"), Signal(name="moves")

@@ -18,7 +18,7 @@ _DIVISORS = (0, "divisor"), (1, "triple")
 """Number k and name of the registers of a divisor and its triple, which have 2 k bits more than a divisor."""
 
 ALONG_BITS = 9
-"""Bits of `Edges.along`. It is 0 to 511, because n of `EdgeSetup` is 2 only if b is over 0."""
+"""Bits of `Edges.along`, 0 to 511: 256 n minus b's fraction, which is over 0 if n is 2 (see `EdgeSetup`)."""
 
 
 def edge_corners_shape(grid: Grid = GRID) -> data.StructLayout:
@@ -48,7 +48,7 @@ def edges_shape(grid: Grid = GRID) -> data.StructLayout:
 
 @dataclass(frozen=True)
 class _Ages:
-    """Stages of a beat (`PipelinedUnit.at`) at which an edge's division and its start are loaded, and end."""
+    """Stages of an edge (`PipelinedUnit.at`): division loaded, start loaded, start done."""
 
     divide: int
     start: int
@@ -318,7 +318,7 @@ class EdgeSetupUnit(PipelinedUnit):
         size = len(divisor) + 1
 
         def added(bits, less, more):
-            # One adder: the 1 of a subtraction comes in through a bit below.
+            # One adder does both. The 1 of a subtraction comes in through a bit below.
             number = Cat(bits, rest)[:size]
             less, more = (Cat(other, Const(0, 1))[:size] for other in (less, more))
             turned = Mux(subtract, ~less, more)

@@ -42,8 +42,8 @@ class GradientSetupUnit(PipelinedUnit):
 
     Let I be the initiation interval. The twelve multiplications of an attribute take turns at ``ceil(12 /
     I)`` multipliers of 18x18 bits: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter. The
-    sum of the start takes four turns at an adder, two bits of both factors a turn. The latency, `latency`,
-    follows from the schedule: 40 cycles for an interval of 4, 52 for 12.
+    sum of the start takes four turns at an adder, with two bits of both factors in each turn. The latency,
+    `latency`, follows from the schedule: 40 cycles for an interval of 4, 52 for 12.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ class LightAdapterUnit(wiring.Component):
     i : :py:`In(stream.Signature(shape))`
         Spans with vectors in the frame of the first light.
     o : :py:`Out(stream.Signature(with_components(shape, 3 + lights * rows)))`
-        The same spans, with the components of further lights behind the first light's.
+        The same spans, with the components of further lights behind the components of the first light.
     write : :py:`In(stream.Signature(write_shape()))`
         Writes of frame constants, always accepted. The unit takes the axes, see `FrameConstants.writes`. They
         are constant while spans are inside.

@@ -39,9 +39,9 @@ def plane_shape() -> data.StructLayout:
 class PlaneAssemblerUnit(wiring.Component):
     """Collects four gradients, and finds ``piece``. `PlaneAssembler` is the bit-accurate model.
 
-    With the first gradient of a triangle the product of bound and limit begins, two bits of the limit a
-    cycle. After the third gradient the search for ``piece`` begins, one bit a cycle. If gradients are at
-    least 4 cycles apart, a triangle is offered 3 cycles after its fourth gradient was taken in. One cycle
+    The first gradient of a triangle starts the product of bound and limit, which takes two bits of the limit
+    a cycle. The third gradient starts the search for ``piece``, which finds one bit a cycle. If gradients are
+    at least 4 cycles apart, a triangle is offered 3 cycles after its fourth gradient was taken in. One cycle
     after the offer the first gradient of the next triangle can be taken in. So gradients that come every four
     cycles never wait. If spans are not cut, there is neither product nor search. The unit has no multipliers.
 

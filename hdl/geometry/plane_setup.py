@@ -75,7 +75,7 @@ class PlaneSetupUnit(PipelinedUnit):
             data.StructLayout(plane_corners_shape(grid) | {"right": unsigned(1)}),
             data.StructLayout(scales_shape() | {"sliver": unsigned(1)}),
             latency=latency,
-            # A triangle that has left shares nothing with the next.
+            # A triangle that has left the unit shares no part of it with the next triangle.
             initiation_interval=min(initiation_interval, latency),
             skid=skid,
             stands=skid,

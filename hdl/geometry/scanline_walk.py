@@ -129,7 +129,8 @@ class ScanlineWalk:
         count = row.length - 1
         if turns.serial:
             # The scanline is there for three cycles before it is taken, and a step takes four cycles. So the
-            # numbers that follow from both are computed one a cycle, with registers between them.
+            # numbers that follow from the scanline and the step are computed one a cycle, with registers
+            # between.
             def registered(value, name):
                 register = Signal.like(value, name=name)
                 m.d.sync += register.eq(value)

@@ -23,12 +23,12 @@ _WIDTH = SPAN_STEP.width
 
 
 class SerialVectorsUnit(wiring.Component):
-    """Does the work of `SpanHalverUnit` and `VectorAdapterUnit` on one attribute a cycle, by their models.
+    """Does the work of `SpanHalverUnit` and `VectorAdapterUnit` on one attribute a cycle, with equal results.
 
     The four attributes of a span are in rings that turn by one attribute a cycle.
 
-    1. A span comes in four turns. They also find its shift, and test with the shift of the piece before
-       whether the span fits. If its own shift differs, four more turns test again.
+    1. A span comes in four turns. The turns also find the span's shift. They test whether the span fits, with
+       the shift of the piece before. If the span's own shift differs, four more turns test again.
     2. Four turns find the exponent of the step.
     3. Four turns give the start.
     4. Four turns give the step, while the next span, or the rest of this span, comes in.
@@ -43,7 +43,7 @@ class SerialVectorsUnit(wiring.Component):
     Parameters
     ----------
     rotates : bool
-        The parameter of both models.
+        As in `SpanHalver` and `VectorAdapter`.
 
     Members
     -------
@@ -57,7 +57,7 @@ class SerialVectorsUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        Neither a span nor a piece is inside.
+        High while neither a span nor a piece is inside.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
@@ -78,7 +78,8 @@ class SerialVectorsUnit(wiring.Component):
     def elaborate(self, platform):
         """The rings and their turns, the decisions, the pieces of a span, and the words."""
         m = Module()
-        # The steps of the turns. `settles` takes a cycle without a turn, as does a span that does not fit.
+        # Steps of four turns each. `settles` is one cycle without a turn. A span that does not fit also takes
+        # one cycle without a turn.
         names = "loads", "settles", "repeats", "tests", "starts", "steps", "renews"
         loads, settles, repeats, tests, starts, steps, renews = (
             Signal(name=name, init=name == "loads") for name in names
@@ -129,7 +130,10 @@ class SerialVectorsUnit(wiring.Component):
         return m
 
     def _rings(self, m: Module, turns, comes, renews, odd, leaves) -> dict[str, Signal]:
-        """Rings of the attributes at both ends, of the whole span's far end, and of the step: first words."""
+        """Rings of the near, far and last ends and of the steps. Returns their first words.
+
+        The last end is the far end of the whole span.
+        """
         given = self.i.payload
         rings = {
             name: [Signal(_WIDTH, name=f"{name}_{k}", reset_less=True) for k in range(ATTRIBUTES)]
@@ -159,7 +163,7 @@ class SerialVectorsUnit(wiring.Component):
         }
 
     def _pixels(self, m: Module, comes, retries, leaves, flags):
-        """The piece's flags, its number of pixels, whether the span is uncut, and the words that pass."""
+        """The piece's flags and number of pixels, whether the span is uncut, and the words that only pass."""
         (whole, odd), given = flags, self.i.payload
         tag = {
             name: Signal.like(Value.cast(given[name]), name=name, reset_less=True)
@@ -191,7 +195,7 @@ class SerialVectorsUnit(wiring.Component):
         (comes, settles), is_component, (fits, agrees) = kinds, ~place.all(), results
         bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
 
-        # These belong to a word that came on the cycle before.
+        # ``came`` and ``first`` belong to a word that came on the cycle before.
         came, first = Signal(name="came"), Signal(name="came_first")
         used, shift = Signal(places, name="used"), Signal(range(places + 1), name="shift")
         rest, chosen = used, []
@@ -248,7 +252,7 @@ class SerialVectorsUnit(wiring.Component):
     def _words(self, m: Module, heads, kinds, place, shift, tag, words) -> None:
         """Send each component through the shifts and the rounding.
 
-        Also send the depths and the words that pass.
+        Also send the depths and the words that pass unchanged.
         """
         p, is_component = VectorAdapter(self.rotates), ~place.all()
         (tests, starts, steps, turns), right = kinds, tag["right"]

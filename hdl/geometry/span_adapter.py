@@ -83,9 +83,9 @@ def connect_shading_span(m: Module, span: data.View, shaded: data.View) -> None:
     m : Module
         Module that gets the wires.
     span : View
-        Of `true_spans_shape`, `line_spans_shape` or `vector_spans_shape`.
+        Span in `true_spans_shape`, `line_spans_shape` or `vector_spans_shape`.
     shaded : View
-        Of `blysk.hdl.pipeline.span_shape`.
+        Span in `blysk.hdl.pipeline.span_shape`.
 
     Raises
     ------

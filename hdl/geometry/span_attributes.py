@@ -75,7 +75,7 @@ class SpanAttributesUnit(wiring.Component):
     pixels in one piece, and no pixel cut off at the long edge. They are offered `latency` cycles, 3, after
     their scanline was taken in. The unit adds shifted steps, modulo 4, and has no multipliers.
 
-    In the *serial* form one attribute after the other goes through the same adders, and its words through
+    In the *serial* form one attribute after the other goes through the same adders. Its words go through
     rings of registers. A scanline comes four times, each time with another attribute's plane. A scanline
     without pixels takes four cycles. A scanline with pixels takes four cycles for every two bits of ``p - 1``
     and n. `latency` is 6, counted from the fourth time. A piece also waits until the piece before it has been
@@ -106,7 +106,7 @@ class SpanAttributesUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        No scanline is walked and no piece waits.
+        High while no scanline is walked and no piece waits.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """

@@ -12,7 +12,7 @@ __all__ = ["SpanClipUnit", "clipped_rows_shape"]
 
 
 def clipped_rows_shape() -> data.StructLayout:
-    """Shape of `ClippedRows.beats`: a scanline's pixels in the picture and pixels cut off, flags, the tag."""
+    """Shape of `ClippedRows.beats`: pixels in the picture, number of pixels cut off, flags, and the tag."""
     words = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length", "skip")}
     flags = {name: unsigned(1) for name in ("covered", "skips", "carry", "last")}
     return data.StructLayout(words | flags | tag_shape())

@@ -57,7 +57,7 @@ class SpanHalverUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        No piece is inside.
+        High while no piece is inside.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

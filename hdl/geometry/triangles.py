@@ -53,7 +53,7 @@ def tag_shape() -> dict:
 
 
 def frame_shape() -> data.StructLayout:
-    """Shape of `FrameSettings.codes`: borders of the picture, back faces by index, limit of a span."""
+    """Shape of `FrameSettings.codes`: borders of the picture, index in `BACK_FACES`, limit of a span."""
     borders = {name: signed(X_BITS) for name in ("left", "top", "right", "bottom")}
     return data.StructLayout(borders | {"back_faces": unsigned(2), "limit": unsigned(LIMIT_BITS)})
 

@@ -113,12 +113,12 @@ def exponent_of(used: Value) -> Value:
 
 
 def _smaller(model: VectorAdapter, code: Value) -> Value:
-    """A code with a margin to 1."""
+    """A code made smaller, so that it has a margin to 1."""
     return (code - (code >> model.margin_shift))[: len(code)].as_signed()
 
 
 def shift_of(model: VectorAdapter, shift: Value) -> Value:
-    """Places by which a vector is shifted. One less if it will turn, so that its length stays under 1."""
+    """Places by which a vector is shifted: one less if the vector will turn, so its length stays under 1."""
     return (shift - shift.any())[: len(shift)] if model.rotates else shift
 
 

@@ -238,7 +238,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return {"lost": lost} | {f"normal_{k}": normal for k, normal in enumerate(normals)}
 
     def _places(self, vector: Word) -> Word:
-        """Places of the shift, four bits. A bit above them tells whether there is a first 1 at this place."""
+        """Places of the shift, four bits. The bit above them tells whether a 1 comes to the top."""
         g, bits = self._graph, self.model.format.width - 1
 
         def ones(v):
@@ -317,7 +317,7 @@ def _component(code: Value, bits: int) -> Value:
 
 
 def _root_place(square: FixedValue) -> tuple[Value, Value]:
-    """``s'``, 20 bits, and whether s is 1 or more."""
+    """``s'`` in 20 bits, which is s or s/4, and whether the squared length s is 1 or more."""
     s = Value.cast(square.truncate(22))
     large = s[22:].any()
     return Mux(large, s[2:], s)[2:22], large

@@ -55,7 +55,7 @@ class VertexSortUnit(wiring.Component):
     grid : Grid
         Fraction bits of the coordinates.
     compact : bool
-        The compact style.
+        Whether the unit has the compact style.
 
     Members
     -------
@@ -131,8 +131,9 @@ class VertexSortUnit(wiring.Component):
 
         Returns the comparisons of `_PAIRS`. On the second cycle they compare the corners in the given order.
 
-        First corners 0 and 1, then 1 and 2, then 0 and 1 again. All three pairs are compared on the first
-        cycle, before any exchange. The exchanges so far decide which comparison the next exchange needs.
+        Corners 0 and 1 are exchanged first, then 1 and 2, then 0 and 1 again. All three pairs are compared on
+        the first cycle, before any exchange. The exchanges so far decide which comparison the next exchange
+        needs.
         """
         turn, same, other = (Signal(name=name) for name in ("turn", "same", "other"))
         # The sign bit of x is inverted, so that y and x together are one signed number.
@@ -198,7 +199,8 @@ class VertexSortUnit(wiring.Component):
                     m.d.sync += digits.eq(count)
 
     def _area(self, m, corners, tag, odd, digits, leaves, free, ends) -> tuple[Value, Value]:
-        """The second stage. Returns whether a triangle that has no area, or is culled, ends now.
+        """The second stage. Returns whether a triangle without area ends now, and whether a culled triangle
+        ends now.
 
         ``tag`` has the index of the material and whether the triangle is two-sided.
         """

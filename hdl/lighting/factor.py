@@ -13,7 +13,7 @@ __all__ = ["FactorUnit"]
 
 
 class FactorUnit(PipelinedUnit):
-    """``a S`` of a specular term S and a factor a. `Factor` is the bit-accurate model.
+    """Product ``a S`` of a specular term S and a factor a. `Factor` is the bit-accurate model.
 
     The diffuse term passes beside the product. The latency is 2 cycles (operands, product), the initiation
     interval 1. There is one multiplier of 17 by 17 bits, with registers before and after. Without a factor

@@ -54,7 +54,7 @@ class TriangleAssemblyUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        No range is being read, and no triangle waits.
+        High while no range is read and no triangle waits.
 
     Source: docs/theory/video.md#vertices; [T] figure 4.10.
     """

@@ -92,7 +92,7 @@ class VertexUnit(PipelinedUnit):
         )
 
     def _rows(self, name: str, vector: Word, row: int, finish) -> Word:
-        """``finish`` of the sum of the products of a row of a matrix."""
+        """Multiply a matrix's row and a vector, sum the products, and apply ``finish``."""
         g, matrix = self._graph, name.split("_")[0]
         products = [
             g.multiply(
@@ -211,7 +211,7 @@ class VertexUnit(PipelinedUnit):
 
 
 def _component(partial: FixedValue, last: FixedValue) -> FixedValue:
-    """A component of a unit vector from a sum, -ONE to ONE."""
+    """A component of a unit vector from a sum, clipped to -ONE and ONE."""
     value = (partial + last).round_half_up(COMPONENT.fraction_bits)
     code = Value.cast(value)
     clipped = Mux(code > ONE, ONE, Mux(code < -ONE, -ONE, code))
