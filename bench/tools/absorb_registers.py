@@ -41,8 +41,7 @@ class Absorbed:
     removed : int
         Removed flip-flops. A flip-flop with another reader stays.
     inverters : int
-        Added look-up tables, one for each enable that flip-flops used inverted. Multipliers cannot invert an
-        enable.
+        Added look-up tables that invert an enable. Flip-flops can invert an enable, multipliers cannot.
     closed : int
         Multipliers with registers for both operands and the product.
     words : int
@@ -101,7 +100,7 @@ class _Netlist:
         return bit
 
     def connect(self, cell: str, port: str, bit: Any) -> None:
-        """Connect a port of one bit, which may have been connected."""
+        """Connect a port of one bit. An earlier connection of the port is replaced."""
         for old in self.cells[cell]["connections"].get(port, ()):
             self.pins[old].discard((cell, port, 0))
         self.cells[cell]["connections"][port] = [bit]
@@ -141,7 +140,7 @@ class _Netlist:
         return _Control(clock, enable, mode["CEMUX"] == "INV")
 
     def enable_of(self, control: _Control) -> Any:
-        """Net that is high while a register of this control is enabled, with a new inverter if needed."""
+        """Net that is high while a register of this control is enabled. An inverter is added if needed."""
         if not control.inverted:
             return control.enable
         if control.enable not in self.inverted:
@@ -162,7 +161,10 @@ class _Netlist:
         return self.inverted[control.enable]
 
     def use(self, cell: str, register: str, control: _Control) -> None:
-        """Switch on a register of a multiplier, with its first clock and an equal or free enable input."""
+        """Switch on a register of a multiplier.
+
+        The register gets the first clock, and an enable input that is free or has the same enable already.
+        """
         multiplier, enable = self.cells[cell], self.enable_of(control)
         names = [f"CE{k}" for k in range(4)]
         free = [name for name in names if multiplier["connections"].get(name, [enable]) == [enable]]
@@ -184,7 +186,7 @@ class _Netlist:
     def fits(self, cell: str, controls: set[_Control | None]) -> _Control | None:
         """Common control of a register's bits.
 
-        ``None`` if the bits differ in it, or the clock does not fit.
+        ``None`` if the bits have different controls, or if the multiplier already uses another clock.
         """
         if len(controls) != 1:
             return None
@@ -193,7 +195,10 @@ class _Netlist:
         return control if control is not None and clock in (None, ["0"], ["x"], [control.clock]) else None
 
     def absorb_product(self, cell: str) -> bool:
-        """Move the flip-flops behind a multiplier into it, if nothing else reads the product."""
+        """Move the flip-flops behind a multiplier into it, if nothing else reads the product.
+
+        Returns whether they were moved.
+        """
         moved: dict[str, str] = {}
         for k in range(_PRODUCT_BITS):
             bit = self.net(cell, f"P{k}")
@@ -232,9 +237,10 @@ class _Netlist:
         return sources.pop() if low & 1 and not high & 1 else None
 
     def absorb_word(self, cell: str, ports: str) -> bool:
-        """Move the flip-flops behind a block RAM's read word into it, if their enable is the read port's.
+        """Move the flip-flops behind a read port of a block RAM into the block RAM.
 
-        With equal enables it does not matter whether the read port's enable also acts on its output register.
+        They move only if they have the enable of the read port. Then it does not matter whether this enable
+        also acts on the output register inside. Returns whether they were moved.
 
         Parameters
         ----------
@@ -293,7 +299,7 @@ class _Netlist:
         found: dict[str, str] = {}
         for k in range(_OPERAND_BITS):
             bit = self.net(cell, f"{operand}{k}")
-            # A register of a constant 1 would not have it on the first cycle.
+            # A register of a constant 1 would be 0 on the first cycle.
             if bit in ("0", "x"):
                 continue
             if bit not in self.by_output:
@@ -325,7 +331,7 @@ class _Netlist:
             for port, name in found.items():
                 self.connect(cell, port, self.net(name, "DI"))
             self.use(cell, f"INPUT{operand}", control)
-        # One may be before both.
+        # A flip-flop may be before both operands.
         for name in {name for _, found in beside.values() for name in found.values()}:
             if self.pins[self.net(name, "Q")] == {(name, "Q", 0)}:
                 self.remove(name)
@@ -354,9 +360,9 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     Returns
     -------
     netlist : dict
-        Netlist whose multipliers use ``REG_INPUTA``, ``REG_INPUTB`` and ``REG_OUTPUT``, with clock ``CLK0``,
-        enables ``CE0`` to ``CE2`` and the constant 0 at reset ``RST0``; whose block RAMs use ``REGMODE`` and
-        ``OCE``; and whose chains have no unread ``COUT`` at the end.
+        The changed netlist. Its multipliers use ``REG_INPUTA``, ``REG_INPUTB`` and ``REG_OUTPUT``, with clock
+        ``CLK0``, enables ``CE0`` to ``CE2``, and the constant 0 at reset ``RST0``. Its block RAMs use
+        ``REGMODE`` and ``OCE``. Its carry chains have no unread ``COUT`` at the end.
     absorbed : Absorbed
         Counts of the moved registers.
     """

@@ -1,7 +1,8 @@
 """The table of the units: errors, latency, interval and cost of each variant.
 
-``blysk blocks`` prints it, from the records of `blysk.bench.units`. Errors come from the bit-accurate models
-and float64 mathematics. Times come from the units or a simulation of the units. Parts come from the netlists.
+``blysk blocks`` prints the table, from the records of `blysk.bench.units`. Errors come from the bit-accurate
+models and float64 mathematics. Latency and interval come from the units or from a simulation. Parts come from
+the netlists.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +35,7 @@ __all__ = [
 ]
 
 _CHUNK = 1 << 17
-"""Number of samples measured at once. It bounds the memory."""
+"""Number of samples that are measured at a time. It bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,10 @@ class Row:
 
 
 def _times(entry: Entry, unit: Component) -> tuple[int, int]:
-    """Latency, and cycles from a result to the next. The unit states them, else a simulation finds them."""
+    """Latency, and cycles from a result to the next.
+
+    If the unit does not state them, a simulation finds them.
+    """
     variant, latency = entry.variant, getattr(unit, "latency", None)
     interval = getattr(unit, "initiation_interval", getattr(unit, "cycles_per_pixel", None))
     if isinstance(latency, int) and isinstance(interval, int):
@@ -176,16 +180,16 @@ def rows(
     samples : int
         Approximate number of random operands, 40 or more.
     seed : int
-        Seed of the operands. Every entry starts from it, so that a line does not depend on the others.
+        Seed of the operands. Every entry starts from this seed, so a line does not depend on other lines.
     jobs : int
-        Number of processes. It does not change the lines or their order.
+        Number of processes. This number does not change the lines or their order.
     """
     if jobs == 1 or len(entries) < 2:
         for entry in entries:
             yield _row(entry, samples, seed)
         return
     with local_executor(min(jobs, len(entries))) as pool:
-        # The name is sent, because some records cannot be sent to a process.
+        # A process gets the names, because some records cannot be sent to it.
         waiting = [pool.submit(_found, e.record.name, e.name, samples, seed) for e in entries]
         for entry, found in zip(entries, waiting, strict=True):
             yield Row(entry, *found.result())
@@ -220,7 +224,7 @@ def sample_of(entry: Entry, samples: int = SAMPLES, seed: int = SEED) -> Sample:
 
 
 def row_of(entry: Entry, sample: Sample | None) -> Row:
-    """Row of an entry and its measured errors. ``None``: without errors."""
+    """Row of an entry and its measured errors. Without a sample the row has no errors."""
     count, errors = (0, (None, None, None)) if sample is None else (np.size(sample.found), sample.errors)
     unit = entry.variant.unit()
     return Row(entry, count, errors, *_times(entry, unit), cost_of(unit))

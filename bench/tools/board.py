@@ -2,9 +2,9 @@
 
 Both use the same top module, `GpuUnit`. It draws the turning mesh from block RAM in bands, and sends them to
 a monitor at 640x480 and 60 Hz. For a bitstream the top gets the board's pins and a PLL. Tools that pip
-installs map, place and route it. The reached clock rates are compared with the needed rates, and the
-bitstream is read back. In simulation the output cells are our models. The bits of the four lanes are decoded
-as in a monitor, and the frames are compared with the frames of the bit-accurate model.
+installs map, place and route the top. The reached clock rates are compared with the needed rates, and the
+bitstream is read back. In a simulation, models replace the output cells. The bits of the four lanes are
+decoded as in a monitor, and the frames are compared with the frames of the bit-accurate model.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -63,14 +63,14 @@ def planned(
     Parameters
     ----------
     board, mesh, given, colours
-        As for `gpu_of`.
+        As in `gpu_of`.
     clock : float
         Rate of the drawing clock, MHz.
 
     Raises
     ------
     InputError
-        As `gpu_of`. Also if no PLL gives the clocks, or a frame takes longer than the display leaves.
+        As in `gpu_of`. Also if no PLL gives the clocks, or a frame takes longer than the display leaves.
     """
     gpu, scenes = gpu_of(board, mesh, given, colours)
     try:
@@ -82,7 +82,7 @@ def planned(
 
 
 def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
-    """The bitstream of a drawing, see `build`. Its steps are shown."""
+    """The bitstream of a drawing, made by `build`. The steps are shown."""
     rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
     with steps() as show_step:
         top = BoardTop(board, GpuUnit(gpu), plan)
@@ -111,7 +111,7 @@ def figures_of(built: Built) -> dict[str, Any]:
 
 
 def design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator[str]:
-    """Lines on the design: board, mesh, shading, display, clocks."""
+    """Lines about the design: board, mesh, shading, display, clocks."""
     drawing, buffer = gpu.drawing, gpu.buffer
     yield f"{'board':<12}{board.name}"
     yield (
@@ -149,7 +149,10 @@ def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
 def simulated(
     board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
 ) -> dict[str, Any]:
-    """Simulate and write frames, compare them with the model's and the exact frame, and return figures."""
+    """Simulate frames, write them, and compare them with the frames of the model and the exact frame.
+
+    Returns figures of the frames.
+    """
     paths = [folder / f"frame-{number:04}.png" for number in range(1, count + 1)]
     made = not folder.exists()
     try:
@@ -194,7 +197,7 @@ def simulated(
 
 
 def toggled(board: Board, gpu: Gpu, plan: ClockPlan, count: int) -> dict[str, int]:
-    """Toggled register bits a frame, of the drawing and of the display. They are also printed."""
+    """Register bits that toggle in a frame, of the drawing and of the display. They are also printed."""
     rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
     top = ToggleCounter(OneClock(GpuUnit(gpu), rate))
     counts = show(top, gpu.buffer.mode, count).status
@@ -214,12 +217,15 @@ def _toggles_line(counted: Mapping[str, int]) -> str:
 
 
 def _busy(gpu: Gpu, shown: Shown) -> float:
-    """Mean busy cycles of drawing a frame, from all begun bands. Cycles without a request do not count."""
+    """Mean cycles in which the drawing is busy with a frame, from all begun bands.
+
+    Cycles without a request do not count.
+    """
     return shown.status["busy"] / max(shown.status["bands"], 1) * gpu.drawing.bands
 
 
 def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected: np.ndarray) -> Iterator[str]:
-    """Lines on a simulation: frames, cycles, errors.
+    """Lines about a simulation: frames, cycles, errors.
 
     Parameters
     ----------
@@ -253,7 +259,7 @@ def shown_lines(gpu: Gpu, scene: Scene, plan: ClockPlan, shown: Shown, expected:
 
 
 def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
-    """One line that says by how much frames are too heavy for the display. Empty if none is too heavy."""
+    """A line that says by how much frames are too heavy for the display. Empty if no frame is too heavy."""
     late = shown.status["late_bands"]
     if not late:
         return ""
@@ -264,7 +270,7 @@ def too_heavy(gpu: Gpu, plan: ClockPlan, shown: Shown) -> str:
 
 
 def built_lines(built: Built) -> Iterator[str]:
-    """Lines on a bitstream: used and available parts, reached and needed clock rates."""
+    """Lines about a bitstream: used and available parts, reached and needed clock rates."""
     for name, (used, available) in built.parts.items():
         yield f"{name:<16}{used:>7,} of {available:,}"
     for clock in built.clocks:
@@ -272,11 +278,14 @@ def built_lines(built: Built) -> Iterator[str]:
         rates = f"{clock.reached:7.1f} MHz of {clock.needed:.1f} needed"
         yield f"{clock.name:<16}{rates}, {verdict}; {clock.path}"
     if built.closed:
-        yield f"{built.closed} multipliers have registers on both sides. Paths between these are not timed."
+        yield (
+            f"{built.closed} multipliers have registers on both sides. Paths between these registers are "
+            "not timed."
+        )
 
 
 def missed(built: Built) -> str:
-    """One line on the clock that is missed by the largest factor. Empty if all clocks are met."""
+    """A line about the clock that is missed by the largest factor. Empty if all clocks are met."""
     clock = min(built.clocks, key=lambda clock: clock.reached / clock.needed)
     if clock.met:
         return ""

@@ -1,4 +1,4 @@
-"""Bitstreams: a board's top through Yosys, nextpnr and ecppack, with its pins, and the reached clocks."""
+"""Makes the bitstream of a board's top by Yosys, nextpnr and ecppack, and reads the reached clock rates."""
 
 import contextlib
 import json
@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 PERIODS = 1
-"""Periods of the reader's clock that a path between two clocks may take. Crossing words stay longer."""
+"""Periods of the reader's clock that a path between two clocks may take. The words on it stay longer."""
 
 _LIBRARY = """\
 read_verilog -lib -specify +/lattice/cells_sim_ecp5.v
@@ -34,10 +34,11 @@ read_verilog -lib +/lattice/cells_bb_ecp5.v
 """
 
 _FEWEST = 16
-"""Least number of registers of an enable or a reset. With fewer it becomes logic before the registers.
+"""Least number of registers with the same enable or reset.
 
-Each tile has few wires for enables. On a nearly full 25F at least 865 wires were used twice with all enables,
-and 7 with this limit, both without `_SETTINGS`.
+An enable or reset of fewer registers becomes logic before the registers. Each tile has few wires for enables.
+On a nearly full 25F at least 865 wires were used twice with all enables, and 7 wires with this limit. Both
+figures are without `_SETTINGS`.
 """
 
 _LEGALISE = f"""\
@@ -54,12 +55,12 @@ If wires are scarce, nextpnr's other router removes as many wires as it lays. On
 """
 
 _ROUNDS, _FEW = 100, 10
-"""Rounds of the router after which it may be given up, and least number of wires used twice to give up."""
+"""The router may be given up after `_ROUNDS` rounds, if it uses `_FEW` or more wires twice."""
 
 _SETTINGS = {"router2/currCongWeightMult": "0.2"}
-"""Settings of nextpnr, put into the netlist: the cost of a wire that is used twice grows by this each round.
+"""Settings of nextpnr in the netlist. The cost of a wire that is used twice grows by this in each round.
 
-By default the cost is constant. If wires are scarce, a few hundred wires then stay in use twice.
+By default the cost is constant. If wires are scarce, a few hundred wires are then used twice to the end.
 """
 
 _PARTS = {
@@ -69,7 +70,7 @@ _PARTS = {
     "block RAMs": "DP16KD",
     "PLLs": "EHXPLLL",
 }
-"""Counted parts, with nextpnr's names."""
+"""Counted parts, and their names in nextpnr's report."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Clock:
 
     @property
     def met(self) -> bool:
-        """Whether it is fast enough."""
+        """Whether the reached rate is at least the needed rate."""
         return self.reached >= self.needed
 
 
@@ -104,17 +105,17 @@ class Built:
     Parameters
     ----------
     parts : dict of str to (int, int)
-        Used and available, by name.
+        Used and available number of each part, by name.
     clocks : tuple of Clock
         Every clock of the design.
     closed : int
-        Multipliers with registers inside on both sides, between which nextpnr does not time.
+        Multipliers with registers inside on both sides. nextpnr does not time paths between these registers.
     seed : int
         Seed of the placement.
     bitstream : bytes
         Bitstream that the FPGA loads.
     words : int
-        Number of equal memory words read back from the bitstream.
+        Number of memory words that were read back from the bitstream. All of them were equal.
     """
 
     parts: dict[str, tuple[int, int]]
@@ -126,7 +127,9 @@ class Built:
 
 
 def _script(draw: float) -> str:
-    """Yosys's commands for a drawing clock in MHz, as for a unit, with the cells of pins and PLL.
+    """Yosys's commands for a drawing clock of ``draw`` MHz.
+
+    They are the commands for a unit, with cells of pins and PLL and with these changes.
 
     Small enables become logic. Multiplexers that join two look-up tables are not used. Both tables would have
     to be placed side by side, and few tables are saved (20,101 instead of 20,150 on a 25F, with 1,336
@@ -145,7 +148,7 @@ def _script(draw: float) -> str:
 def _stuck(said: str) -> str:
     """Reason why the router will not end, from its log. Empty while it may end.
 
-    In all runs that ended, twice the rounds at least halved the number of wires used twice.
+    In all runs that ended, the number of wires used twice at least halved while the rounds doubled.
     """
     twice = [int(number) for number in re.findall(r"^Info:\s+iter=\d+ wires=\d+ overused=(\d+)", said, re.M)]
     if len(twice) >= _ROUNDS and twice[-1] >= _FEW and 2 * min(twice) > twice[len(twice) // 2]:
@@ -165,7 +168,7 @@ def build(
     seeds: int = 1,
     progress: Callable[[str], object] = lambda step: None,
 ) -> Built:
-    """Make the bitstream of a top that requests its pins of the platform.
+    """Make the bitstream of a top that requests its pins from the platform.
 
     Parameters
     ----------
@@ -174,7 +177,7 @@ def build(
     top : Elaboratable
         The top, which makes its clock domains itself.
     rates : dict of str to float
-        Clock rates of its PLL in MHz, by domain.
+        Clock rates of the top's PLL in MHz, by domain.
     seeds : int
         Largest number of placements to try until every clock is met. If none meets all, the result is the
         best placement.
@@ -186,7 +189,7 @@ def build(
     InputError
         If a tool is missing.
     TooLarge
-        If it does not fit the device.
+        If the design does not fit the device.
     GivenUp
         If no placement can be routed.
     ToolError
@@ -252,11 +255,11 @@ def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
     Raises
     ------
     TooLarge
-        If it takes more of a part than the device has. The message names all these parts.
+        If the netlist takes more of a part than the device has. The message names all these parts.
     """
     kinds = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
     counts = {
-        # A carry cell takes two look-up tables, a memory of 16 words takes four.
+        # A carry cell takes two look-up tables. A memory of 16 words takes four.
         "look-up tables": kinds["LUT4"] + 2 * kinds["CCU2C"] + 4 * kinds["TRELLIS_DPR16X4"],
         "flip-flops": kinds["TRELLIS_FF"],
         "block RAMs": kinds["DP16KD"],
@@ -322,7 +325,7 @@ def _described(path: Sequence[Mapping[str, Any]], delay: float) -> str:
 
 
 def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
-    """Make ``top.bit`` of a configuration in text, read it back, and compare.
+    """Make ``top.bit`` from a configuration in text, read it back, and compare.
 
     The read-back text may name settings differently, because several names stand for one bit. So the text is
     packed again, and must give the same bytes. The contents of memories are compared directly.

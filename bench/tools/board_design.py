@@ -1,4 +1,4 @@
-"""Design of a board: a scene with its presets for the buttons, and the top with the board's pins."""
+"""Design for a board: a scene, its presets for the buttons, and the top component with the board's pins."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -41,17 +41,17 @@ __all__ = ["BoardTop", "gpu_of", "least_cycles"]
 _COMPACT_INTERVAL = 9
 """Setup interval on a small device.
 
-With it ``renormalise`` takes 2 multipliers fewer than with interval 3.
+With this interval ``renormalise`` takes 2 multipliers fewer than with interval 3.
 """
 
 MAX_LIGHTS = 4
 """Largest number of lights of a board's scene."""
 
 _SHINIER = 4
-"""Factor of the second material's exponent over the first's."""
+"""Exponent of the second material, as a multiple of the exponent of the first material."""
 
 _RENDERER_BLOCKS = 19
-"""Block RAMs, as placed, of the renderer's tables and buffers, of command lists and of motion."""
+"""Block RAMs, in a placed design, of the renderer's tables and buffers, command lists and motion."""
 
 _TRANSFER_BLOCKS = 2
 """Block RAMs of the table of sRGB, with a port for each channel."""
@@ -63,8 +63,8 @@ def gpu_of(
     """The drawing of a mesh on a board, and the scenes of its presets.
 
     The presets combine two materials with two positions of the lights. The materials are the given material,
-    and the same with four times the exponent. The lights are as given, or turned by a quarter around the
-    upright.
+    and the same material with four times the exponent. The lights are the given lights, or the given lights
+    turned by a quarter around the up direction.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def gpu_of(
     given : dict
         Options of `OPTIONS`.
     colours : str, optional
-        One of `COLOURS`; by default ``rgb888``, on a small device ``rgb565``.
+        A key of `COLOURS`. The default is ``rgb888``, and ``rgb565`` on a small device.
 
     Raises
     ------
@@ -126,12 +126,12 @@ def _design(settings: Settings, scene: Scene, board: Board) -> ShadingPipeline:
 
 
 def _presets(scene: Scene, up: Any) -> list[Scene]:
-    """Presets: two positions of the lights, each with two materials. The material changes first."""
+    """Presets: two positions of the lights, each with two materials. The materials change first."""
     shiny = tuple(
         replace(material, exponent=min(_SHINIER * material.exponent, MAX_EXPONENT))
         for material in scene.materials
     )
-    # A light may lie along the upright. Turned, it stays where it is.
+    # A light along the up direction does not change when it is turned.
     quarter = Rotation.from_rotvec(np.pi / 2 * normalise(up))
     lights = tuple(light.turned(quarter.apply) for light in scene.lights)
     return [

@@ -11,8 +11,10 @@ COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 _LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
 
 DEFAULTS = {"triangles": 1000, "back_faces": "cull", "transfer": "linear"}
-"""Defaults that differ from the defaults of a rendering. The table of sRGB takes two block RAMs, and the
-bitstream for the ULX3S-25F leaves one free.
+"""Defaults that differ from the defaults of a rendering.
+
+The transfer is linear because the table of sRGB takes two block RAMs. The bitstream for the ULX3S-25F leaves
+only one block RAM free.
 """
 
 _METHOD = (
@@ -26,5 +28,5 @@ OPTIONS = {
 }
 """Options of the command, with the defaults in its help.
 
-The size is the display's size, and the camera has perspective.
+There is no option for size and projection: a board has the display's size, and a camera with perspective.
 """

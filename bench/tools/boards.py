@@ -25,21 +25,21 @@ class Board:
     options : tuple of str
         Options of nextpnr: device, package, speed grade.
     reference : int
-        Rate of its clock, Hz.
+        Rate of the board's clock, Hz.
     buttons : tuple of (str, int)
-        Name and number of up to six button resources. The top gives each its meaning.
+        Names and numbers of up to six button resources, in the order of the drawing's inputs.
     luts, block_rams, multipliers : int
-        Parts of the device. It has as many flip-flops as look-up tables.
+        Parts of the device. There are as many flip-flops as look-up tables.
     lines : int
-        Lines of a band, by the memory of the device.
+        Lines of a band. The memory of the device limits this number.
     loader : str
         Name of the board for openFPGALoader.
     compact : bool
-        Whether the device is small. It then gets geometry of compact style, and setup interval 9 for methods
-        that have it.
+        Whether the device is small. A small device gets geometry of compact style. It gets setup interval 9
+        if the method has this interval.
     known : str
-        Known facts on the bitstream of its default design, with commits. The command prints them before a
-        build, and the guide's table is made from them.
+        Facts about the bitstream of the board's default design, with commits. The command prints them before
+        a build. The guide's table is made from them.
     """
 
     name: str

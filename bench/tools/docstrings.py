@@ -15,20 +15,20 @@ __all__ = [
 
 
 def inline(text: str) -> str:
-    """A text as Markdown: literals in backticks, and characters of Markdown's syntax escaped."""
+    """A text as Markdown. Literals get backticks, and characters of Markdown's syntax are escaped."""
     parts = re.split(r"(``.+?``|:\w+:`[^`]+`|`[^`]+`)", text)
     for k, part in enumerate(parts):
         if k % 2:
             parts[k] = "`" + re.sub(r"^:\w+:", "", part).strip("`") + "`"
         else:
-            # Stars that multiply. Stars of emphasis stay.
+            # Stars that multiply are escaped. Stars of emphasis stay.
             part = re.sub(r"([<\\])", r"\\\1", part)
             parts[k] = re.sub(r"(?<=\w)\*(?=\w)|(?<=\s)\*(?=\s)", r"\\*", part)
     return "".join(parts)
 
 
 def _table(lines: Sequence[str]) -> list[str]:
-    """A table with columns marked by runs of ``=``, as a table of Markdown."""
+    """A table in Markdown, from a table whose columns are marked by runs of ``=``."""
     starts = [match.start() for match in re.finditer("=+", lines[0])]
     spans = list(pairwise([*starts, None]))
     rules = [k for k, line in enumerate(lines) if set(line.strip()) <= {"=", " "}]
@@ -70,9 +70,9 @@ def markdown(text: str) -> str:
     Parameters
     ----------
     text : str
-        Cleaned docstring: paragraphs, lists, tables with ``=`` rules, numpydoc sections.
+        Cleaned docstring. It may have paragraphs, lists, tables with rules of ``=``, and numpydoc sections.
     """
-    # A literal stays on a line.
+    # A literal may not break into two lines.
     text = re.sub(r"``[^`]+``", lambda match: re.sub(r"\s*\n\s*", " ", match[0]), text)
     lines = text.splitlines()
     found: list[str] = []

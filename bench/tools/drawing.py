@@ -1,7 +1,7 @@
-"""Drawing of a structure: boxes in columns from left to right, arrows between them.
+"""Drawing of a structure: boxes in columns from left to right, and arrows between the boxes.
 
-A wide drawing is folded, with its columns in bands below each other. An arrow from band to band ends at a
-tag, and continues at a tag of the same number.
+A wide drawing is folded: its columns are in several bands, each below the band before. An arrow from band to
+band ends at a tag, and continues at a tag of the same number.
 """
 
 from collections import Counter, defaultdict
@@ -26,13 +26,14 @@ _WIDEST = 860.0
 _BETWEEN = 30.0
 """Approximate width between columns."""
 _FORMULAS, _LONGEST, _SHORT = 4, 40, 20
-"""Most formulas in a box, and most characters of a formula in a box and in a tag. A name replaces a longer
-formula.
+"""Largest number of formulas in a box, and of characters of a formula in a box and in a tag.
+
+A name replaces a longer formula.
 """
 _TAGS = 70.0
 """Approximate width that tags take on a side of a band."""
 _BAND = 6
-"""Number of cut arrows that weigh as much as a further band."""
+"""A further band costs as much as this number of cut arrows."""
 _FACES = {
     "input": "#ffffff",
     "output": "#ffffff",
@@ -49,7 +50,7 @@ _BACK = "#c0392b"
 
 @dataclass
 class _Place:
-    """A box, or a point that an arrow passes, in a column."""
+    """A box in a column, or a point in a column through which an arrow passes."""
 
     column: int
     width: float
@@ -82,7 +83,10 @@ class _Band:
 
 
 def _shown(operations: Counter[str]) -> Counter[str]:
-    """Operations as a box shows them. Constants are marked only at products, which need no multiplier."""
+    """Operations as a box shows them.
+
+    Constants are marked only at products, because a product by a constant needs no multiplier.
+    """
     shown: Counter[str] = Counter()
     for symbol, number in operations.items():
         shown["× const" if symbol == "×c" else symbol.removesuffix("c")] += number
@@ -130,7 +134,10 @@ def _size(node: Node) -> tuple[float, float]:
 
 
 def _spread(wanted: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Places of a column's boxes, in order, without overlap, as near as possible to wanted places."""
+    """Places of the boxes of a column, in their order, as near as possible to wanted places.
+
+    The boxes do not overlap.
+    """
     steps = np.r_[0.0, np.cumsum((heights[:-1] + heights[1:]) / 2 + _GAP)]
     blocks: list[list[float]] = []
     for value in wanted - steps:
@@ -143,7 +150,7 @@ def _spread(wanted: np.ndarray, heights: np.ndarray) -> np.ndarray:
 
 
 class _Layout:
-    """Places of boxes, and of the points that arrows pass."""
+    """Places of boxes, and of the points through which arrows pass."""
 
     def __init__(self, band: _Band):
         graph, columns, back = band.graph, band.columns, band.back
@@ -211,7 +218,7 @@ class _Layout:
                 means = {}
                 for place, k in enumerate(order):
                     near = [position[o] for o in self._beside(k, beside)]
-                    # A box without a neighbour keeps its share of the column.
+                    # A box without a neighbour keeps its relative place in the column.
                     own = place / max(len(order) - 1, 1) * max(len(position) - 1, 0)
                     means[k] = float(np.mean(near)) if near else own
                 order.sort(key=means.__getitem__)
@@ -238,7 +245,7 @@ class _Layout:
                     self.places[k].y = float(y)
 
     def _close_gaps(self) -> None:
-        """Take out empty stripes, such as between parts that no arrow joins."""
+        """Take out empty horizontal stripes, for example between parts that no arrow joins."""
         shift, bottom = 0.0, -np.inf
         for place in sorted(self.places, key=lambda p: p.y - p.height / 2):
             top = place.y - place.height / 2
@@ -249,7 +256,7 @@ class _Layout:
 
     @property
     def width(self) -> float:
-        """Distance of the outermost sides."""
+        """Distance from the leftmost side of a box to the rightmost side."""
         return max(p.x + p.width / 2 for p in self.places) - min(p.x - p.width / 2 for p in self.places)
 
     def _set_columns(self) -> None:
@@ -263,7 +270,7 @@ class _Layout:
 
 
 def _cuts(graph: Graph, columns: dict[int, int]) -> list[int]:
-    """First columns of the bands, so that each is narrow enough and few arrows are cut."""
+    """First columns of the bands. Each band is narrow enough, and few arrows are cut."""
     last = max(columns.values()) + 1
     widths = np.zeros(last)
     for number, column in columns.items():
@@ -278,7 +285,7 @@ def _cuts(graph: Graph, columns: dict[int, int]) -> list[int]:
         found = []
         for start in range(end):
             width = widths[start:end].sum() + _TAGS * ((start > 0) + (end < last))
-            # A column that is too wide stands alone.
+            # A column that is too wide is a band of its own.
             if width <= _WIDEST or start == end - 1:
                 cost, starts = best[start]
                 found.append((cost + (cut[start] + _BAND) * (start > 0), [*starts, start]))
@@ -287,7 +294,7 @@ def _cuts(graph: Graph, columns: dict[int, int]) -> list[int]:
 
 
 def _bands(graph: Graph) -> list[_Band]:
-    """A graph's boxes in one band, or in several if one would be too wide."""
+    """The boxes of a graph in one band, or in several bands if one band would be too wide."""
     columns, back = layers(graph)
     whole = _Band(graph, columns, back)
     starts = _cuts(graph, columns)
@@ -332,7 +339,7 @@ def _bands(graph: Graph) -> list[_Band]:
 
 
 def draw_structure(graph: Graph) -> Figure:
-    """Draw boxes in columns from left to right, a register's distance apart.
+    """Draw boxes in columns from left to right, and the arrows between them.
 
     Parameters
     ----------
@@ -404,7 +411,7 @@ def _draw_arrows(axes, layout: _Layout) -> None:
             curve((x0 + 12, y0), (x0 + 12, high), (a.x, high))
             curve((x1 - 10, high), (x1 - 10, y1), (x1, y1))
         else:
-            # Within a column arrows keep their height, so that they do not pass other boxes of it.
+            # Within a column an arrow keeps its height, so it does not cross boxes of this column.
             x, y = column_right[a.column], y0
             vertices.append((x, y))
             codes.append(Path.LINETO)

@@ -18,7 +18,7 @@ __all__ = [
 
 
 _DEPTH = 1e-7
-"""Errors under this share of the largest are not drawn."""
+"""Errors smaller than this share of the largest error are not drawn."""
 
 _PUBLISHED = "total, as published"
 
@@ -61,7 +61,7 @@ def _distinct(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> lis
 
 
 def _with_published(measured: Sequence[_Measured]) -> list[tuple[_Measured, _Measured | None]]:
-    """Panels: each variant of the project with its form as published, if both exist."""
+    """Variants of a panel: a variant, and its form as published if there is one."""
 
     def parts(label):
         return set(label.split(", ")) - {"as published", "as_published", ""}
@@ -83,7 +83,7 @@ def _with_published(measured: Sequence[_Measured]) -> list[tuple[_Measured, _Mea
 def _intervals(
     logarithmic: bool, first: np.ndarray, low: float, high: float, bins: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds and middles of the intervals of an axis. ``first`` are operands of a variant."""
+    """Bounds and middles of the intervals of an axis. ``first`` are the operands of the first variant."""
     if logarithmic:
         low = 1.0 if low == 0 and np.all(first == np.rint(first)) else max(low, 1e-3)
         edges = np.geomspace(low, high, bins + 1)
@@ -125,7 +125,7 @@ def draw_errors(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> F
             curves.append((_PUBLISHED, _curves_of(published.sample)[-1][1], published))
         for name, errors, of in curves:
             values = (_shares if decides else _envelope)(at[id(of)], errors, edges)
-            # Intervals between whole numbers are empty.
+            # With whole numbers as operands, some intervals are empty.
             has_any = ~np.isnan(values)
             values = values[has_any]
             # Errors near 0 would take up most of a logarithmic axis.
@@ -133,7 +133,7 @@ def draw_errors(entries: Sequence[Entry], samples: Sequence[Sample | None]) -> F
             (handles[name],) = panel.plot(middles[has_any], values, label=name, **_CURVES[name])
         if m.label:
             panel.set_title(m.label, fontsize=8)
-        # A picture with many panels has small panels.
+        # Many panels are small, so vertical lines are left out.
         panel.grid(True, axis="both" if len(panels) <= 8 else "y", color="#dddddd", linewidth=0.5)
     for panel in axes.flat[len(panels) :]:
         panel.set_visible(False)
@@ -181,7 +181,7 @@ _CURVES = {
 
 
 def _curves_of(sample: Sample) -> list[tuple[str, np.ndarray]]:
-    """Names of the curves of an entry, and the errors of every result. The last is the total error."""
+    """Names of the curves of an entry, and the errors of every result. The last curve is the total error."""
     found, exact = np.asarray(sample.found), np.asarray(sample.exact)
     if isinstance(sample, Decisions):
         return [("yes by mistake", (found > exact).ravel()), ("no by mistake", (found < exact).ravel())]

@@ -20,7 +20,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Parts:
-    """Parts of the FPGA that a netlist takes.
+    """Parts of an FPGA that a netlist takes.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ class Family:
     options : tuple of str
         Options of nextpnr.
     large : tuple of str
-        Further options, for designs of `_LARGE` look-up tables or more.
+        Further options for large designs.
     synthesis : str
-        Yosys's commands from a flat netlist to mapped cells, a line each.
+        Yosys's commands from a flat netlist to mapped cells, one on each line.
     look_up_tables : str
         Name of look-up tables in nextpnr's report.
     flip_flop, multiplier, block_ram, distributed_ram : str
@@ -70,14 +70,14 @@ class Family:
     untimed : str
         Pattern of the cells through which nextpnr times no paths: ``KIND``, or ``KIND.PARAMETER=VALUE``.
     registers : str
-        A sentence on registers inside multipliers.
+        Sentences about registers inside multipliers, for texts with figures.
     limit : float or None
-        Largest quoted clock rate, MHz, of a design with a multiplier with registers on both sides by
-        `absorb_registers`. nextpnr does not time the path between these registers. ``None``: registers stay
-        as Yosys leaves them.
+        `absorb_registers` puts registers into multipliers. nextpnr does not time a path between registers on
+        both sides of a multiplier. A design with a path of this kind is quoted with at most this clock rate,
+        MHz. ``None``: registers stay where Yosys leaves them.
     target : int
-        Target clock rate of nextpnr, MHz. If it is far above the rate that a design reaches, nextpnr's router
-        does not end.
+        Target clock rate of nextpnr, MHz. If the target is far above the rate that a design reaches,
+        nextpnr's router does not end.
     """
 
     device: str
@@ -111,10 +111,10 @@ ECP5 = Family(
         *("--25k", "--package", "CABGA381", "--speed", "6"),
         *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
     ),
-    # This placer brings registers nearer to their multipliers than the default placer. With hardly any
-    # logic it does not end. The router takes wires on slow paths up again.
+    # This placer brings registers nearer to their multipliers than the default placer. With very little
+    # logic it does not end. The second option lets the router route slow paths again.
     large=("--placer", "static", "--tmg-ripup"),
-    # Two registers on either side of a multiplier belong to this multiplier. So equal registers are not
+    # Two registers on each side of a multiplier belong to this multiplier. So equal registers are kept, not
     # merged. The mapper saves look-up tables on paths shorter than 2.5 ns. It estimates 0.3 ns for a wire.
     synthesis="""\
 scratchpad -set abc9.D 2500
@@ -183,7 +183,7 @@ class Place:
     seed : int
         Seed of the placement.
     fmax : float
-        Largest clock rate, MHz. At most `Family.limit` if a multiplier is closed.
+        Largest clock rate, MHz. It is at most `Family.limit` if ``closed`` is not 0.
     start, end : str
         Registers, or memories, at the ends of the slowest path.
     logic, routing : float
@@ -191,7 +191,7 @@ class Place:
     kinds : dict of str to int
         Number of cells of each kind on the slowest path.
     closed : int
-        Multipliers with registers inside on both sides. nextpnr does not time the path between these.
+        Multipliers with registers inside on both sides. nextpnr does not time paths between these registers.
     rerouted : bool
         Whether the target was out of reach, so that slow paths were not routed again.
     """
@@ -209,9 +209,9 @@ class Place:
 
 def signal_name(cell: str, family: Family) -> str:
     """Name of the register or memory that gives a cell its name."""
-    # nextpnr names the pieces of a cell by a `$` or `/` and a word.
+    # nextpnr adds `$` or `/` and a word to the name of a cell's piece.
     name = re.split(rf"_(?:{family.cells})_|(?<!^)[$/][A-Za-z]", cell)[0]
-    # The pieces of a memory, and the suffix by which Amaranth distinguishes equal names.
+    # Remove the numbers of a memory's piece, and the suffix that Amaranth adds to equal names.
     name = re.sub(r"\.\d+\.\d+$|\$\d+$", "", name)
     return name.removeprefix("unit.")
 

@@ -15,14 +15,15 @@ __all__ = ["Formulas"]
 class Formulas:
     r"""Formulas by the names of registers, from a unit's data flows and from its class.
 
-    The registers of a functional unit have the formulas of all operations on it. An operand's register has
-    the formulas of operands. Another register has the formulas of results, or the names of their words.
+    The registers of a functional unit have the formulas of all operations that share it. Its operand
+    registers have the formulas of the operands. Its other registers have the formulas of the results. A
+    result without a formula has the name of its word.
 
     Parameters
     ----------
     component : Component
-        A unit; its class may have a dictionary ``FORMULAS``: regular expressions of names of registers, and
-        formulas, in which ``\1`` stands for the first group.
+        A unit. Its class may have a dictionary ``FORMULAS`` from regular expressions to formulas. An
+        expression matches names of registers. In its formula ``\1`` stands for its first group.
     """
 
     def __init__(self, component: wiring.Component):
@@ -50,7 +51,7 @@ class Formulas:
             found[name].append(formula.text)
 
     def of(self, name: str) -> tuple[str, ...]:
-        """Formulas of a register. Empty if it has none."""
+        """Formulas of a register. Empty if the register has none."""
         for pattern, text in self._stated.items():
             if match := re.fullmatch(pattern, name):
                 return (match.expand(text),)

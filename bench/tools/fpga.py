@@ -1,22 +1,22 @@
 """Place and route: parts of an FPGA that a unit or the pipeline takes, and its clock rate.
 
-``blysk fpga`` prints it, from tools that pip installs. Yosys (package ``pyosys``) maps the netlist to the
-cells of a family of FPGAs. nextpnr (a package for each family) places and routes them on a device of the
-family in its slowest speed grade. This is out of context, so ports are no pins. Placement starts from a seed.
-The clock rate differs by a few per cent between seeds. There is a `Family` for Lattice's ECP5 and one for
-Nexus.
+``blysk fpga`` prints both. pip installs the tools. Yosys (package ``pyosys``) maps the netlist to the cells
+of a family of FPGAs. nextpnr (a package for each family) places and routes the cells on a device of the
+family in its slowest speed grade. nextpnr works out of context, so ports are not pins. Placement starts from
+a seed. The clock rate differs by a few per cent between seeds. There is a `Family` for Lattice's ECP5, and
+another for Nexus.
 
 Every port has a register before or behind it. So every path of the design lies between registers and is
 timed. These registers are not among the counted parts. The delay of reset is not counted.
 
-On ECP5 `absorb_registers` moves registers beside a multiplier into it, because Yosys does not. nextpnr times
-a multiplier with registers on one side in full, but not the path between registers on both sides. The clock
-rate of a design with such a multiplier is quoted up to `Family.limit`, and the design is named below the
-table.
+On ECP5 Yosys leaves registers beside a multiplier outside, and `absorb_registers` moves them into the
+multiplier. nextpnr then times paths through a multiplier with registers on one side. It does not time a path
+between registers on both sides. A design with this path is quoted with at most `Family.limit`, and is named
+below the table.
 
-On Nexus nextpnr times each stage of a multiplier, with its registers' clock-to-output and setup times. Yosys
-moves registers beside a multiplier into it. Only a multiplier with an adder inside has no delay, and is
-refused.
+On Nexus Yosys moves registers beside a multiplier into the multiplier. nextpnr times each stage of a
+multiplier, with clock-to-output and setup times of its registers. Only a multiplier with an adder inside has
+no delay. A design with it is refused.
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
@@ -86,7 +86,7 @@ def table_by_unit(name: str, units: Mapping[str, Parts], family: Family = ECP5) 
 
 
 def _aligned(lines: Sequence[Sequence[str]], left: Container[int]) -> str:
-    """Lines of words as columns. Columns of ``left`` are aligned left, the others right."""
+    """Lines of words as columns. Columns in ``left`` are aligned left, and other columns right."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
         " ".join(
@@ -119,7 +119,10 @@ def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
 
 
 def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """Variants of units by names. A name is a unit (all variants of `entries_shown`), or unit and variant."""
+    """Variants by names. A name of a unit stands for all of its variants in `entries_shown`.
+
+    A name of a unit and a variant stands for this variant.
+    """
     for name in names:
         entries = [entry for unit in UNITS for entry in entries_shown(unit)]
         found = [entry for entry in entries if name in (entry.title, entry.record.name)]
@@ -153,9 +156,9 @@ def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
 def pipelines_of(
     given: Mapping[str, Any], every: bool, build: Mapping[str, Any] | None = None
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
-    """The core by arguments of `design` and options of its build, with one method or every serving method.
+    """The core by arguments of `design` and options of its build, with the given method.
 
-    By default its pixels are linear light.
+    With ``every`` there is a core for every method that serves this core. The default transfer is linear.
 
     Raises
     ------
@@ -174,12 +177,12 @@ def pipelines_of(
 
 
 def about(family: Family) -> dict[str, Any]:
-    """Device, its parts and the tools' versions, for the JSON file; `InputError` if a tool is missing."""
+    """Device, its parts and the tools' versions, for the JSON file. `InputError` if a tool is missing."""
     return {"device": family.device, "capacity": asdict(family.capacity), "tools": versions_of(family)}
 
 
 def count_by_unit(designs: Designs, family: Family, inside: bool, figures: str | None) -> None:
-    """Print the parts of each unit inside of designs, as mapped; parameters as for `place`."""
+    """Print the parts of each unit inside the designs, before placement. Parameters are as in `place`."""
     found = {
         name: parts_by_unit(unit(), family, inside)
         for name, unit in progress(designs, total=len(designs), unit="designs")
@@ -200,7 +203,7 @@ def place(designs: Designs, family: Family, seeds: int, jobs: int, inside: bool,
     family : Family
         The FPGA, and its target clock rate.
     seeds, jobs, inside
-        As for `lay_out`.
+        ``seeds``, ``jobs`` and ``absorb`` of `lay_out`.
     figures : str or None
         JSON file for every figure.
 

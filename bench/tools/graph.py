@@ -80,7 +80,7 @@ class Graph:
         return sources, targets
 
     def keep(self, numbers: Iterable[int]) -> None:
-        """Drop all other boxes."""
+        """Keep the boxes with these numbers, and drop all other boxes."""
         numbers = set(numbers)
         self.nodes = {number: node for number, node in self.nodes.items() if number in numbers}
         self.edges = {edge: data for edge, data in self.edges.items() if numbers.issuperset(edge)}
@@ -109,7 +109,7 @@ class Graph:
 
 
 def layers(graph: Graph) -> tuple[dict[int, int], set[tuple[int, int]]]:
-    """Column of each box, and the arrows that lead back.
+    """Column of each box, and the arrows that lead back to an earlier column.
 
     Returns
     -------
@@ -165,7 +165,7 @@ _LIKENESS_DEPTH = 8
 
 
 def likeness(graph: Graph) -> str:
-    """A text that is equal for graphs that differ only in widths, registers' names and constants."""
+    """A text of a graph. Graphs that differ only in widths, names of registers and constants share it."""
     labels = {
         number: repr(
             (

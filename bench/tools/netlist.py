@@ -76,7 +76,10 @@ def _fields(name: str, shape) -> list[tuple[str, str, int, int]]:
 
 
 def _ports(component: wiring.Component) -> list[tuple[str, bool, str, object]]:
-    """Net, direction (true: input), name and shape of every member, without valid and ready."""
+    """Net, direction, name and shape of every member, without valid and ready.
+
+    The direction is true for an input.
+    """
     ports = []
     for name, member in component.signature.members.items():
         is_input = member.flow == wiring.In
@@ -299,7 +302,7 @@ class Netlist:
 
 
 def _parts(word: tuple[int, ...], names: dict[tuple, list[str]]) -> list[tuple[str, int, int]]:
-    """Name, offset and width of a register's fields, or of the whole register if it has none."""
+    """Name, offset and width of a register's fields. A register without fields is its only field."""
     whole = _short(names[word])
     stems = {f"{name}." for name in names[word]}
     found = {}

@@ -1,6 +1,6 @@
 """Pages of units: function, ports and variants of each, and drawings of structure, timing and errors.
 
-``blysk pages`` writes them, from the records of `blysk.bench.units`. Text comes from the docstrings of the
+``blysk pages`` writes the pages, from the records of `blysk.bench.units`. Text comes from docstrings of the
 unit and its bit-accurate model. Figures come from the table of the units. Drawings come from the netlist, a
 simulation and the measured errors. The list of tests comes from the stimuli of the record.
 """
@@ -72,13 +72,13 @@ def _title(unit: str) -> str:
 def _component(unit: str) -> wiring.Component:
     """A unit in its first variant, to read its ports."""
     component = entries_shown(unit)[0].variant.unit()
-    # A unit that nothing elaborates gives a warning.
+    # Amaranth warns of a component that is never elaborated.
     Fragment.get(component, None)
     return component
 
 
 def _model(unit: str) -> type | None:
-    """Class of the bit-accurate model, if the unit has one of its own."""
+    """Class of the bit-accurate model. ``None`` if the unit has no model of the same name."""
     component = _component(unit)
     model = type(getattr(component, "model", None))
     return model if model.__name__ == type(component).__name__.removesuffix("Unit") else None
@@ -103,7 +103,7 @@ def _files(unit: str, folder: Path) -> str:
 
 
 def _with_links(text: str, folder: Path) -> str:
-    """A text of Markdown whose citations of the theory are links."""
+    """A text in Markdown. Its citations of the theory become links."""
     return re.sub(r"docs/theory/\w+\.md(#[\w-]+)?", lambda cited: _link(cited[0], cited[0], folder), text)
 
 
@@ -315,7 +315,11 @@ def _tests(record: Record) -> list[str]:
     lines += [f"    {test_command(record.name)}", ""]
     lines += [*markdown_table(("stimulus", "cases covered", "beats or pixels", "stalls", "run"), rows), ""]
     if record.waivers:
-        lines += ["Signals at which a fault may stay unseen:", ""]
+        lines += [
+            "Signals at which a fault may stay unseen. Some faults invert a bit only while another bit of "
+            "the same word, the *controlling bit*, has a certain value:",
+            "",
+        ]
         lines += [
             *markdown_table(("signal", "reason"), [(f"`{s}`", why) for s, why in record.waivers.items()])
         ]
@@ -354,7 +358,7 @@ def pictures(unit: str, rows: Sequence[Row], samples: Sequence[Sample | None]) -
             yield f"{unit}-structure{suffix}.svg", svg(draw_structure(_graph(unit, numbers[0])))
         for suffix, (row, *_) in _timings(rows):
             entry, component = row.entry, row.entry.variant.unit()
-            # A unit of one result a beat needs no operands to show its times.
+            # A unit with a result for each beat shows its latency and interval with any operands.
             alone = entry.variant.beat or isinstance(component, PipelinedUnit)
             example = None if alone else entry.record.example(entry.name, component)
             waves = waves_of(component, entry.variant.beat, example)
@@ -376,7 +380,8 @@ def index_page(folder: Path) -> str:
         "",
         f"Each unit has a page, {MADE} from the code. Text comes from the docstrings, figures are those of "
         "`blysk blocks`, and drawings come from netlists and simulations. The units are in the order in "
-        "which a span passes through them. Of units with the same function a pipeline has a single unit.",
+        "which a span passes through them. If several units have the same function, a pipeline has only one "
+        "of them.",
     ]
     if "pipeline" in RECORDS:
         lines += ["", "[![Structure of the pipeline](pipeline-structure.svg)](pipeline.md)"]
@@ -411,8 +416,8 @@ def write_pages(
     Parameters
     ----------
     folder : Path
-        Folder of the pages, such as ``docs/blocks``. It is made if there is none. Links lead from there to
-        the files of the project.
+        Folder of the pages, such as ``docs/blocks``. The folder is made if it does not exist. Links lead from
+        the folder to the files of the project.
     units : sequence of str
         Keys of `RECORDS`.
     samples : int
@@ -426,7 +431,7 @@ def write_pages(
         If the folder or a file cannot be written, or if a file that is no page would be replaced.
     """
     check_folder(folder, units)
-    # The first page marks the folder as a folder of pages, even if an interrupt follows.
+    # The first page marks the folder as a folder of pages, even if the command is interrupted later.
     write_text(folder / "README.md", index_page(folder))
     for unit in units:
         if progress:

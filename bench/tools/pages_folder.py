@@ -12,11 +12,11 @@ PROJECT = Path(__file__).resolve().parents[2]
 """Folder of the project, with its sources and documents if it is a checkout."""
 
 MADE = "made by `blysk pages`"
-"""Words of the folder's first page that mark the folder."""
+"""Words on the first page of a folder. They mark a folder that `blysk pages` made."""
 
 
 def check_folder(folder: Path, units: Sequence[str]) -> None:
-    """Make the folder of pages if there is none, and refuse a folder of somebody else.
+    """Make the folder of pages if it does not exist. Refuse a folder with other files that would be replaced.
 
     Parameters
     ----------
@@ -28,7 +28,8 @@ def check_folder(folder: Path, units: Sequence[str]) -> None:
     Raises
     ------
     InputError
-        If it cannot be made or written, or if a file that `blysk pages` did not write would be replaced.
+        If the folder cannot be made or written, or if a file that `blysk pages` did not write would be
+        replaced.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -23,7 +23,7 @@ OTHERS = "others"
 _LUTS = {"LUT4": 1, r"CCU2C?": 2, r"(TRELLIS_)?DPR16X4": 6}
 """Look-up tables of a cell, by the pattern of its kind.
 
-A memory takes four, and two more for its write port.
+A cell of a memory takes four, and two more for its write port.
 """
 
 _LEVELS = 3
@@ -36,8 +36,8 @@ def units_of(netlist: str) -> list[str]:
     Parameters
     ----------
     netlist : str
-        RTLIL of a `Registered` component. A path has `_LEVELS` names or less. The datapath of a pipelined
-        unit counts as the unit.
+        RTLIL of a `Registered` component. A path has at most `_LEVELS` names. The datapath of a pipelined
+        unit is a part of this unit.
     """
     found = re.findall(r"^module \\top\.unit\.(\S+)$", netlist, re.MULTILINE)
     return [path for path in found if path.count(".") < _LEVELS and path.split(".")[-1] != "datapath"]
@@ -46,10 +46,11 @@ def units_of(netlist: str) -> list[str]:
 def parts_by_unit(
     component: wiring.Component, family: Family = ECP5, absorb: bool = True
 ) -> dict[str, Parts]:
-    """Parts of each unit of a component, by its path. Parts of units inside a unit count only there.
+    """Parts of each unit of a component, by the unit's path.
 
-    Yosys maps the whole component, so that units may share logic. Shared logic counts for the unit in its
-    cell's name. Look-up tables are of the mapped cells. nextpnr adds some at the ends of carries.
+    Parts of a unit inside another unit count only for the inner unit. Yosys maps the whole component, so
+    units may share logic. Shared logic counts for the unit in the name of its cell. Look-up tables are
+    counted before placement. nextpnr later adds some at the ends of carries.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def parts_by_unit(
     family : Family
         Family of the device.
     absorb : bool
-        As for `lay_out`.
+        As in `lay_out`.
 
     Raises
     ------

@@ -102,7 +102,7 @@ class Layout:
 
     @property
     def closed(self) -> int:
-        """Multipliers with registers inside on both sides. nextpnr does not time the path between these."""
+        """Multipliers with registers inside on both sides. nextpnr does not time paths between these."""
         return max(place.closed for place in self.places)
 
     def as_dict(self) -> dict[str, Any]:
@@ -131,7 +131,7 @@ class Registered(wiring.Component):
 
     Members
     -------
-    The component's ports, flat, each a plain word.
+    The ports of the component, without nesting. Each port is an unsigned word.
     """
 
     def __init__(self, component: wiring.Component):
@@ -139,7 +139,7 @@ class Registered(wiring.Component):
         self._ports = {
             "__".join(map(str, path)): (member.flow, Value.cast(value))
             for path, member, value in component.signature.flatten(component)
-            # The `valid` or `ready` of a stream that is always valid or always ready.
+            # If a stream is always valid or always ready, its `valid` or `ready` is a constant.
             if not isinstance(Value.cast(value), Const) and len(Value.cast(value))
         }
         super().__init__({name: flow(Shape(len(value))) for name, (flow, value) in self._ports.items()})
@@ -163,7 +163,7 @@ class Registered(wiring.Component):
 
 
 def tool_versions(family: Family = ECP5) -> dict[str, str | None]:
-    """Version of each tool by its package, without an import. ``None`` if it is not installed."""
+    """Version of each tool by its package. ``None`` if the package is not installed. Nothing is imported."""
     return {package: version_of(package) for package in ("pyosys", family.package)}
 
 
@@ -178,14 +178,14 @@ def versions_of(family: Family) -> dict[str, str]:
 
 
 def ports_of(netlist: Mapping[str, Any]) -> set[int]:
-    """Nets of the ports of a netlist, Yosys's JSON."""
-    # Nets are numbers, constants are not.
+    """Nets of the ports of a netlist in Yosys's JSON."""
+    # Nets are numbers, and constants are texts.
     ports = netlist["modules"]["top"]["ports"].values()
     return {bit for port in ports for bit in port["bits"] if isinstance(bit, int)}
 
 
 def at_port(cell: Mapping[str, Any], ports: set[int]) -> bool:
-    """Whether a flip-flop is a register of `Registered` at a port, with nothing else there."""
+    """Whether a flip-flop is directly at a port, as the registers of `Registered` are."""
     return any(ports & {*cell["connections"].get(pin, ())} for pin in ("D", "DI", "Q"))
 
 
@@ -199,7 +199,7 @@ def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Fami
     report : dict
         nextpnr's report, JSON.
     family : Family
-        Family to which it is mapped.
+        Family to which the netlist is mapped.
     """
     cells = netlist["modules"]["top"]["cells"].values()
     ports = ports_of(netlist)
@@ -219,7 +219,7 @@ def parts_of(netlist: Mapping[str, Any], report: Mapping[str, Any], family: Fami
 
 
 def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
-    """Refuse a netlist with a cell that nextpnr does not time paths through."""
+    """Refuse a netlist if it has a cell through which nextpnr does not time paths."""
     for cell in netlist["modules"]["top"]["cells"].values():
         kind = cell["type"]
         for name in (kind, *(f"{kind}.{key}={value}" for key, value in cell["parameters"].items())):
@@ -228,7 +228,7 @@ def _refuse_untimed(netlist: Mapping[str, Any], family: Family) -> None:
 
 
 def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
-    """Refuse a netlist that does not fit, by its cells of each kind. The placer would try for ever."""
+    """Refuse a netlist that has more cells of a kind than fit. The placer would try for ever."""
     for name, pattern, most in (
         ("flip-flops", family.flip_flop, family.capacity.flip_flops),
         ("multipliers", family.multiplier, family.capacity.multipliers),
@@ -263,7 +263,7 @@ def read_report(report: Mapping[str, Any], seed: int, family: Family = ECP5, clo
     Raises
     ------
     ToolError
-        If the report has no clock or several, or no path between its edges.
+        If the report has no clock or several clocks, or no path between rising edges of the clock.
     """
     try:
         ((clock, rate),) = report["fmax"].items()
@@ -307,7 +307,7 @@ def _load(path: Path) -> tuple[Parts, Place] | None:
 
 
 def _store(path: Path, parts: Parts, place: Place) -> None:
-    # If the cache fills up or is removed, only the next run takes longer.
+    # If the entry cannot be written, only the next run takes longer.
     with contextlib.suppress(InputError, OSError):
         write_json(path, {"parts": asdict(parts), "place": asdict(place)})
 
@@ -316,7 +316,7 @@ def _stuck(said: str) -> str:
     """Reason why the router will not end, from its log. Empty if it may end.
 
     nextpnr routes wires of slow paths again as long as there are slow paths. If the target cannot be met,
-    nextpnr does not end. An example is the bisection, with the same slowest path to 10 ps in 27 rounds.
+    nextpnr does not end. For example, the bisection's slowest path stayed the same to 10 ps in 27 rounds.
     """
     slack = [float(worst) for worst in _SLACK.findall(said)]
     stuck = len(slack) > _ROUNDS and max(slack[-_ROUNDS:]) <= max(slack[:-_ROUNDS])
@@ -335,7 +335,7 @@ def lay_out(
     """Synthesise a component, then place and route it from seeds 1, 2, ....
 
     Results are kept in the cache, by netlist, tools and options. The result of each seed is kept as soon as
-    it is done, so that an interrupted run can continue.
+    it is there. So an interrupted run can continue.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ def lay_out(
     seeds : int
         Number of seeds.
     jobs : int
-        Processes at once.
+        Number of processes at a time.
     progress : callable
         Called after each seed.
     family : Family
@@ -361,7 +361,7 @@ def lay_out(
     TooLarge
         If the design does not fit.
     ToolError
-        If a tool fails, or the netlist cannot be timed.
+        If a tool fails, or nextpnr cannot time the netlist.
     """
     tools = versions_of(family)
     netlist = rtlil.convert(Registered(component), name="top", emit_src=False)
@@ -390,7 +390,7 @@ def lay_out(
 def map_cells(
     netlist: str, folder: Path, runner: ToolRunner, family: Family, absorb: bool
 ) -> tuple[dict[str, Any], Absorbed]:
-    """Map a netlist, in RTLIL, to a family's cells: Yosys's JSON, and counts of `absorb_registers`."""
+    """Map a netlist in RTLIL to a family's cells. Returns Yosys's JSON, and counts of `absorb_registers`."""
     (folder / "top.il").write_text(netlist, encoding="utf-8")
     runner.run("Yosys", YOSYS, [], folder, MAP_BEFORE + family.synthesis + MAP_AFTER)
     mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))

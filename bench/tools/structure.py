@@ -27,7 +27,7 @@ _COMPARISONS = {"<", "≤", ">", "≥", "=", "≠"}
 _CONTROL = re.compile(r"(^|_)(ready|valid|ages)$|^(held|moves)$")
 
 MOST_BOXES = 48
-"""Largest number of boxes of a drawing. With more, kinds of boxes are left out."""
+"""Largest number of boxes of a drawing. If there are more, some kinds of boxes are left out."""
 
 
 def _reached(starts: Iterable[int], following: dict[int, set[int]]) -> set[int]:
@@ -62,7 +62,7 @@ def _drop_control(graph: Graph) -> None:
 
 
 def _drop_idle_choices(graph: Graph) -> None:
-    """Bypass multiplexers of fewer than two words."""
+    """Bypass multiplexers that choose among fewer than two words."""
     changed = True
     while changed:
         changed = False
@@ -199,8 +199,8 @@ def graph_of(component: wiring.Component, most: int = MOST_BOXES) -> Graph:
     component : Component
         Unit.
     most : int
-        Largest number of boxes. With more, comparisons and roundings are left out, then choices, then all
-        boxes but memories, multipliers, adders, submodules and ports.
+        Largest number of boxes. If there are more, comparisons and roundings are left out first, then
+        choices. At last only memories, multipliers, adders, submodules and ports stay.
 
     Returns
     -------

@@ -54,7 +54,7 @@ class Waves:
 
     @property
     def cycles(self) -> int:
-        """Cycles shown."""
+        """Number of cycles."""
         return len(self.inputs)
 
 
@@ -73,7 +73,8 @@ def waves_of(unit: Component, beat: dict | None = None, example: UnitRun | None 
         Fields of three input beats. Other fields and the constants are 0. A field ``length`` is replaced by
         `PIXELS`. A beat is then a span with this number of results.
     example : UnitRun, optional
-        Beats, constants and writes before them, in place of ``beat``. It ends with the first few results.
+        Beats, constants and earlier writes, in place of ``beat``. The simulation ends with the first few
+        results.
 
     Raises
     ------
@@ -159,7 +160,7 @@ def _offered(valid: np.ndarray, ready: np.ndarray, names: list[str]) -> list[str
 
 
 def _shown(waves: Waves) -> list[int | None]:
-    """Cycles of the diagram. `None` stands for a stretch that is left out."""
+    """Cycles of the diagram. ``None`` stands for cycles that are left out."""
     states = [
         (
             waves.levels["i.valid"][k],
@@ -244,7 +245,7 @@ def _draw_beats(axes, shown, beats, span, letters) -> None:
     """Draw boxes with the names of the beats that a stream offers."""
     low, high = span
     names = [None if clock is None else beats[clock] for clock in shown]
-    # Both sides of a stretch that is left out have the same levels, and so has the stretch.
+    # Cycles that are left out have the same levels as the cycles before and after them.
     names = [
         names[k - 1] if clock is None else name
         for k, (name, clock) in enumerate(zip(names, shown, strict=True))

@@ -21,11 +21,11 @@ MOUNT = "/job"
 
 
 class ToolError(SimulationError):
-    """Yosys or nextpnr failed, or its result cannot be timed."""
+    """Yosys or nextpnr failed, or nextpnr cannot time the result."""
 
 
 class TooLarge(ToolError):
-    """A design takes more than the FPGA has."""
+    """A design takes more parts than the FPGA has."""
 
 
 class GivenUp(ToolError):
@@ -33,7 +33,7 @@ class GivenUp(ToolError):
 
 
 class ToolRunner:
-    """Runs tools, several at a time, and can stop all of them."""
+    """Runs several tools at a time, and can stop all of them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -52,7 +52,7 @@ class ToolRunner:
         """Run Python code in a folder, with a text as its standard input.
 
         `given_up` is called every few seconds with the tool's output so far. If it returns a reason, the tool
-        is stopped and `GivenUp` raised. `ToolError` is raised if the tool fails, or was stopped by `stop`.
+        is stopped, and `GivenUp` is raised. `ToolError` is raised if the tool fails or if `stop` stops it.
         """
         # Python's own warnings do not belong to the tool's output.
         command = [sys.executable, "-W", "ignore", "-c", code, *arguments]
@@ -76,7 +76,7 @@ class ToolRunner:
                     try:
                         process.wait(_SECONDS if given_up else None)
                     except subprocess.TimeoutExpired:
-                        # The tool writes at the file's position, which reading also moves.
+                        # The tool writes at the file's position. `pread` does not move this position.
                         size = os.fstat(log.fileno()).st_size
                         if reason := given_up(os.pread(log.fileno(), size, 0).decode(errors="replace")):
                             raise GivenUp(reason) from None
