@@ -219,7 +219,7 @@ class ShadingPipeline:
 
     @property
     def has_threshold(self) -> bool:
-        """Whether frame constants have a threshold: tables are loaded, and the gate needs it."""
+        """Whether frame constants have a threshold: tables are loaded, and the gate needs a threshold."""
         return self.loads_tables and self.gate
 
     @property
@@ -371,7 +371,7 @@ class ShadingPipeline:
         return Operands(none, none, np.zeros(0, dtype=bool))
 
     def _albedo_of(self, spans: Spans, constants: Sequence[FrameConstants]) -> Fixed | None:
-        """Albedo of every pixel of spans of a pixel or more; ``None`` without albedo."""
+        """Albedo of every pixel, for spans of at least one pixel; ``None`` without albedo."""
         if self.albedo is None or spans.attributes is None:
             return None
         textures = [of.texture for of in constants if of.texture is not None]

@@ -95,8 +95,8 @@ LOBES: dict[str, Lobe] = {
     )
 }
 """Specular units with a table that is written for each frame, by name; every method serves each. A table has
-704 words for ``phong_coplanar``, 336 for the others. At any exponent its largest error found is 0.06 LSB
-against its model; for roughness see `Lobe`.
+704 words for ``phong_coplanar``, 336 for the other models. At any exponent its largest error found is 0.06
+LSB against its model; for roughness see `Lobe`.
 """
 
 MIRROR_LOBES: dict[str, Lobe] = {PHONG.name: QuotientLobe(PHONG)}

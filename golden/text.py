@@ -4,7 +4,7 @@ import codecs
 
 __all__ = ["is_wide", "numbers_of_text", "plain_text"]
 
-# UTF-32 first: the little-endian mark of UTF-16 is the first half of that of UTF-32.
+# UTF-32 comes first: its little-endian mark begins with the little-endian mark of UTF-16.
 _MARKS = {
     codecs.BOM_UTF32_LE: "utf-32",
     codecs.BOM_UTF32_BE: "utf-32",

@@ -30,9 +30,9 @@ class InputError(Exception):
     thing : str
         The bad input: a file's name, or an option and its value.
     reason : str
-        Why it cannot be used.
+        Why the input cannot be used.
     remedy : str
-        An action that corrects it.
+        An action that corrects the input.
     """
 
     def __init__(self, thing: str, reason: str, remedy: str):

@@ -131,7 +131,7 @@ def atomic_writer(path: str | os.PathLike) -> Iterator[Path]:
     stays unchanged. An exception in the block (an interrupt, too) removes the temporary file. The new file
     has the permissions of the file that it replaces. If there is no older file, the umask gives the
     permissions. If ``path`` is a link, its target is replaced. If ``path`` is no regular file
-    (``/dev/stdout``, a pipe), it is yielded itself and written directly.
+    (``/dev/stdout``, a pipe), ``path`` itself is yielded, and written directly.
 
     Parameters
     ----------

@@ -323,7 +323,7 @@ class AttributeSpans:
         return AttributeWords(words[:, : self.attributes], weight, *given)
 
     def errors(self, spans: SpanAttributes, length: np.ndarray) -> np.ndarray:
-        """Bound of the error of the words of every pixel: ``(1 + i 2^-e/2) 2^-23``, shape (pixels,)."""
+        """Error bound of every pixel's words: ``(1 + i 2^-e/2) 2^-23``, shape (pixels,)."""
         span, index = pixels_of(checked_lengths(length))
         found: np.ndarray = (1 + np.ldexp(index / 2, -spans.exponent[span])) * self.WORD_FORMAT.step
         return found

@@ -55,7 +55,7 @@ class TextureFilter:
         Parameters
         ----------
         texels : int64 array, shape (places, 4, 3)
-            Codes of channels of the texel of each bank.
+            Channel codes of the texel from each bank.
         weight : Fixed, shape (places, 2)
             Weights of odd columns and of odd rows, see `TextureAddress`.
 
@@ -75,7 +75,7 @@ class TextureFilter:
         return self._color(self._mean(upper << 1, lower, down))
 
     def _mean(self, start: np.ndarray, end: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Mean of two words of 18 and of 17 bits, a word of 18 bits."""
+        """Mean of a word of 18 bits and a word of 17 bits. The result has 18 bits."""
         mean: np.ndarray = start + ((end - (start >> 1)) * weight >> (self.share_bits - 1))
         return mean
 

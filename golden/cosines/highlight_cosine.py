@@ -16,8 +16,9 @@ class HighlightCosine:
 
     N(t) moves along a great circle. beta is the angle between the plane of this circle and H. lambda is the
     angle from N_l to the projection of H onto the plane. One signed accumulator counts
-    ``theta = lambda - t psi`` down in turns. If the highlight is inside the span, it passes through zero. So
-    one pass is enough. [T] has two passes. With the light vector L in place of H the result is ``1 - N·L``.
+    ``theta = lambda - t psi`` down in turns. If the highlight is inside the span, theta passes through zero.
+    So one pass is enough. [T] has two passes. With the light vector L in place of H the result is ``1 -
+    N·L``.
 
     The table holds ``v = 1 - cos`` for a quarter of the wave. theta is folded into the quarter. Then
     ``1 - cos gamma`` is ``(1 - cos beta) + cos beta v`` in the half turn about the highlight, and
@@ -98,7 +99,7 @@ class HighlightCosine:
             return Fixed.round(self.TABLE_VALUE_FORMAT, (low + high) / 2), Fixed.round(
                 self.rise_format, 0 * rise
             )
-        # The wave is farthest below its chord where its slope, the sine, is that of the chord.
+        # The wave is farthest below its chord where its slope, the sine, equals the slope of the chord.
         steepest = np.arcsin(rise / width)
         sagitta = low + (steepest - start) * rise / width - (1 - np.cos(steepest))
         value = low - sagitta / 2

@@ -56,8 +56,8 @@ class Quotient:
     A pixel with ``q < 2^-14`` of the largest scale is flagged. Its results are invalid. After the two cuts of
     `spans_for` q is at least 0.05, and no pixel is flagged.
 
-    The relative error of r is at most `ROOT_ERROR`, that of s `SINE_ERROR`. N·L is off by `ROOT_ERROR` and
-    2^-16. docs/theory/bounds.md#quotient derives them.
+    The relative error of r is at most `ROOT_ERROR`, the relative error of s at most `SINE_ERROR`. N·L is off
+    by `ROOT_ERROR` and 2^-16. docs/theory/bounds.md#quotient derives them.
 
     Parameters
     ----------

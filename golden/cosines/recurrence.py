@@ -79,7 +79,7 @@ class Recurrence:
     - It takes x(0), D(0) and the coefficient of d, and seven steps of the recurrence with ``interleave`` 1
       (`prologue`). These steps add at most `prologue_error`. No part of it grows with the square of the
       length.
-    - It takes 17-bit cosines and sines, such as those of the highlight-cosine unit.
+    - It takes 17-bit cosines and sines, for example from the highlight-cosine unit.
       ``D = 2 sin(2d) A sin(phase - (j+2) d)`` is a small number times a sine. So an error e of the sine
       becomes ``psi e`` at the end of the span.
 
@@ -188,7 +188,7 @@ class Recurrence:
     def prologue_error(self, length: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """Bound of the error that start values from `prologue` add to `error`, for spans up to 90 degrees.
 
-        For ``reinsch``. docs/theory/bounds.md#recurrence derives it.
+        The bound is for ``reinsch``. docs/theory/bounds.md#recurrence derives it.
 
         Parameters
         ----------
@@ -275,7 +275,7 @@ class Recurrence:
         Parameters
         ----------
         first, second, coefficient, shift
-            As for `states` with ``interleave`` 1, shape (spans,); the coefficient is that of d.
+            As for `states` with ``interleave`` 1, shape (spans,). The coefficient is for a step d.
 
         Returns
         -------

@@ -70,13 +70,13 @@ class RecurrenceSetup:
 
     Up to 90 degrees no used word wraps (docs/theory/bounds.md#recurrence-setup). Spans over 90 degrees are
     flagged, from ``q = 1 + 2^-13`` on. Their words are invalid. A span of one pixel is computed with
-    ``m - 1 = 1``, and nothing reads its words. The coefficient is that of a step 4d up to 90 degrees.
+    ``m - 1 = 1``, and nothing reads its words. The coefficient is for a step of 4d, limited to 90 degrees.
 
     Parameters
     ----------
     recurrence : Recurrence
         Recurrence that takes the start values: interleaved, 16 fraction bits. The start values of ``direct``
-        are computed from those of ``reinsch``. ``x(j+4)`` is rounded half up, and
+        are computed from the start values of ``reinsch``. ``x(j+4)`` is rounded half up, and
         ``-2 cos 4d = K 2^(2-s) - 2`` is rounded up.
 
     Raises

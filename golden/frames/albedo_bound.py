@@ -96,7 +96,7 @@ class _Light(NamedTuple):
         diffuse = colors * material.diffuse
         specular = colors * np.array([material.reflection(of) for of in cosines]).reshape(-1, 3)
         largest = material.ambient_term(scene.ambient_light) + diffuse.sum(axis=0)
-        # The ambient operand, those of lights, and their sum.
+        # Roundings of the ambient operand, of the operands of lights, and of their sum.
         surface = errors.diffuse + step * (2 + np.count_nonzero(diffuse, axis=0))
         other = errors.highlight + step * np.count_nonzero(specular, axis=0)
         if material.tinted:

@@ -116,7 +116,7 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
     Returns
     -------
     raster, cut
-        As of `cut_spans`.
+        As `cut_spans` returns them.
     """
     cosine = np.cos(np.radians(largest_angle))
 
@@ -143,7 +143,7 @@ def cut_by_attributes(scene: Scene, raster: Raster) -> tuple[Raster, int]:
     Returns
     -------
     raster, cut
-        As of `cut_spans`.
+        As `cut_spans` returns them.
 
     Source: docs/theory/textures.md#cuts.
     """
@@ -181,7 +181,7 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
     Returns
     -------
     raster, cut
-        As of `cut_spans`.
+        As `cut_spans` returns them.
     """
 
     def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
@@ -216,7 +216,8 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
     Returns
     -------
     raster, cut
-        As of `cut_spans`. Spans of two pixels count as cut only if their ends differ by more than the limits.
+        As `cut_spans` returns them. Spans of two pixels count as cut only if their ends differ by more than
+        the limits.
     """
 
     def differs(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
@@ -338,7 +339,7 @@ def cut_by_error(
     Returns
     -------
     raster, cut
-        As of `cut_spans`.
+        As `cut_spans` returns them.
     """
     limits, scene = limits or HighlightLimits.of(scene), scene.lit
     cosines = np.cos(np.radians([interpolator.widest_span(exponent) for exponent in limits.exponents]))

@@ -69,7 +69,7 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
 
 
 def pixel_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> np.ndarray | None:
-    """Bound as of `error_bound` for each pixel of a scene with vertex colours or textures.
+    """Bound as in `error_bound` for each pixel of a scene with vertex colours or textures.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ def pixel_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> np.ndarra
     Returns
     -------
     float64 array, shape (height, width, 3), or None
-        In LSB of linear light, see `albedo_bound`. ``None``: no bound is known, as of `error_bound`. For
+        In LSB of linear light, see `albedo_bound`. ``None``: no bound is known, as in `error_bound`. For
         `albedo_bound` the whole error by tolerances is an error of the specular sum.
     """
     return None if design.specular is None else design.interpolator.bound(_PixelBounds(scene, design, cut))
 
 
 def triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
-    """Bound as of `error_bound` of a picture by triangles, see `quotient_triangle_bound`.
+    """Bound as in `error_bound` of a picture by triangles, see `quotient_triangle_bound`.
 
     Parameters
     ----------

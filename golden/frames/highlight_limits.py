@@ -27,7 +27,7 @@ class _Curve:
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Arguments u, ascending; and for each u the steepest ``|dS/du|`` and the largest S from it on."""
+        """Arguments u, ascending; for each u the steepest ``|dS/du|`` and the largest S from this u on."""
         u, value, slopes = curve_lines(self.reflection, self.parameter)
         u, slopes = np.ldexp(u, self.scale), np.ldexp(slopes, -self.scale)
         return u, *(np.maximum.accumulate(of[::-1])[::-1] for of in (slopes, value))

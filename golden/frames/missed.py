@@ -61,7 +61,7 @@ def _missed(
     Returns
     -------
     by_curve, by_words : bool arrays, shape (spans,)
-        A span is at most one of the two: if it is ``by_words``, it is not ``by_curve``.
+        A span that is ``by_words`` is not also ``by_curve``.
     """
     limits, scene = limits or HighlightLimits.of(scene), scene.lit
     by_curve, by_words = np.zeros((2, len(raster.length)), dtype=bool)
@@ -112,7 +112,7 @@ def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dic
 
 
 def component_error(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Renderer) -> np.ndarray:
-    """Bound of the error of a component of N/W at any pixel of each piece: float64 array, shape (S,).
+    """Error bound of the components of N/W at all pixels of each piece: float64 array, shape (S,).
 
     The corners are rounded, the sums of `GradientSetup` have their error, and the pixel's value is cut.
 

@@ -151,7 +151,7 @@ def _bound(scene: Scene, errors: list[LightErrors]) -> float:
 def _light_errors(
     scene: Scene, design: ShadingPipeline, errors: QuotientErrors, further: QuotientErrors | None = None
 ) -> list[LightErrors]:
-    """Bounds of the light on each material, from those of directions of the first and of further lights."""
+    """Bounds of the light on each material, from bounds for the first light and for further lights."""
     lobe = design.lobe
     kinds = [errors] if further is None or len(scene.lights) < 2 else [errors, further]
     found = []

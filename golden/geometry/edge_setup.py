@@ -81,7 +81,7 @@ class EdgeSetup:
 
     An edge from (x0, y0) to (x1, y1) with ``d = y1 - y0 > 0`` meets the centre of scanline j, which is k
     steps below (x0, y0), at ``X = x0 + (x1 - x0) k / d``. With ``h`` half a pixel and ``P = 2^s`` a pixel,
-    the first centre not left of it is that of column
+    the first centre that is not left of the edge belongs to column
 
         x = ceil((X - h) / P) = ceil(((x0 - h) d + (x1 - x0) k) / (P d))
 

@@ -68,7 +68,7 @@ class PlaneSetup:
 
     Let ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2. The width in pixels is
     ``a / (D 2^s)``, so ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and ``1/A``; A is cut to
-    25 fraction bits. ``d / A`` is one `wide_product`. If it is 1 or more, it is halved.
+    25 fraction bits. ``d / A`` is one `wide_product`. A quotient of 1 or more is halved.
 
     For a difference v of attributes the step per scanline is ``2^s v / D = (v / d) 2^(s - e)``. The step per
     column is ``v / W``. `GradientSetup` multiplies the mantissas by 2^8. It shifts right by

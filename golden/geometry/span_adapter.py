@@ -40,7 +40,7 @@ class LineAdapter:
     The six components are shifted left by the same number of places: the number of bits that repeat the sign
     in all of them, at most `LARGEST_SHIFT`. If ``flip`` is set, they are negated. They are rounded half up to
     22 fraction bits, and saturate to ``+-(1 - 2^-22)``. A factor that all six share does not change a
-    direction. So the unit normals along the line are those of N/W:
+    direction. So the line has the same unit normals as N/W:
 
     ========== ============ =====================================================================
     word       format       why

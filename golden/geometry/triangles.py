@@ -100,7 +100,7 @@ class FrameSettings:
     ----------
     left, top, right, bottom : int
         The picture, in pixels of the grid, from -2048 to 2048: columns ``left`` to ``right - 1``, scanlines
-        ``top`` to ``bottom - 1``. It has 1 to 4095 of each.
+        ``top`` to ``bottom - 1``. The picture has 1 to 4095 columns and scanlines.
     back_faces : str
         Treatment of back faces, one of `BACK_FACES`.
     limit : int

@@ -227,7 +227,7 @@ class HighlightGate(Gate):
         Parameters
         ----------
         cosine, left, right : Fixed, any shape
-            Dot products as of `dot_product`.
+            Dot products from `dot_product`.
         threshold : Fixed, shape () or the same, UQ(0, F)
             T.
 

@@ -402,7 +402,7 @@ class Lobe(HighlightOperand):
 
 @dataclass(frozen=True, eq=False)
 class LobeTable:
-    """Entries of a `Lobe`'s table, for one model and parameter; `Lobe.table` makes one.
+    """Entries of a `Lobe`'s table, for one model and parameter, made by `Lobe.table`.
 
     Parameters
     ----------

@@ -126,7 +126,7 @@ class QuotientLobe(Lobe):
         return left, right
 
     def table(self, parameter: float | None = None) -> LobeTable:
-        """Table of the model for one parameter, as of `Lobe`.
+        """Table of the model for one parameter, as in `Lobe`.
 
         Raises
         ------

@@ -284,7 +284,7 @@ class Interpolator(ABC):
         raise ValueError(f"method {self.name} has no error bound for a gate")
 
     def spans(self, lights: int, highlights: bool) -> QuotientSpans:
-        """Model of the setup of spans of vectors.
+        """Model of the setup for spans with vectors.
 
         Parameters
         ----------

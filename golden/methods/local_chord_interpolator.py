@@ -46,9 +46,9 @@ class LocalChordInterpolator(Interpolator):
         nearly -V;
     - the errors of the quadratics at t = 1/4 and 3/4 are within `highlight_tolerance` and `diffuse_tolerance`
       minus the bounds of the arithmetic. `MARGIN` multiplies the errors, for the positions between. If the
-      ratio of the normals' lengths at the two ends is larger, it takes the place of `MARGIN`. These factors
-      were found by search. With equal lengths the largest error at any t was 1.31 times the error at 1/4 and
-      3/4. With lengths in the ratio g it was up to ``1.03 max(4/3, g)`` times.
+      ratio of the normals' lengths at the two ends is larger, this ratio takes the place of `MARGIN`. These
+      factors were found by search. With equal lengths the largest error at any t was 1.31 times the error at
+      1/4 and 3/4. With lengths in the ratio g it was up to ``1.03 max(4/3, g)`` times.
 
     Fit and arithmetic together have a budget of error, at full reflection: 0.4 LSB in the specular term and
     0.12 in the diffuse term. The reference is exactly normalised interpolation. The budget is checked at
@@ -67,8 +67,8 @@ class LocalChordInterpolator(Interpolator):
     - where the highlight shows, the error of a is within `FACTOR_BUDGET`;
     - the errors of a, and of u times the largest a of the span, are together within `HIGHLIGHT_BUDGET`.
 
-    A light that fades may be brighter than white. If the largest channel of its colour is over 1, it
-    multiplies all errors.
+    A light that fades may be brighter than white. If the largest channel of its colour is over 1, this
+    channel multiplies all errors.
 
     ========== ========== ========================================
     word       format     why

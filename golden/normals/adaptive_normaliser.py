@@ -104,7 +104,7 @@ class AdaptiveNormaliser:
         return len(self.limits.codes)
 
     def end_error(self, levels: int, first_step: bool) -> float:
-        """Bound of the error of a component of a segment end, in a span with ``levels`` levels."""
+        """Error bound of a segment end's components, in a span with ``levels`` levels."""
         p = self.bisection
         length = 0.0
         for level in range(1, levels + 1):

@@ -90,8 +90,8 @@ class BisectionChain:
             )
             e_error = own_error + slope * u_error
             e = exact.max()
-            # A step leaves a quarter of an error of u, as e follows it (0.28; 0.37 in the first step). The
-            # 17-bit r, 1 in place of `ONE_SQUARED` and the two roundings add to it.
+            # A step multiplies an error of u by about a quarter, because e follows u: by 0.28, in the first
+            # step by 0.37. The 17-bit r, 1 in place of `ONE_SQUARED`, and two roundings add to the error.
             u_error = (0.37 if first else 0.28) * u_error + 2 * own_error + e * 2.0**-15 + 2 * half
             rounding = 2 * e * 2.0**-17 + 2.0**-21 + half
             l_error = (0.5 + e) * l_error + (weight_l + l_error + 1) * e_error + rounding

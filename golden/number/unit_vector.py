@@ -31,7 +31,7 @@ ONE_SQUARED = Fixed((COMPONENT * COMPONENT), ONE * ONE)
 """Dot product of a unit vector with itself."""
 
 CODE_LENGTH_ERROR = 3**0.5 * COMPONENT.step / 2 * (1 + 2.0**-10)
-"""Largest error of the length of a vector of rounded components; `quantise` stays within it."""
+"""Largest error of a vector's length if its components are rounded. `quantise` stays within this error."""
 
 
 def quantise(vectors: np.ndarray) -> np.ndarray:

@@ -154,7 +154,7 @@ class Camera:
         Raises
         ------
         ValueError
-            If a point of a perspective camera is not in front of it.
+            If the camera is a perspective camera and a point is not in front of the camera.
         """
         result = self.homogeneous(points, width, height)
         if not (result[..., 2] > 0).all():

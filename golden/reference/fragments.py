@@ -60,8 +60,8 @@ def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndar
     Returns
     -------
     float64 array, shape (count, 3)
-        ``normalise((1-t) m_l N_l + t m_r N_r)``; if this is 0, the normal of the face, negated if the scene
-        negates it.
+        ``normalise((1-t) m_l N_l + t m_r N_r)``. If this is 0, the normal of the face takes its place,
+        negated if the scene negates the normals of the face.
     """
     span, t = _position(raster, which)
     left = (1 - t) * raster.magnitude_left[span][:, np.newaxis]

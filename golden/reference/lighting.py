@@ -433,7 +433,7 @@ class _Sums:
     ) -> None:
         """Add both terms of a light; without a cosine of the highlight, the diffuse term alone.
 
-        The factor multiplies the specular term; N·L is multiplied by it before.
+        The factor multiplies the specular term here. N·L contains the factor already.
         """
         color = np.asarray(light.color)
         self.total += np.maximum(cosine, 0.0)[..., np.newaxis] * (color * self.material.diffuse)

@@ -164,8 +164,9 @@ def render(
       vertices and at the middles of the three edges ([T] appendix Д). The normal of a middle is
       ``(N_a + N_b)/|N_a + N_b|``, as for ``phong``. In the perspective-correct barycentric coordinates l the
       polynomial is ``sum_i l_i (2 l_i - 1) I_i + sum_{i<j} 4 l_i l_j I_ij``. Two triangles that share an edge
-      and its normals have equal intensities along it. Between the six points the polynomial may leave their
-      range by up to a third of it (in the middle of the triangle). It is saturated again;
+      and its normals have equal intensities along it. Between the six points the polynomial may leave the
+      range of their intensities by up to a third of this range, in the middle of the triangle. It is
+      saturated again;
     - ``adaptive``: ``gouraud`` in the triangles of `gouraud_triangles`, ``phong`` in the others ([T]
       appendix В);
     - ``phong``: the vertex normals interpolated perspective-correctly and normalised at every pixel, as a
@@ -444,7 +445,7 @@ def _shade(
     points: np.ndarray | None = None,
     albedo: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Intensities of normals; the first axis is that of their triangles, ``triangles[which]``."""
+    """Intensities of normals. The first axis of the normals belongs to the triangles ``triangles[which]``."""
 
     def shade(normals: np.ndarray, material: Material, *given: np.ndarray | None) -> np.ndarray:
         viewer = scene.view_vectors(given[0])

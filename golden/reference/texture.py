@@ -52,7 +52,7 @@ class Texture:
     Texture coordinates u and v are 0 to 1 from the left to the right border of the image, and from its upper
     to its lower border. Texel (i, j) has its centre at ``u = (i + 1/2)/width``, ``v = (j + 1/2)/height``.
 
-    *Levels.* Level 0 is the image. Each further level has half of the columns and rows, one at least. Its
+    *Levels.* Level 0 is the image. Each further level has half of the columns and rows, at least one. Its
     texels are the means of the texels that they cover. The last level has one texel.
 
     Parameters

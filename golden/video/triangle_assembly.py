@@ -49,7 +49,7 @@ class TriangleAssembly:
         top: int,
         bottom: int,
     ) -> tuple[Triangles, dict[str, int]]:
-        """Bit-accurate triangles, and the counts of the others.
+        """Bit-accurate triangles, and the counters.
 
         Parameters
         ----------

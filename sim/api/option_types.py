@@ -57,7 +57,7 @@ class Roughness(Number):
 
 
 class Direction(Vector):
-    """A direction, or a word for one.
+    """A direction, or a word for a direction.
 
     Parameters
     ----------

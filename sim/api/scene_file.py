@@ -128,8 +128,8 @@ def read_scene_file(path: str | os.PathLike[str]) -> SceneFile:
     Raises
     ------
     InputError
-        If the file cannot be read, is not TOML, or names no mesh; also if a key is unknown, or a value has
-        another type or is out of range. The message names the file and the key.
+        If the file cannot be read, is not TOML, or names no mesh. If a key is unknown, or a value has another
+        type or is out of range. The message names the file and the key.
     """
     values: dict[str, Any] = {}
     keys: dict[str, str] = {}

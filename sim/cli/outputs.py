@@ -19,7 +19,7 @@ def check_outputs(
     Parameters
     ----------
     inputs : sequence of str
-        Known files that the run reads. A mesh may name more.
+        Known files that the run reads. A mesh file may name further files.
     pictures, others : sequences of str or None
         Files to be written.
 

@@ -84,7 +84,7 @@ class ObservedPipeline(Component):
     Raises
     ------
     ValueError
-        If the design has another number of lights than one.
+        If the design does not have exactly one light.
     """
 
     def __init__(self, design: ShadingPipeline):

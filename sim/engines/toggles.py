@@ -129,7 +129,7 @@ def _init(register: Value) -> int:
 def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
     """Words of 32 register bits, fewer in the last word, and their values after reset.
 
-    An engine computes with such a word in one operation; one word of all bits would take minutes to compile.
+    An engine handles such a word in one operation. A single word of all bits would take minutes to compile.
     """
     parts, initial, width = [], 0, 0
     for register in registers:

@@ -157,7 +157,7 @@ def _without_dark_lights(
 
 
 def _no_specular(design: ShadingPipeline) -> dict[str, Any]:
-    """Changes that leave out the specular path, and tints with it."""
+    """Changes that leave out the specular path and, with an albedo, its tints."""
     tints = {"albedo": {"tints": False}} if design.albedo is not None else {}
     return {"specular": None, "gate": False, "factors": (), **tints}
 

@@ -156,7 +156,7 @@ def specialisation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         parts.append(f"{figures['cycles']:,} of {figures['full_cycles']:,} cycles")
     yield _line("specialised", ", ".join(parts))
     if "full_cycles" in figures:
-        text = "the frame equals that of the full pipeline, to the bit"
+        text = "the frame equals the frame of the full pipeline, to the bit"
         if figures["different_pixels"]:
             text = (
                 f"{figures['different_pixels']:,} pixels differ from the full pipeline's, by at most "

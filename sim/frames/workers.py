@@ -138,7 +138,7 @@ def cluster_client(address: str) -> Iterator["Client"]:
     """Dask's client of a scheduler whose workers have this version of blysk.
 
     Each worker builds its models in its own cache. An exception in the block cancels the waiting tasks; Dask
-    cannot stop the running ones. Dask's messages are pickled Python, so use only an address that you trust.
+    cannot stop running tasks. Dask's messages are pickled Python, so use only an address that you trust.
 
     Parameters
     ----------

@@ -231,7 +231,7 @@ def _gltf_material(
 
 
 def _color(look: dict, key: str, count: int, name: str) -> Triple:
-    """A colour of a material, perhaps with alpha after it."""
+    """A colour of a material, perhaps followed by alpha."""
     given = look.get(key, [1] * count)
     return color_of(given[:3] if _are_numbers(given, count) else [], key, name, str(given))
 

@@ -48,7 +48,8 @@ class LoadedMesh:
         differ in more than the name.
     ignored : tuple of str
         Contents or references of the file that belong to the picture and are not read: alpha, textures other
-        than those of the colour, a missing image or material file, and the names that a reader does not know.
+        than the texture of the colour, a missing image or material file, and the names that a reader does not
+        know.
     lights : tuple of Light
         Lights of a glTF file, in its unit of length; the brightest counts 1, see `placed_lights`.
     camera : Camera or None

@@ -10,7 +10,7 @@ from blysk.sim.meshes.refusal import Refused
 
 __all__ = ["check_corners", "cut_polygons", "triangulated"]
 
-# A triangle counts as without area if its area over that of its polygon is at most this: rounding only.
+# A triangle counts as without area up to this share of its polygon's area: rounding only.
 _FLAT = 2.0**-40
 # Largest number of corners that are tried as the centre of a fan.
 _FANS = 16
@@ -140,7 +140,7 @@ def _doubled_areas(flat: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _sides(triangle: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """The three directed sides, each before the corner that lies across it."""
+    """The three directed sides. Side k lies opposite corner k."""
     a, b, c = triangle
     return iter(((b, c), (c, a), (a, b)))
 

@@ -69,7 +69,7 @@ def _surface(segments: int) -> tuple[np.ndarray, np.ndarray]:
         return _contract(along_v, rows.transpose(2, 1, 0, 3)).transpose(1, 2, 0, 3)
 
     points, du, dv = evaluate(basis, basis), evaluate(slope, basis), evaluate(basis, slope)
-    # On a row that is one point, dS/dv is 0. As u goes to 0, its direction goes to that of d2S/dudv.
+    # On a row that is one point, dS/dv is 0. As u goes to 0, its direction goes to the direction of d2S/dudv.
     collapsed = (np.ptp(control_points()[:, 0], axis=1) == 0).all(axis=-1)
     points[collapsed, 0] = control_points()[collapsed, 0, :1]
     dv[collapsed, 0] = evaluate(slope[:, :1], slope)[collapsed, 0]

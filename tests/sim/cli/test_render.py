@@ -37,7 +37,7 @@ def test_specialised_pipeline_says_what_it_leaves_out(folder, capsys):
     assert re.search(
         r"^specialised +[\d,]+ of [\d,]+ cells, \d+ of \d+ multipliers, .* cycles$", output, re.M
     )
-    assert re.search(r"^ +the frame equals that of the full pipeline, to the bit$", output, re.M)
+    assert re.search(r"^ +the frame equals the frame of the full pipeline, to the bit$", output, re.M)
     fit = json.loads(Path("a.json").read_text())["specialisation"]
     assert (fit["largest_difference"], fit["different_pixels"]) == (0, 0)
     for name, count in fit["specialised"].items():
