@@ -27,7 +27,7 @@ __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 def span_shape(model: ShadingPipeline) -> data.StructLayout:
     """Shape of a raster span: first pixel, number of pixels, and the operands of the method.
 
-    The method decides about the operands. They are one of these:
+    The operands depend on the method:
 
     - unit normals at the first and last pixel centre;
     - the ends of the true line;
@@ -103,7 +103,7 @@ class ShadingPipelineUnit(wiring.Component):
     Without lights there is neither interpolator nor multiplier. Every pixel has the ambient colour.
 
     With an albedo an albedo unit processes each span in parallel with the interpolator. A FIFO holds the
-    albedo of all pixels that may come before their terms, so it does not limit the rate.
+    albedo of all pixels that may come before their terms, so the albedo does not limit the rate.
 
     In the *compact* style there are these multipliers:
 

@@ -74,8 +74,8 @@ class PixelPipelinesUnit(wiring.Component):
     while a write waits. The first pixel leaves an idle unit `latency` cycles after its span was accepted.
     Every pipeline has its own frame constants. At a change of the material it waits only for its own spans.
 
-    Counters of ``status`` are the sums of the pipelines' counters. Like these they stop at their largest
-    value. They come a cycle later for each doubling of the pipelines.
+    Counters of ``status`` are the sums of the pipelines' counters. Like the pipelines' counters they stop at
+    their largest value. The sums come a cycle later for each doubling of the number of pipelines.
 
     Parameters
     ----------

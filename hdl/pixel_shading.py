@@ -177,7 +177,7 @@ class PixelShading:
         for light, read in zip(self.lights, self.tables.reads, strict=True):
             wiring.connect(m, light.table, read)
         if self.tables.tables is None:
-            # Whether a write was taken and which address it had, by two registers.
+            # Two registers tell whether a write was taken, and whether its address is that of the tables.
             of_table = Signal(name="of_table")
             m.d.sync += [
                 of_table.eq(write.address == LOBE_ADDRESS),

@@ -17,7 +17,7 @@ __all__ = ["AttributeSpansUnit", "attribute_span_shape", "attribute_words_shape"
 
 
 def _lines(model: AttributeSpans) -> dict:
-    """Members of a word of every line: ``colors``, ``coordinates``, ``weight``, as far as there are any."""
+    """Members with a word of every line that the model has: ``colors``, ``coordinates``, ``weight``."""
     word, members = FixedShape(model.WORD_FORMAT), {}
     if model.colors:
         members["colors"] = data.ArrayLayout(word, 3)
@@ -75,9 +75,9 @@ class AttributeSpansUnit(wiring.Component):
     """Words of every pixel of spans, first pixel first; `AttributeSpans` is the bit-accurate model.
 
     Each line has an accumulator of 39 bits, and a register of its step, shifted by the exponent. The first
-    pixel of a span is on the output a cycle after the span was accepted. The others follow on each cycle,
-    unless the output waits. A span of m pixels is accepted m cycles after the span before it, also if m is 1.
-    A span of length 0 takes a cycle and gives nothing. The unit has no multipliers.
+    pixel of a span is on the output a cycle after the span was accepted. The other pixels follow on each
+    cycle, unless the output waits. A span of m pixels is accepted m cycles after the span before it, also if
+    m is 1. A span of length 0 takes a cycle and gives nothing. The unit has no multipliers.
 
     Parameters
     ----------

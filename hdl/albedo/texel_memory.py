@@ -24,7 +24,7 @@ def texels_shape() -> data.ArrayLayout:
 
 
 class TexelMemoryUnit(PipelinedUnit):
-    """Gives the texel of each bank at an address of each bank, one request a cycle.
+    """Gives the texel of each bank at the bank's own address, one request a cycle.
 
     The latency is 2 cycles: the memory's register and the register behind it. A memory outside of a design
     has the same streams, and any latency. It answers requests in their order.
@@ -32,7 +32,7 @@ class TexelMemoryUnit(PipelinedUnit):
     A write is taken on every cycle. A write with ``begins`` gives an address, divided by 2. The values after
     it are halves of words, first the lower half. The words go to banks 0, 1, 2, 3, then to the next address.
     Values past the end of the banks must not come. Reset begins at address 0, and clears no word. Write only
-    while no request is inside: on a cycle of a write the registers stand still.
+    while no request is inside, because the registers stand still on the cycle of a write.
 
     Parameters
     ----------

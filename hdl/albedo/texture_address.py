@@ -68,7 +68,7 @@ class TextureAddressUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(bank_addresses_shape(model)))`
         Addresses and weights.
     constants : :py:`In(descriptor_shape())`
-        The texture, of which each level has to fit the memory.
+        The texture. Each of its levels has to fit the memory.
 
     Source: docs/theory/textures.md#addresses.
     """
@@ -151,7 +151,7 @@ class TextureAddressUnit(PipelinedUnit):
         return found, [across, down]
 
     def _axis(self, axis: int, size: Word) -> tuple[list[Word], Word]:
-        """Words of the even and of the odd column or row, both halved, and of the weight of the odd."""
+        """Words of the even and the odd column (or row), halved, and of the odd column's weight."""
         p, g, name = self.model, self._graph, "uv"[axis]
         share_bits = p.share_bits if p.bilinear else 0
 

@@ -41,8 +41,8 @@ class TextureFilterUnit(PipelinedUnit):
 
     Formats and error are those of `TextureFilter`, the bit-accurate model. With an initiation interval of 1
     there are nine multipliers. With a longer interval the six means of rows share ``ceil(6 / interval)``
-    multipliers, and the three means of columns ``ceil(3 / interval)``. For ``nearest`` alone there is no
-    multiplier. The latency is 9 cycles at an interval of 1, and 3 for ``nearest`` alone.
+    multipliers, and the three means of columns share ``ceil(3 / interval)``. For ``nearest`` alone there is
+    no multiplier. The latency is 9 cycles at an interval of 1, and 3 for ``nearest`` alone.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ class ColoredIntensityUnit(IntensityUnit):
         return register(m, register(m, surface * factor, f"colored_{name}") + beside, f"sum_{name}")
 
     def _by_tint(self, m, operands, light: FixedValue, channel: int, name: str):
-        """Light on the surface and light beside it; the specular sum belongs to one of the two."""
+        """Light on the surface, and light beside it. ``tinted`` decides which gets the specular sum."""
         register, tinted = self.register, self.constants.tinted
         products = self.products(m, operands, ("specular",), channel, name)
         levels = self.model.lights.bit_length()
@@ -151,7 +151,7 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
 
     A pixel takes ``c = 3 (1 + T)`` cycles, where T is the number of its terms that are not 0
     (`Intensity.cycles`). With one channel it takes ``1 + T``, and 2 more with a first pass. The pixel leaves
-    after ``c + 5`` cycles, without cycles of stall.
+    after ``c + 5`` cycles. Cycles of stall are not counted.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ class DiffuseUnit(PipelinedUnit):
     model : Diffuse
         Bit-accurate model: format of the operand.
     latency : int or None
-        At least 2, or 3 if the initiation interval is over 1. ``None``: the least.
+        At least 2, or 3 if the initiation interval is over 1. ``None``: the least latency.
     initiation_interval : int
         Cycles from an input to the next, at least 1.
 

@@ -17,10 +17,10 @@ __all__ = ["HighlightGateUnit"]
 
 
 class HighlightGateUnit(PipelinedUnit):
-    """Decides whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
+    """Decides whether a span may be lit.
 
-    The bit-accurate model `HighlightGate` has the comparisons with their words (T, u, w, a, b, d), the
-    formats and the proof.
+    The result is 0 only if every pixel of the span has a specular term of 0. The bit-accurate model
+    `HighlightGate` has the comparisons with their words (T, u, w, a, b, d), the formats and the proof.
 
     There are fifteen multiplications: three for each of ``N_l . N_r``, ``N_l . H`` and ``N_r . H``, and six
     products for the comparisons: ``T u``, ``a b``, ``u w``, ``max(a, b)^2``, ``max(a, b) u`` and ``d^2``.
@@ -45,7 +45,7 @@ class HighlightGateUnit(PipelinedUnit):
     initiation_interval : int or None
         Cycles from an input to the next, 1 to the number of multiplications. ``None``: 6.
     exponent : int or None
-        Exponent, 1 to 1000, fixed at build time, without a PROM. ``None``: the exponent is a port.
+        Exponent, 1 to 1000, fixed at build time. There is then no PROM. ``None``: the exponent is a port.
     takes_threshold : bool
         Whether the threshold T is a port in place of the exponent, as for the tables of a `Lobe`. There is
         then no PROM.
@@ -53,7 +53,8 @@ class HighlightGateUnit(PipelinedUnit):
     Raises
     ------
     ValueError
-        If ``initiation_interval`` or the exponent is out of range, or ``takes_threshold`` has an exponent.
+        If ``initiation_interval`` or the exponent is out of range, or ``takes_threshold`` comes with an
+        exponent.
 
     Members
     -------
@@ -62,7 +63,7 @@ class HighlightGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light. Bit 0 is the first light.
     constants : :py:`In(StructLayout({"halfway": ArrayLayout(..., lights), "exponent": 10}))`
-        Unit vectors H; as a port also the exponent, 1 to 1000, or ``threshold``, T of F bits. All are
+        Unit vectors H. If it is a port, also the exponent, 1 to 1000, or ``threshold``, T in F bits. All are
         constant while beats are inside.
 
     Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.

@@ -73,7 +73,7 @@ class IntensityUnit(PipelinedUnit):
     Parameters
     ----------
     model : Intensity
-        Bit-accurate model: number of lights, at least 1; specular terms or not; channels.
+        Bit-accurate model: number of lights, at least 1, whether there are specular terms, and channels.
 
     Members
     -------
@@ -82,7 +82,8 @@ class IntensityUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(pixel_color_shape(fraction_bits)))`
         Channels, in the model's `result_format`.
     constants : :py:`In(StructLayout({"ambient", "diffuse", "specular"}))`
-        Colour operands, constant while beats are inside: one ``ambient``, and the other two for each light.
+        Colour operands, constant while beats are inside: one ``ambient``, and ``diffuse`` and ``specular``
+        for each light.
 
     Source: docs/theory/units.md#intensity; [T] figure 4.10; [B] 4 and 5.
     """
@@ -172,8 +173,8 @@ class CompactIntensityUnit(wiring.Component):
     The results are those of `IntensityUnit`. A pixel takes ``c = 3 max(1, T)`` cycles, where T is the number
     of its diffuse and specular terms that are not 0 (`Intensity.cycles`). With one light a pixel takes 6
     cycles with a highlight, and 3 cycles without a highlight or in the dark. The next pixel is taken c cycles
-    later. The pixel leaves after ``c + 5`` cycles (input, operands, product, sum, rounding, saturation),
-    without cycles of stall.
+    later. The pixel leaves after ``c + 5`` cycles (input, operands, product, sum, rounding, saturation).
+    Cycles of stall are not counted.
 
     Parameters
     ----------

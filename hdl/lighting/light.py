@@ -113,7 +113,7 @@ class LightUnit(wiring.Component):
     longer interval dark beats bypass the specular unit. They wait beside it in order, and take two cycles
     each.
 
-    For beats that are not dark, the specular unit gives the latency, the initiation interval and the
+    For beats that are not dark, the specular unit determines the latency, the initiation interval and the
     multipliers. With a longer interval the latency is a cycle longer. For a light that fades a `FactorUnit`
     follows, which adds two cycles and a multiplier. The factor passes beside the units before it.
 

@@ -302,7 +302,7 @@ class LobeUnit(PipelinedUnit):
         return (shifted,), place
 
     def _look_up(self, register: Callable[[Any, str], Any], address: Value, fraction: Value) -> Value:
-        """Word at an address, and the fraction, delayed by as many cycles."""
+        """Word at an address, and the fraction, delayed by the same two cycles."""
         self._module.d.comb += self._read.address.eq(address)
         return Cat(self._read.word, register(register(fraction, "fraction_read"), "fraction"))
 

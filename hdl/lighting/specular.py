@@ -125,7 +125,6 @@ class SpecularUnit(PipelinedUnit):
     saturation, product, base, square). Each of M products has a multiplier of 17 by 17 bits. Multipliers of
     the chords have 17 by 11 and 14 by 11 bits for ``coscos``, and 13 by 11 for ``exp``. With a longer
     interval the products share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles
-    interval the products share ``ceil(M / I)`` multipliers of 18 by 18 bits. A product then takes two cycles
     more, for its operands and the registers around the multiplier (`registered_product`). It also waits
     for its slot.
 
@@ -305,7 +304,8 @@ class SpecularUnit(PipelinedUnit):
     ) -> Word:
         """Exact product.
 
-        With a multiplier of its own it takes one cycle. Else it is issued to a shared multiplier.
+        With a multiplier of its own the product takes one cycle. Otherwise it is issued to a shared
+        multiplier.
         """
         g = self._graph
         if g.interval == 1:

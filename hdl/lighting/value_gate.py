@@ -14,10 +14,11 @@ __all__ = ["ValueGateUnit"]
 
 
 class ValueGateUnit(PipelinedUnit):
-    """Decides whether a span may be lit. 0 only if every pixel of the span has a specular term of 0.
+    """Decides whether a span may be lit.
 
-    `ValueGate` is the bit-accurate model. The latency is 3 cycles, the initiation interval 1. There is no
-    multiplier. The PROM, which all lights share, holds 1024 words of 18 bits.
+    The result is 0 only if every pixel of the span has a specular term of 0. `ValueGate` is the bit-accurate
+    model. The latency is 3 cycles, the initiation interval 1. There is no multiplier. The PROM, which all
+    lights share, holds 1024 words of 18 bits.
 
     Parameters
     ----------
@@ -26,7 +27,7 @@ class ValueGateUnit(PipelinedUnit):
     lights : int
         Number of lights, at least 1.
     exponent : int or None
-        The exponent, 1 to 1000, fixed at build time, without a PROM. ``None``: the exponent is a port.
+        The exponent, 1 to 1000, fixed at build time. There is then no PROM. ``None``: the exponent is a port.
     takes_threshold : bool
         Whether the threshold is a port in place of the exponent, as for the tables of a `Lobe`. There is then
         no PROM.

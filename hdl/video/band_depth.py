@@ -31,9 +31,9 @@ class BandDepthUnit(wiring.Component):
     memory : :py:`In(DepthMemory(x_bits, y_bits))`
         Depths of the band. A place outside the band reads as cleared. Writes there have no effect.
     begin : :py:`In(1)`
-        A band begins, with all depths cleared. Set ``begin`` only while ``busy`` is low.
+        High if a band begins, with all depths cleared. Set ``begin`` only while ``busy`` is low.
     busy : :py:`Out(1)`
-        Words are swept.
+        High while words are swept.
 
     Source: docs/theory/video.md#bands; not in the documents.
     """

@@ -28,7 +28,7 @@ class ControlsUnit(wiring.Component):
     buttons : :py:`In(4)`
         One bit for each of `BUTTONS`, 1 while the button is down. Any clock domain may drive the bits.
     frame : :py:`In(1)`
-        A frame begins.
+        High on the cycle on which a frame begins.
     angle : :py:`Out(12)`
         Angle of the frame.
     index : :py:`Out(range(materials * lights))`

@@ -41,7 +41,7 @@ class DrawCommandsUnit(wiring.Component):
     i : :py:`In(stream.Signature(walk_request_shape(commands)))`
         Requests.
     o : :py:`Out(stream.Signature(command_shape()))`
-        Commands, with the end.
+        Commands of the list, the command ``end`` last.
 
     Source: docs/theory/video.md#bands; [T] chapter 4.
     """
@@ -56,7 +56,7 @@ class DrawCommandsUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The address, and the word behind it."""
+        """The address, and the word that the memory gives."""
         m = Module()
         words = self.model.codes
         m.submodules.commands = memory = Memory(shape=COMMAND_BITS, depth=len(words), init=words)

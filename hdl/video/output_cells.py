@@ -14,7 +14,7 @@ class OutputCells(wiring.Component):
 
     With ports the cell is the FPGA's own cell (``ODDRX1F`` on ECP5), made by Amaranth's `DDRBuffer`. Without
     ports it is a model of this cell. On each cycle ``bits`` has the pair that the pins send, two cycles after
-    its input, as with ``ODDRX1F``. Its clock is the domain ``serial``.
+    its input, as with ``ODDRX1F``. The cells are in the domain ``serial``.
 
     Parameters
     ----------

@@ -9,7 +9,10 @@ from blysk.hdl.core.pipelined_unit import PipelinedUnit
 __all__ = ["SYMBOL", "TmdsEncoderUnit"]
 
 SYMBOL = data.StructLayout({"data": 8, "control": 2, "active": 1})
-"""Shape of an input. If ``active``, the byte ``data`` is sent, else the bits c0 and c1 of ``control``."""
+"""Shape of an input. If ``active``, the byte ``data`` is sent, else ``control``.
+
+``control`` has the control bits c0 and c1, as ``c0 + 2 c1``.
+"""
 
 
 class TmdsEncoderUnit(PipelinedUnit):
