@@ -153,9 +153,9 @@ class ArccosUnit(PipelinedUnit):
         return carried["flags"], total
 
     def _sequential(self, m, x, segment, flags):
-        """Words are ready at stage 5, and ``c2 x`` starts.
+        """Words are ready at stage 5, on which ``c2 x`` starts.
 
-        ``c1 x`` starts at 6, ``(c2 x) x`` at 8. The sum is ready at 12.
+        ``c1 x`` starts at stage 6, and ``(c2 x) x`` at stage 8. The sum is ready at stage 12.
         """
         at, register = self.at, self.register
         c0, c1, c2 = (

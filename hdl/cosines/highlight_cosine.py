@@ -34,7 +34,7 @@ class HighlightCosineUnit(wiring.Component):
 
     `HighlightCosine`, the bit-accurate model, has table, formats and error bounds.
 
-    The first value of a span comes 12 cycles after the span is accepted. Its stages are accumulator, folding,
+    The first value of a span comes 12 cycles after the span is accepted. The stages are accumulator, folding,
     table and its register, rise, sum, operand, product, alignment, rounding, sum, saturation. The values of
     the other pixels come in the following cycles, unless the output is stalled. The next span is accepted
     early enough to leave no gap. A span of length 0 takes one cycle and has no value. The unit has a

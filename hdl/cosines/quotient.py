@@ -64,8 +64,8 @@ class QuotientUnit(PipelinedUnit):
     each product has a multiplier. With a longer interval the products share
     ``ceil((2 + 2 lights) / initiation_interval)`` multipliers, without highlights
     ``ceil((1 + lights) / initiation_interval)``. The latency follows from the graph. At intervals of 1 to 5
-    it is 16, 22, 21, 24, 25 cycles with one light, and 16, 22, 22, 23, 21 with two. Without highlights it is
-    10 at an interval of 1.
+    it is 16, 22, 21, 24, 25 cycles with one light, and 16, 22, 22, 23, 21 cycles with two lights. Without
+    highlights it is 10 at an interval of 1.
 
     Parameters
     ----------

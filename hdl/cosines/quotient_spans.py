@@ -19,7 +19,7 @@ __all__ = ["QuotientSpansUnit", "line_directions_shape", "vectors_shape"]
 
 
 def vectors_shape(model: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
-    """Shape of a span: components at the first pixel, their step, its exponent, and the length.
+    """Shape of a span: components at the first pixel, their step, the step's exponent, and the length.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class QuotientSpansUnit(wiring.Component):
         waits. Payload and constants have to stay from the first cycle on which the span is valid. Valid may
         fall.
     o : :py:`Out(stream.Signature(pixel_words_shape(model)))`
-        Words of pixels, and a bit that alternates from span to span, 1 in the first.
+        Words of pixels, and a bit that alternates from span to span, 1 in the first span.
     constants : :py:`In(line_directions_shape(model))`
         Only with highlights: ``sin a`` and ``cos a`` of each light, constant while spans are inside.
     begun : :py:`Out(1)`

@@ -19,7 +19,10 @@ _SHIFT_BITS = 6
 
 
 def recurrence_starts_shape(model: RecurrenceSetup, lights: int) -> data.StructLayout:
-    """Shape of a prepared span: start values for L and H of each light, coefficient, shift, length, flag."""
+    """Shape of a prepared span: starts for L and H of each light, the step's words, length and flag.
+
+    The step's words are the coefficient, and its shift in the form ``reinsch``. The flag is ``out_of_range``.
+    """
     r = model.recurrence
     words = data.ArrayLayout(FixedShape(r.state_format), r.interleave)
     start = data.StructLayout(dict.fromkeys(("first", "second"), words))
@@ -206,7 +209,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return sine, (step, step_shift), (phase, phase_shift)
 
     def _rho(self, inverse: Word, sine: Word, reciprocal: Word, step_shift: Word) -> tuple[Word, Word]:
-        """Word of rho and its shift."""
+        """Word of rho (see `RecurrenceSetup`) and its shift."""
         g, p = self._graph, self.model
         product = g.multiply("excess_product", inverse, sine)
         excess = g.register("excess_difference", lambda a, b: a - b, inverse, sine)

@@ -25,7 +25,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpola
     Parameters
     ----------
     model : BisectionInterpolator
-        Threshold, factor of the bisection unit, specular operand.
+        Bit-accurate model, with threshold, factor of the bisection unit, and specular operand.
     lights : int
         Number of lights, at least 1.
     options
@@ -41,7 +41,7 @@ class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpola
         self.setup_interval = self._normaliser.interval(0)
 
     def span_intervals(self, spans):
-        """Intervals of spans of several segments are longer.
+        """Intervals of the spans. If a span has several segments, its interval is longer.
 
         A span's levels are counted while the previous span is divided.
         """

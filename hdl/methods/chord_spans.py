@@ -26,7 +26,7 @@ from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 __all__ = ["ChordAccumulatorUnit", "ChordSpansUnit"]
 
 _LONG = 3
-"""Pixels of the shortest span that has differences."""
+"""Number of pixels of the shortest span that has differences."""
 
 
 class ChordAccumulatorUnit(AccumulatorUnit):
@@ -37,7 +37,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     Parameters
     ----------
     model : LocalChordInterpolator
-        Formats.
+        Bit-accurate model, with the formats.
     lights : int
         Number of lights, at least 1.
     highlights : bool
@@ -104,7 +104,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
 
     @staticmethod
     def _adds_late(model: DifferenceAccumulator) -> bool:
-        """Whether the start has a bit of the weight of half a step of the result."""
+        """Whether the start has a bit at the place of half a step of the result."""
         return model.start_format.fraction_bits > model.result_format.fraction_bits
 
     @property
@@ -113,7 +113,7 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         return self.words
 
     def hold(self, m, load):
-        """Keep only the decision, as the words are on the port when they are taken in."""
+        """Keep only the decision, because the words are on the port when they are taken in."""
         if self.gated:
             self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
             with m.If(self.i.ready):

@@ -123,7 +123,7 @@ class InterpolatorUnit(wiring.Component):
     cycles_per_pixel = 1
 
     room_after = 2
-    """Cycles from a span's first pixel until there is room for the prepared second span after it."""
+    """Least cycles from a span's first pixel until the second span after it is prepared."""
 
     DEFAULT_INTERVAL = 4
     """Largest default of `setup_interval`."""

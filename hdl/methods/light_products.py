@@ -30,7 +30,7 @@ def operands_shape(
     Parameters
     ----------
     model : Interpolator
-        Formats.
+        Bit-accurate model, with the formats.
     lights : int
         Number of lights.
     highlights : bool
@@ -116,7 +116,7 @@ class LightProductsUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph; the chord in the specular unit's format."""
+        """The graph. The chord is brought into the specular unit's format."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for light, words in zip(result, self._words, strict=True):

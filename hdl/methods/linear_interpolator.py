@@ -23,7 +23,7 @@ class LinearInterpolatorUnit(NormalInterpolatorUnit, model=LinearInterpolator):
     Parameters
     ----------
     model : LinearInterpolator
-        The specular operand.
+        Bit-accurate model, with the specular operand.
     lights : int
         Number of lights, at least 1.
     options

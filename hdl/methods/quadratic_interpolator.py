@@ -34,7 +34,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
     Parameters
     ----------
     model : QuadraticInterpolator
-        Form and specular operand.
+        Bit-accurate model, with form and specular operand.
     lights : int
         Number of lights, at least 1.
     options

@@ -59,7 +59,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         return 1
 
     def span_intervals(self, spans):
-        """Intervals of spans of one or two pixels are shorter."""
+        """Intervals of the spans. They are shorter for spans of one or two pixels."""
         return np.minimum(spans.length, 3) * self.setup_interval // 3
 
     @property

@@ -24,7 +24,7 @@ class LineAccumulatorUnit(AccumulatorUnit):
     Parameters
     ----------
     model : RenormaliseInterpolator
-        Formats.
+        Bit-accurate model, with the formats.
     length_bits : int
         Bits of the length.
     """
@@ -58,7 +58,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInter
     Parameters
     ----------
     model : RenormaliseInterpolator
-        The specular operand.
+        Bit-accurate model, with the specular operand.
     lights : int
         Number of lights, at least 1.
     options

@@ -70,7 +70,7 @@ class BisectionChainUnit(wiring.Component):
         )
 
     def latency(self, level: int) -> int:
-        """Cycles from input to output of a span of a level."""
+        """Cycles from input to output of a span with this ``level``."""
         return 17 + level * (3 * self.model.bisection.steps + 8)
 
     def elaborate(self, platform):

@@ -21,9 +21,9 @@ class AccumulatorUnit(wiring.Component):
 
     `DifferenceAccumulator`, the bit-accurate model of each quadratic, has formats, rounding and bounds.
 
-    A span of m pixels gives its first values 3 cycles after it was accepted. It gives the others in the next
-    m - 1 cycles, unless the output waits. The next span is accepted early enough to leave no gap. A span of
-    length 0 takes one cycle and gives nothing. The unit has no multipliers.
+    A span of m pixels gives its first values 3 cycles after it was accepted. The values of the other pixels
+    follow in the next m - 1 cycles, unless the output waits. The next span is accepted early enough to leave
+    no gap. A span of length 0 takes one cycle and gives nothing. The unit has no multipliers.
 
     The accumulators load the words of a span a cycle after it was accepted. So a register drives all of their
     enables.

@@ -37,8 +37,8 @@ class DifferenceSetupUnit(PipelinedUnit):
 
     A span needs seven multiplications: the square of dt, three products with P and three with G. With an
     initiation interval I, ``ceil(7 / I)`` multipliers share them (`blysk.hdl.core.dataflow`), each with its
-    own shifter. By default one multiplier does all. The results are the same for every I. A table of
-    ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals.
+    own shifter. By default one multiplier makes all products. The results are the same for every I. A table
+    of ``2^(length_bits - 1)`` words of 17 bits holds the reciprocals.
 
     =========== == == == == == == ==
     interval    1  2  3  4  5  6  7
