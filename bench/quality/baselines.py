@@ -3,8 +3,8 @@
 The figures are in ``bench/quality/baselines.json``. A test fails if a figure changes by more than 2 %, up or
 down. ``python -m blysk.bench.quality.baselines`` measures all figures and prints the changes. The exit status
 is 1 if a figure changed by more than 2 %, or if an entry is missing or no longer measured. ``--update``
-writes the file. With words the command measures only entries with one of the words in their names. The other
-entries stay unchanged. After a unit was added, use
+writes the file. If words are given, the command measures only entries whose names have one of the words. The
+other entries stay unchanged. After a unit was added, use
 ``python -m blysk.bench.quality.baselines --update halfway_vector``.
 
 Cycles do not depend on the engine. Here they come from Amaranth's own simulator, which compiles nothing.
@@ -132,13 +132,13 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
     pipelines += [_Pipeline(method, gate=True) for method in ("quadratic", "linear")]
     pipelines += [_Pipeline("quadratic", "blinn_product", "compact", gate) for gate in (False, True)]
     entries = {f"frames: {pipeline.name}": pipeline.cycles for pipeline in pipelines}
-    # In this style the model changes only the latency, so the cycles differ only by this.
+    # In the throughput style the model changes only the latency, so the cycles differ only by the latency.
     pipelines += [_Pipeline(model=model) for model in MODELS if model != "cosquad"]
     pipelines += [_Pipeline("quotient", "phong")]
     entries |= {f"parts: {pipeline.name}": pipeline.parts for pipeline in pipelines}
-    # Pipelines have lines of their own, with styles and gates.
+    # Pipelines already have their entries, with styles and gates.
     of_units = [entry for entry in UNITS if entry.record.kind is not ShadingPipelineUnit]
-    # Units of geometry whose errors are in no table.
+    # Units whose errors are in no table, such as the units of geometry.
     of_units += [Entry(record, record.default) for record in RECORDS.values() if not entries_of(record)]
     entries |= {f"parts: {entry.title}": partial(_parts_of_unit, entry) for entry in of_units}
     return entries
@@ -147,9 +147,9 @@ def _entries() -> dict[str, Callable[[], dict[str, int]]]:
 ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
 """Entries to measure, each with a function that returns its figures.
 
-``frames`` is `cycles_of` the pipelines of each method in both styles, and of some with a gate. ``parts`` is
-`Cost.totals` of these pipelines, of a pipeline of each model, of true Phong, and of every measured variant of
-every other unit.
+Entries ``frames`` have `cycles_of` a pipeline. There are the pipelines of each method in both styles, and
+some with a gate. Entries ``parts`` have `Cost.totals` of these pipelines, of a pipeline of each model, of
+true Phong, and of every measured variant of every other unit.
 """
 
 

@@ -1,4 +1,4 @@
-"""Equivalent mutants. ABC proves that no stimulus distinguishes them from the unit."""
+"""Proofs by ABC that a mutant is equivalent to its unit: no stimulus distinguishes them."""
 
 import itertools
 import math
@@ -20,13 +20,13 @@ __all__ = ["Miter", "yosys"]
 _SECONDS = 20
 """Time limit of a proof of equivalence, in seconds.
 
-A first attempt comes before this proof. Its limit is a quarter of this time. Most successful proofs take at
-most 3 seconds.
+A first attempt comes before this proof. The limit of the first attempt is a quarter of this time. Most
+successful proofs take at most 3 seconds.
 """
 
 
 YOSYS_SECONDS = 1800
-"""Time limit of a run of Yosys, in seconds, longer than any run that we have seen finish."""
+"""Time limit of a run of Yosys, in seconds. Every run that has finished so far took less time."""
 
 
 def yosys(script: str, folder: Path) -> None:
@@ -66,7 +66,10 @@ _NARROW = 12
 
 
 def _numbers(data: bytes) -> Iterator[int]:
-    """Numbers in AIGER's binary format: 7 bits a byte, lowest first; bit 7 is set if another byte follows."""
+    """Numbers in AIGER's binary format.
+
+    A byte has 7 bits of a number, and the lowest bits come first. Bit 7 is 1 if another byte follows.
+    """
     value = shift = 0
     for byte in data:
         value |= (byte & 127) << shift
@@ -85,14 +88,14 @@ def _coded(number: int) -> bytes:
 
 
 class Miter:
-    """Equivalence check of a unit and one of its mutants, each given as AND gates and one-bit registers.
+    """Equivalence check of a unit and a mutant of the unit. Both are AND gates and one-bit registers.
 
-    A proof that goes through multipliers would take too long. Therefore unit and mutant share their
-    registers, and the proof shows that both compute the same next values. Then the registers stay equal by
-    induction. Shared registers of at most 12 bits, and registers named ``valid`` or ``ages``, control the
-    unit. They take the next values that the unit computes. The other shared registers are free inputs, or 0
-    if they are always 0 in the unit. The register that the fault reaches first, and bits that differ in a
-    proof, are not shared.
+    A proof through multipliers would take too long. Therefore unit and mutant share their registers, and the
+    proof shows that both compute the same next values. Then the registers stay equal by induction. Shared
+    registers of at most 12 bits, and registers named ``valid`` or ``ages``, control the unit. They take the
+    next values that the unit computes. The other shared registers are free inputs, or 0 if they are always 0
+    in the unit. The register that the fault reaches first is not shared. Bits that differ in a proof are not
+    shared in the next proof.
 
     Parameters
     ----------
@@ -153,11 +156,11 @@ class Miter:
         ``register`` is the register that the mutant's fault reaches first.
         """
         shared = set(range(len(self._next)))
-        # Here simplification of the gates removed the fault. If fewer registers were shared, it would rarely
-        # remove the fault.
+        # With all registers shared, simplification of the gates may remove the fault. With fewer shared
+        # registers this is rare.
         if not self._write(mutant, shared):
             return True
-        # The fault has no effect for any register contents. An example is a fault that changes a register's
+        # The fault may have no effect for any contents of the registers. For example, it changes a register's
         # input only while the register keeps its value.
         if self._prove(mutant, shared, _SECONDS / 4)[0]:
             return True
@@ -198,8 +201,8 @@ class Miter:
     def _write(self, mutant: int, shared: Set[int]) -> list[int]:
         """Write ``mutant.aig``.
 
-        Returns, for each output of the file, the register that it compares, or -1 if it compares an output of
-        the unit.
+        Returns a number for each output of the file: the register that the output compares, or -1 if it
+        compares an output of the unit.
         """
         known, gates = {}, []
         places = itertools.count(1 + self._inputs)
@@ -229,7 +232,7 @@ class Miter:
             a, b = (unit[end >> 1] ^ end & 1 for unit in units)
             if latch >= 0 and not (latch in shared and latch in self._free):
                 now = (unit[1 + self._inputs + latch] >> 1 for unit in units)
-                # A shared register has one node, whose next value is the unit's.
+                # A shared register has one node. The unit gives the node's next value.
                 ends = zip(now, (a, a if latch in shared else b), strict=True)
                 following |= {node: end for node, end in ends if node}
             if a != b and (latch < 0 or latch in shared):

@@ -1,5 +1,6 @@
-// Behind `sim/engines/cxxrtl_driver.cc`: which mutant the next models are, and at which number their counters begin.
-// In front of it, BLYSK_COUNTERS has BLYSK_COUNTER(register) for each of these.
+// This text follows `sim/engines/cxxrtl_driver.cc`. blysk_mutant selects the mutant of the next models. blysk_start is
+// the number at which their counters begin. A macro BLYSK_COUNTERS before this text has BLYSK_COUNTER(register) for each
+// counter.
 
 extern "C" {
 

