@@ -116,7 +116,7 @@ def shown(value: Any) -> str:
 
 
 def shown_key(name: str) -> str:
-    """A key of a file in a message."""
+    """A key of a file, as a message shows it."""
     return name if re.fullmatch("[A-Za-z0-9_-]{1,40}", name) else shown(name)
 
 

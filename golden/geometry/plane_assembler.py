@@ -44,8 +44,8 @@ class PlaneAssembler:
     the step of N/W per pixel, and m the least length of N/W in the triangle. Over p pixels of a scanline the
     chord is at most ``p |g| / m``. Both are bounded:
 
-    - ``|g| <= (largest + sum) / 2``, of the absolute values of the three components of g: at most
-      ``sqrt(3/2) < 1.23`` times too large;
+    - ``|g| <= (largest + sum) / 2``, where ``largest`` and ``sum`` are the largest and the sum of the
+      absolute values of g's three components. This is at most ``sqrt(3/2) < 1.23`` times too large;
     - ``m >= least`` of `AttributeSerialiser`.
 
     ``piece`` is the largest number from 1 to 12 for which ``2^piece (largest + sum) / 2`` is at most

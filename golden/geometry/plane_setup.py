@@ -66,9 +66,9 @@ class PlaneScales:
 class PlaneSetup:
     """``1/D`` and ``1/W`` of a triangle, where D is its height and W its largest width, at the middle corner.
 
-    Let ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2. The width in pixels is
-    ``a / (D 2^s)``, so ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and ``1/A``; A is cut to
-    25 fraction bits. ``d / A`` is one `wide_product`. A quotient of 1 or more is halved.
+    Let a be twice the area, ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2. The
+    width in pixels is ``a / (D 2^s)``, so ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and
+    ``1/A``; A is cut to 25 fraction bits. ``d / A`` is one `wide_product`. A quotient of 1 or more is halved.
 
     For a difference v of attributes the step per scanline is ``2^s v / D = (v / d) 2^(s - e)``. The step per
     column is ``v / W``. `GradientSetup` multiplies the mantissas by 2^8. It shifts right by

@@ -8,7 +8,7 @@ GUARD_BITS = 3
 """Bits that the three products keep below the result's last bit."""
 
 LOST = 2.0**-1 + 3 * 2.0**-GUARD_BITS
-"""Error of a `wide_product` in steps of the result, without the omitted product: rounding, three cuts."""
+"""Error of a `wide_product` by rounding and by three cuts, in steps of the result."""
 
 
 def low_format(format: Format, low_bits: int) -> Format:
@@ -28,7 +28,7 @@ def halves(value: Fixed, low_bits: int) -> tuple[Fixed, Fixed]:
 def wide_product(a: Fixed, b: Fixed, a_low: int, b_low: int, fraction_bits: int) -> Fixed:
     """``a b`` from three products of the halves. The product of the two low halves is omitted.
 
-    Each product is cut to `GUARD_BITS` more than the result's fraction bits, and their sum rounded half up.
+    Each product is cut to `GUARD_BITS` more fraction bits than the result has. Their sum is rounded half up.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Quadratic interpolation of normals ([T] 2.2): methods ``quadratic``, ``-eval`` and ``-horner``."""
+"""Quadratic interpolation of normals ([T] 2.2), by differences, by evaluation, and by Horner's rule."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -97,7 +97,7 @@ class QuadraticInterpolator(NormalInterpolator):
         middle = np.sqrt(3) * self.middle_normal.error
         if self.form != "differences":
             return float(middle + np.sqrt(3) * QuadraticEvaluator(self.form).error)
-        # G and P have four times the middle normal.
+        # G and P contain four times the middle normal.
         p, g = self.LARGEST_P + 4 * middle, self.LARGEST_G + 4 * middle
         return float(middle + self._reciprocal_error(p, g) + difference_rounding((1 << LENGTH_BITS) - 2))
 

@@ -86,7 +86,7 @@ class Light:
         Vector *to* the light, of any length but 0, stored as a unit vector. A text may hold the three
         numbers: ``"0,1,0"``.
     color : three floats, float or str
-        Intensity I_i, at least 0: of each channel, one number for all channels, or ``"#rrggbb"`` in
+        Intensity I_i, at least 0: three numbers, one number for all channels, or ``"#rrggbb"`` in
         sRGB. Stored as three floats of linear light.
     position : three floats, optional
         Position of a point light, in the mesh's units, in place of ``direction``.

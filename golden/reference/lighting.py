@@ -61,7 +61,7 @@ class Material:
     Parameters
     ----------
     ambient, diffuse, specular : three floats, float or str, each
-        k_a, k_d, k_s, at least 0: of each channel, one number for all channels, or ``"#rrggbb"`` in sRGB.
+        k_a, k_d, k_s, at least 0: three numbers, one number for all channels, or ``"#rrggbb"`` in sRGB.
         Stored as three floats of linear light. Their sum may exceed 1: the intensity saturates.
     exponent : int
         Exponent n of the highlight, 1 to 1000.

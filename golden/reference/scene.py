@@ -42,7 +42,7 @@ class Scene:
     lights : sequence of Light
         Any number, directional or point lights; stored as a tuple.
     ambient_light : three floats, float or str
-        I_a, at least 0: of each channel, one number for all channels, or ``"#rrggbb"`` in sRGB.
+        I_a, at least 0: three numbers, one number for all channels, or ``"#rrggbb"`` in sRGB.
         Stored as three floats of linear light.
     background : three floats, float or str
         Colour of the pixels that show no surface, in [0, 1], in the same forms.

@@ -17,7 +17,7 @@ _MARKS = {
     "run": "a pixel whose right neighbour is not the next pixel, or the last pixel of the frame",
     "frame": "the last beat of the frame",
 }
-_DEPTHS = "Each frame clears the depths; a frame that is sent with 1 in keep adds to the picture."
+_DEPTHS = "Each frame clears the depths, unless it is sent with 1 in keep: then it adds to the picture."
 
 _PATHS = {
     "axi": "AXI4-Lite, s_axil_*",
@@ -82,7 +82,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
         *layout_lines(layouts.given),
         f"m_axis_tdata, {layouts.made.size} bytes, likewise:",
         *layout_lines(layouts.made),
-        "s_axis_tlast ends a frame: without it the last beat never comes.",
+        "s_axis_tlast ends a frame: without it the last output beat never comes.",
         f"m_axis_tlast: {_MARKS[packets]}.",
         "m_axis_tuser: bit 0 marks the first beat of the frame, bit 1 the last; tkeep is all ones.",
         "",

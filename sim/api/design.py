@@ -38,7 +38,7 @@ def design(
     Parameters
     ----------
     lights, materials : int
-        Numbers of lights and materials that it serves: 1 to 16 and 1 to 1024.
+        Numbers of lights and materials that the pipeline serves: 1 to 16 and 1 to 1024.
     factors : int
         Number of lights that fade, by distance or as spots. They are the first lights. Needs ``chord-local``.
     albedo : str or sequence of str, optional
@@ -99,8 +99,8 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
     method = settings["method"]
     if settings["model"] in MIRROR_LOBES and not (METHODS | PUBLISHED)[method].serves_mirror:
         remedy = (
-            "use method quotient; or phong_coplanar, equal where N, L and V lie in a plane, elsewhere with "
-            "rounder highlights, 11 LSB of linear light off on the default teapot"
+            "use method quotient; or phong_coplanar, which is exact where N, L and V lie in a plane, and 11 LSB "
+            "of linear light off on the default teapot"
         )
         raise settings.refuse("model", f"method {method} finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:

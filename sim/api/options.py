@@ -307,7 +307,7 @@ NEEDS: dict[str, Option] = {
         "orthographic: only for cameras without perspective.  [default: none]",
     ),
 }
-"""What a scene decides in a design, for commands without a scene."""
+"""Parts of a design that a scene decides, for commands without a scene."""
 
 BUILD: dict[str, Option] = {
     "geometry": Option(

@@ -35,7 +35,7 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
     """A scene with the defaults of the command line.
 
     The mesh, the camera and the lights are scaled by the same power of two, so that no product of coordinates
-    overflows. The picture is the same to the bit. Colours are ``"#rrggbb"`` in sRGB, or one number or three
+    overflows. This changes no bit of the picture. Colours are ``"#rrggbb"`` in sRGB, or one number or three
     of linear light. Each option also takes the text of the command line: ``size="640x480"``.
 
     Parameters
@@ -158,9 +158,9 @@ def load(
 
 
 def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
-    """Whether a triangle may be in the picture.
+    """Whether the picture may show a triangle.
 
-    It is not if all its corners are beyond the same border, or all are nearer than the near plane.
+    No triangle is shown if all its corners are beyond the same border, or all are nearer than the near plane.
     """
     width, height = size
     with np.errstate(over="ignore", invalid="ignore"):
@@ -276,7 +276,7 @@ def _framing(vertices: np.ndarray, settings: Settings, count: int) -> list[Camer
 
 
 def _shifted(point: ArrayLike, shift: int = 0) -> Triple:
-    """A point times ``2**shift``, as the vertices of the mesh."""
+    """A point multiplied by ``2**shift``, like the vertices of the mesh."""
     x, y, z = np.asarray(point, dtype=np.float64).tolist()
     return math.ldexp(x, shift), math.ldexp(y, shift), math.ldexp(z, shift)
 

@@ -117,7 +117,7 @@ def _axes_lines(renderer: Renderer) -> list[str]:
     if not renderer.axes:
         return []
     return [
-        "With several lights no vertex normal may be longer than 1, before it is times 1/W.",
+        "With several lights no vertex normal may be longer than 1, before it is multiplied by 1/W.",
         f"axes of light k, from 1 on: {', '.join(renderer.axes)} of its frame, each as its dot products with",
         "x, y and z of light 0's frame, times 2^17, rounded, at most 2^17 - 1; write them before the first "
         "triangle of a frame",
@@ -137,7 +137,7 @@ def _coarse_lines(unit: RendererUnit) -> list[str]:
 def _geometry_lines(geometry: GeometryUnit) -> list[str]:
     """Description of the input of a core from triangles to spans."""
     grid = geometry.grid
-    spans = "their true lines, uncut" if geometry.lines else "two unit normals, wide ones cut"
+    spans = "their true lines, uncut" if geometry.lines else "two unit normals, wide spans cut"
     normal, limit = "vertex normal", "is not read" if geometry.lines else _LIMIT
     if geometry.vectors:
         spans, limit = "N/W and its step, cut where N/W grows short", "is not read"

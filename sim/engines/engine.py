@@ -189,4 +189,4 @@ class Prepared(Protocol):
     """A component prepared for an engine, for any number of runs, each from power-up."""
 
     def run(self, drive: Drive, progress: Callable[[int], object] | None) -> Trace:
-        """Run from power-up. ``progress`` gets the number of output beats so far, once a batch of cycles."""
+        """Run from power-up. After each batch of cycles ``progress`` gets the number of output beats."""

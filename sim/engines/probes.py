@@ -75,8 +75,8 @@ class ObservedPipeline(Component):
     status : :py:`Out(StructLayout({..., "gated_pixels": 32}))`
         The fields of its status, and
 
-        - ``gated_pixels``: number of taken pixels whose spans have no highlight by the gate, 0 without a
-          gate;
+        - ``gated_pixels``: number of taken pixels whose spans have no highlight, as the gate decides; 0
+          without a gate;
         - ``waits``: whether a pixel of the interpolator is stalled;
         - ``taken``: whether the lights take a pixel;
         - each word, by the name of its probe.
@@ -272,7 +272,7 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
 
 
 def _accumulators(fragment, number, one: float):
-    """Probes for the sums of methods with an accumulator of normals, and for their increments."""
+    """Probes for the sums of methods with an accumulator of normals, and for the increments of the sums."""
     words = _registers(_part(fragment, "interpolator.difference_accumulator"))
     if words:
         age = -1 - _unit(fragment, "interpolator").product_latency

@@ -186,7 +186,7 @@ def simulate(
         Input beats, as `beats.pack` takes them.
     count : int or None
         Expected number of output beats. The run ends ``settle`` cycles after these beats, all writes and all
-        input beats are transferred. ``None`` takes as many as come, until all input is taken and
+        input beats are transferred. ``None`` takes any number, until all input is taken and
         ``idle_timeout`` cycles have passed without a transfer.
     constants : scalar of the constants' type, or mapping of names to codes
         Values for the whole run. Needed if the component has ``constants``.
@@ -200,7 +200,7 @@ def simulate(
         ``"cxxrtl"``, ``"pysim"``, or ``"auto"``. ``"auto"`` takes the compiled engine. If no compiler works,
         it takes pysim with a warning.
     origin : optional
-        Values that the component is made from, as for `cxxrtl.Compiled`. With them the component is found
+        Values from which the component is made, as for `cxxrtl.Compiled`. With them the component is found
         faster in the cache.
     input_stalls, output_stalls : bool array, optional
         One value a cycle, repeated for ever. ``True`` keeps the source from offering a new beat, or the sink

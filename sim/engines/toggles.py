@@ -33,7 +33,7 @@ class ToggleCounter(Component):
     Members
     -------
     i, o, constants, write
-        Those of the component.
+        Members of the component.
     status : :py:`Out(StructLayout({path: 48, ...}))`
         Counts, by the path of the submodule: names with dots between them. ``top`` counts the component's own
         registers. Submodules without registers have no count.
@@ -147,7 +147,7 @@ def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
 
 
 class _Ones(Elaboratable):
-    """Number of bits of a word that differ from the cycle before, counted for each byte, and in its place.
+    """For each byte of a word, the number of bits that differ from the cycle before, in the same byte.
 
     It is a module of its own, so that an event-driven engine evaluates little again after a change.
     """

@@ -45,7 +45,7 @@ __all__ = [
 
 
 def turned(vector: ArrayLike, axis: ArrayLike, count: int) -> np.ndarray:
-    """A vector at equal steps of a full turn about an axis. The turn is counter-clockwise, seen from its tip.
+    """A vector at equal steps of a full turn about an axis, counter-clockwise as seen from the axis' tip.
 
     Step k is ``v cos a + (u x v) sin a + u (u·v) (1 - cos a)`` (Rodrigues). Here u is the axis' unit vector,
     and ``a = 2 pi k / count``. Step 0 is the vector itself, to the bit.
@@ -91,10 +91,10 @@ def turntable(camera: Camera, count: int) -> list[Camera]:
 
 
 def equal_distance(cameras: Sequence[Camera]) -> list[Camera]:
-    """Cameras of `Camera.framing` with the same target, moved to the largest of their distances.
+    """Cameras of `Camera.framing` with the same target, moved to the largest distance among them.
 
-    Without this move a turntable would come nearer at angles where the mesh is narrow. All cameras get the
-    largest height of picture and the nearest near plane among them.
+    Without this move the camera of a turntable would come nearer at angles where the mesh is narrow. All
+    cameras get the largest height of picture and the nearest near plane among them.
     """
     if len(cameras) == 1:
         return list(cameras)

@@ -1,4 +1,4 @@
-"""Kinds of errors of a frame, and the frame that each compares with."""
+"""Kinds of errors of a frame, each with the frame for comparison."""
 
 __all__ = ["ERRORS", "reference_of"]
 
@@ -7,11 +7,11 @@ ERRORS = {
     "method": "exact normals of every pixel, same model",
     "total": "exact normals of every pixel, model {}",
 }
-"""Name of each error, and the frame that it compares with. ``{}`` stands for a model, see `reference_of`."""
+"""Frame for comparison, by the name of the error. ``{}`` stands for a model, see `reference_of`."""
 
 
 def reference_of(error: str, target: str) -> str:
-    """The frame that an error compares with, in words.
+    """The frame for comparison of an error, in words.
 
     Parameters
     ----------

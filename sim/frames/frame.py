@@ -109,7 +109,7 @@ def attribute_beats(layout: data.StructLayout, attributes: SpanAttributes) -> np
 
 
 def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Pixels of wide beats, in the order in which one pipeline gives them; ``y``: their scanlines.
+    """Pixels of beats with several pixels each, in the order of a single pipeline; ``y``: their scanlines.
 
     Within a scanline both orders follow the order of the spans.
     """

@@ -89,7 +89,7 @@ def teapot_frame(
 def _colored(
     mesh: Mesh, materials: Sequence[Material], design: ShadingPipeline
 ) -> tuple[Mesh, Sequence[Material]]:
-    """The mesh with colours of its normals, and materials with a texture, if the design shows them."""
+    """The mesh with vertex colours, and materials with a texture, if the design shows them."""
     albedo = design.albedo
     if albedo is None:
         return mesh, materials

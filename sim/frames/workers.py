@@ -126,7 +126,7 @@ def check_address(address: str) -> None:
         If the text has another form, or Dask is missing.
     """
     option = f"--cluster {address}"
-    # If the text is no address, Dask's client stays behind half built.
+    # For a text that is no address Dask would leave a half-built client behind.
     if not re.fullmatch(r"((tcp|tls|wss?)://)?([^\s/:@\[\]]+|\[[0-9a-fA-F:.%]+\]):[0-9]{1,5}", address):
         raise InputError(option, "not the address of a Dask scheduler", _START)
     if importlib.util.find_spec("distributed") is None:

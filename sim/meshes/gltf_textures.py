@@ -43,7 +43,7 @@ _KNOWN = {
 _ANY = {"name", "extensions", "extras"}
 # A whole number of JSON may be too large for a float.
 _LARGEST = 1e30
-# Extensions of other kinds of images, beside an image that is read.
+# Extensions that give a texture other images, in addition to an image that is read.
 _IMAGES = {"EXT_texture_webp", "KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds"}
 
 

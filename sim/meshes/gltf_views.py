@@ -15,7 +15,7 @@ from blysk.sim.meshes.materials import Found
 __all__ = ["GltfLight", "GltfViews", "gltf_views", "placed_camera", "placed_lights"]
 
 _LIGHTS = "KHR_lights_punctual"
-# The share of the vertices that are nearer to a light than the distance at which its brightness counts.
+# The share of the vertices that are nearer to a light than the distance r of `placed_lights`.
 _NEAR = 0.25
 # The farthest place of a camera from the middle of the mesh, in sizes of the mesh.
 _FARTHEST = 1e6

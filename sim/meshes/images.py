@@ -21,7 +21,7 @@ MAX_PIXELS = 1 << 26
 """Largest number of pixels of an image, 8192 x 8192."""
 
 NOT_THERE, OUTSIDE = "which does not exist", "outside its folder"
-"""Why a file beside a mesh file is not read."""
+"""Reasons for which a file beside a mesh file is not read."""
 
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA")
 _REMEDY = "save the image again, as PNG or JPEG, or shade the mesh with one material"

@@ -65,8 +65,8 @@ def load_mesh(
     """Load a mesh from a file, or build the teapot.
 
     *Normals* stored at the vertices of an OBJ, PLY, GLB or glTF file are kept. The computed normal replaces
-    zero, NaN and infinite normals. Normals of another length are normalised. Both kinds are counted. Without
-    stored normals (and for STL, whose normals belong to faces)
+    zero, NaN and infinite normals. Normals of another length are normalised. Both repairs are counted.
+    Without stored normals (and for STL, whose normals belong to faces)
 
     - vertices of equal position are welded;
     - the mesh is cut along the edges where two faces meet at more than ``crease_angle``;
@@ -121,7 +121,7 @@ def load_mesh(
 
     Contents that belong to the picture and are not read are in ``ignored``: other textures, alpha, ``illum``,
     smoothing groups, animations. Each reader has a list of the statements, keywords, properties, keys and
-    extensions that it knows. Others are in ``ignored`` by their names.
+    extensions that it knows. Other names are in ``ignored``.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ _IMAGE = re.compile(
 
 
 def plain_lines(data: bytes) -> bytes:
-    """A text without comments, each statement in a line of its own; names keep what looks like a comment."""
+    """A text without comments, and each statement in a line of its own. In names ``#`` begins no comment."""
 
     def without_comment(line):
         name = line[1] or b""

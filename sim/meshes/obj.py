@@ -14,7 +14,7 @@ from blysk.sim.meshes.refusal import Refused, shown
 
 __all__ = ["read_obj", "split_obj"]
 
-# Statements that are read, and those that only name parts.
+# Statements that are read, and statements that only name parts.
 _STATEMENTS = {"usemtl", "mtllib", "o", "g", "s", "vt"}
 
 
@@ -151,9 +151,9 @@ def _coordinates(data: bytes) -> np.ndarray:
 def _triangles(
     data: bytes, vertices: np.ndarray, coordinates: int, normals: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles as indices from 1 of position, coordinates, normal, (T, 3, 3), and numbers of materials.
+    """Triangles, shape (T, 3, 3), and the numbers of their materials.
 
-    A missing index is 0.
+    A corner has the indices, from 1, of its position, texture coordinates and normal. A missing index is 0.
     """
     blocks = re.split(rb"^o ([0-9]+)\n?", data, flags=re.MULTILINE)
     of_block = [0, *map(int, blocks[1::2])]

@@ -60,19 +60,19 @@ def cut_polygons(
 def triangulated(vertices: np.ndarray, polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Cut polygons of equally many corners into triangles that keep all corners and sides.
 
-    Each side of a polygon of n corners is a side of exactly one of its n - 2 triangles. Two triangles share
-    each other side, in opposite directions. So polygons that share sides stay joined. A fan from a corner is
-    used if each of its triangles has an area and the polygon's orientation. The fan then covers a polygon
-    that does not cross itself. Other polygons are cut by ear clipping, in the plane at right angles to their
-    area vector ``sum(p_i x p_(i+1)) / 2``. A triangle without area is left only where nothing else keeps a
-    corner, as at the end of a spike.
+    Each side of a polygon of n corners is a side of exactly one of its n - 2 triangles. All other
+    sides belong to two triangles, in opposite directions. So polygons that share sides stay joined. A fan
+    from a corner is used if each of its triangles has an area and the polygon's orientation. The fan then
+    covers a polygon that does not cross itself. Other polygons are cut by ear clipping, in the plane at right
+    angles to their area vector ``sum(p_i x p_(i+1)) / 2``. A triangle without area is left only where nothing
+    else keeps a corner, as at the end of a spike.
 
     Parameters
     ----------
     vertices : ndarray, shape (V, 3)
         Coordinates.
     polygons : int ndarray, shape (P, n)
-        Vertices of their n corners, n at least 3, in range.
+        Vertices of the polygons' n corners, n at least 3, in range.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def _keeps_sides(triangles: list[list[int]], count: int) -> bool:
 
 
 def _improved(flat: np.ndarray, triangles: list[list[int]], least: float) -> np.ndarray:
-    """Triangles of a polygon. One without area exchanges a side with a neighbour if both get an area."""
+    """Triangles of a polygon. Triangles without area exchange a side with a neighbour if both get an area."""
     result = np.array(triangles)
     across = {side: (k, c) for k, t in enumerate(triangles) for side, c in zip(_sides(t), t, strict=True)}
     waiting = np.flatnonzero(_doubled_areas(flat, result) <= least).tolist()

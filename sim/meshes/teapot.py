@@ -49,8 +49,8 @@ def control_points() -> np.ndarray:
 def _contract(weights: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Sum of ``weights[k, n] * points[k, ...]`` over the four k: shape (n, ...).
 
-    The outer two and the inner two are added first, so that reversing both arrays gives the same bits:
-    two patches that share an edge, in either direction, get the same points there.
+    The outer two and the inner two are added first. So reversing both arrays gives the same bits. Two
+    patches that share an edge, in either direction, get the same points there.
     """
     w = weights.reshape(*weights.shape, *([1] * (points.ndim - 1)))
     p = points[:, np.newaxis]

@@ -127,7 +127,7 @@ async def cycles(dut, parts, count=None):
 @cocotb.test()
 @cocotb.parametrize(pauses=[(0.0, 0.0), (0.4, 0.4), (0.8, 0.1), (0.1, 0.8)])
 async def every_pixel(dut, pauses):
-    """Send constants, then spans, and check pixels; sources and sink pause in these shares of the cycles."""
+    """Send constants, then spans, and check pixels; sources and sink pause in the given shares of cycles."""
     for port in ("i_valid", "write_valid", "o_ready"):
         getattr(dut, port).value = 0
     dut.rst.value = 1
