@@ -20,10 +20,10 @@ EXPONENTS = (1, 10, 100, 1000)
 
 
 def model_of(method: str) -> str:
-    """Reflection model by which methods are compared.
+    """Reflection model with which a method is compared with other methods.
 
-    It is ``cosquad``, the documents' model. For a method whose highlights always come from a table it is
-    ``blinn``.
+    The model is ``cosquad`` of the documents. It is ``blinn`` if the method's highlights always come from a
+    table.
     """
     return "blinn" if (METHODS | PUBLISHED)[method].needs_table else "cosquad"
 
@@ -56,7 +56,7 @@ def measure(
     height: int = 480,
 ) -> Iterator[tuple[int, "SimulatedFrame", "Comparison"]]:
     """Frames of a mesh by one design, and their errors, for each exponent."""
-    # The simulator takes a second to import, and the designs are listed without it.
+    # These imports take a second, and a list of the designs does not need them.
     from blysk.golden.frames.compare import compare
     from blysk.sim.frames.frame import FrameSimulator
 

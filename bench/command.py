@@ -21,7 +21,7 @@ Part = TypeVar("Part")
 
 
 class _Lines(tqdm):
-    """Progress without a terminal: a line on standard error every `_SECONDS`. Shorter work prints none."""
+    """Progress without a terminal: a line on standard error every `_SECONDS`. Shorter work prints no line."""
 
     def __init__(self, *arguments, **options):
         self._printed = time.monotonic()
@@ -40,7 +40,7 @@ def progress(parts: Iterable[Part] | None = None, *, total: int, unit: str) -> "
     Parameters
     ----------
     parts : iterable, optional
-        The work. The bar then iterates over it. Without it, call ``update`` after each part.
+        Parts of the work. The bar then iterates over them. Without parts, call ``update`` after each part.
     total : int
         Number of the parts.
     unit : str

@@ -16,7 +16,7 @@ _SPOTS = (
     *((1, 2), (1, -2), (-1, 2), (-1, -2), (1, 3), (1, -3), (-1, 3), (-1, -3), (1, 4), (1, -4)),
     *((-1, 4), (-1, -4), (1, 5), (1, -5), (-1, 5), (-1, -5)),
 )
-"""Places of a label as steps to the side and up from its point, nearest first."""
+"""Places of a label, nearest first, as numbers of steps to the side and up from its point."""
 
 
 class Label(NamedTuple):
@@ -44,9 +44,10 @@ class Label(NamedTuple):
 def place_labels(
     axes: Axes, labels: Sequence[Label], points: Sequence[tuple[float, float]] = (), **options: Any
 ) -> int:
-    """Write labels so that they cover neither another label nor a point, in their order.
+    """Write labels in their order. No label covers another label or a point.
 
-    A label at a distance from its point gets a thin line to it. A label without a free place is left out.
+    A label at a distance from its point gets a thin line to the point. A label without a free place is left
+    out.
 
     Parameters
     ----------

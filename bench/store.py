@@ -1,4 +1,4 @@
-"""Measurements that are made once. Results are in the user's cache, by a hash of measurement and code."""
+"""Measurements that are made once. Results are in the user's cache, by a hash of the measurement and code."""
 
 import ast
 import contextlib
@@ -35,7 +35,7 @@ class Task:
     settings : dict
         Values that JSON can hold.
     timed : bool
-        Whether it measures a time. A timed measurement runs alone, in this process.
+        Whether the function measures a time. A timed measurement runs alone, in this process.
     """
 
     function: Callable[..., Any]
@@ -51,8 +51,8 @@ class Task:
     def key(self) -> str:
         """Hash that tells measurements apart.
 
-        The hash covers name, settings, libraries' versions, the code of `golden`, `hdl` and `sim`, and the
-        modules of `bench` that the function's module imports.
+        The hash covers name, settings, versions of libraries, and code. The code is that of `golden`, `hdl`
+        and `sim`, and of the modules of `bench` that the function's module imports.
         """
         file = Path(inspect.getsourcefile(self.function))
         parts = (
@@ -104,9 +104,9 @@ def _digest(result: Any) -> str:
 def results_of(
     tasks: Sequence[Task], executor: Executor | None = None, progress: Callable[[], object] = lambda: None
 ) -> list[Any]:
-    """Results of measurements, in their order. They come from the cache, or are measured now and kept there.
+    """Results of measurements, in their order. Results that the cache does not have are measured now.
 
-    Each result is kept as soon as it is measured, so that a stopped run can continue. A damaged entry is
+    The cache keeps each result as soon as it is measured. So a stopped run can continue. A damaged entry is
     measured again.
 
     Parameters
@@ -114,8 +114,8 @@ def results_of(
     tasks : sequence of Task
         The measurements.
     executor : Executor, optional
-        Workers of the measurements that are not timed. Timed measurements run in this process, one after the
-        other. ``None``: all run in this process.
+        Workers for the measurements that are not timed. Timed measurements run in this process, one after the
+        other. ``None``: all measurements run in this process.
     progress : callable
         Called after each measurement.
 
@@ -138,7 +138,7 @@ def results_of(
 
     def keep(index: int, result: Any) -> None:
         results[index] = result
-        # If the cache fills up or is removed, only the next run takes longer.
+        # If the entry cannot be written, only the next run takes longer.
         with contextlib.suppress(InputError, OSError):
             entry = {"task": tasks[index].name, "settings": tasks[index].settings}
             write_json(paths[index], {**entry, "digest": _digest(result), "result": result})

@@ -13,7 +13,8 @@ def grid(points: np.ndarray, normals: np.ndarray) -> Mesh:
     Parameters
     ----------
     points, normals : float64 arrays, shape (rows, columns, 3)
-        Points, and unit normals at them. The normals point to where rows and columns turn anticlockwise.
+        Points, and unit normals at these points. A normal is on the side of the cross product of the step to
+        the next row and the step to the next column.
     """
     index = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]

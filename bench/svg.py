@@ -23,7 +23,7 @@ STYLE = {"svg.fonttype": "none", "svg.hashsalt": "blysk", "font.family": ["DejaV
 
 
 def _with_classes(text: str) -> str:
-    """The SVG with classes in place of styles that occur more than once."""
+    """The SVG. Styles that occur more than once become classes."""
     found = Counter(re.findall(r' style="([^"]*)"', text))
     names = {style: f"s{k}" for k, (style, uses) in enumerate(found.items()) if uses > 1}
     rules = "".join(f".{name}{{{style}}}\n" for style, name in names.items())

@@ -1,1 +1,1 @@
-"""Commands of this layer: options, their checks, and then the import of what does the work."""
+"""Commands of this layer: options and their checks. Then a command imports the code for its work."""

@@ -67,12 +67,12 @@ class _Name(click.ParamType):
     "times.",
 )
 def command(folder, quick, meshes, names, jobs, address):
-    """Measure error against run time and everything else in the report, and write it into FOLDER.
+    """Measure error against run time and all other figures of the report, and write the report into FOLDER.
 
     The default FOLDER is report. The command makes it, or replaces an earlier report in it. The page
     index.html is one file that any browser opens from disk. Each table is also a CSV file, the drawing of
-    each conclusion is also an SVG file, and report.json has every figure. The cache keeps each measurement:
-    a stopped report continues from there if the code is the same.
+    each conclusion is also an SVG file, and report.json has every figure. The cache keeps each measurement,
+    so a stopped report continues if the code is the same.
 
     \b
     Example:

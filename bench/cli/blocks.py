@@ -47,7 +47,7 @@ def command(samples, seed, jobs, figures):
     lat          cycles from an input to its first result
     int          cycles from one result to the next
     ROM, regs    bits
-    multipliers  3*18: three of 18x18 bits; 1*c: one by a constant
+    multipliers  3*18: three of 18x18 bits; 1*c: a product by a constant
 
     The variant of a bisection is its degree and its widest span in degrees.
 

@@ -62,12 +62,12 @@ _MOST_FRAMES = 60
 def command(context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **_):
     """Show a turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
-    Without --simulate the command makes a bitstream. It first prints how earlier bitstreams for this board
-    came out. Then it prints used and available FPGA resources, and reached and needed clock rates. The exit
+    Without --simulate the command makes a bitstream. It first prints results of earlier bitstreams for this
+    board. Then it prints used and available FPGA resources, and reached and needed clock rates. The exit
     status is 1 if a clock is not met.
 
-    With --simulate it decodes frames from the simulated lanes of the monitor connector. It compares the
-    frames with the bit-accurate model. The exit status is 1 if a frame differs, or if the frames are too
+    With --simulate the command decodes frames from the simulated lanes of the monitor connector. It compares
+    the frames with the bit-accurate model. The exit status is 1 if a frame differs, or if the frames are too
     heavy for 60 Hz.
 
     The buttons of the board stop the motion, reverse it, and change the material and the light.
@@ -119,7 +119,7 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
 
 
 def _recorded(path: str | None) -> dict[str, Any]:
-    """Figures of a JSON file, checked before long work; empty if the file does not exist yet."""
+    """Figures of a JSON file, checked before long work. Empty if the file does not exist yet."""
     if path is None:
         return {}
     check_writable(path)
@@ -133,12 +133,12 @@ def _recorded(path: str | None) -> dict[str, Any]:
 
 
 def _loader() -> str:
-    """The loader's executable.
+    """Path of the executable of openFPGALoader.
 
     Raises
     ------
     InputError
-        If it is not installed.
+        If openFPGALoader is not installed.
     """
     found = shutil.which("openFPGALoader")
     if found is None:

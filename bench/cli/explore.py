@@ -32,7 +32,7 @@ class _Some(click.ParamType):
         return self.name
 
     def convert(self, value, param, ctx):
-        """The values without repetitions; `InputError` if a value is unknown."""
+        """The values without repetitions. `InputError` if a value is unknown."""
         if isinstance(value, tuple):
             return value
         known = {str(one): one for one in self.values}
@@ -137,8 +137,9 @@ def command(mesh, exponent, size, largest, error, cost, limit, jobs, address, fi
     Choices are lists with commas between the values. The sweep has every combination of the choices. If a
     method does not have a choice, the choice is not varied for this method. Errors are in LSB of an 8-bit
     channel of linear light. Cells, multipliers, register bits and memory bits are counted in the netlist,
-    before technology mapping. Cycles are an upper bound for a pixel, from the figures of the units for the
-    scene's spans. bisection has no bound for spans that it divides. Designs with a * are on the Pareto front
+    before technology mapping. Cycles are an upper bound of the cycles a pixel. The bound follows from the
+    figures of the units and the spans of the scene. bisection has no bound for spans that it divides. Designs
+    with a * are on the Pareto front
     of the sweep: no design is better in both error and cost. Several lights stand evenly around the scene.
     The cache keeps earlier results.
 

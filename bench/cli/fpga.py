@@ -49,8 +49,8 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
     type=Whole(1, 1000),
     default=ECP5.target,
     show_default=True,
-    help="Clock rate in MHz that the tools aim at. A target within reach gives a higher rate than one far "
-    "beyond.",
+    help="Clock rate in MHz that the tools aim at. A target within reach gives a higher rate than a target "
+    "far beyond reach.",
 )
 @click.option(
     "--seeds", type=Whole(1, 100), default=SEEDS, show_default=True, help="Placements of each design."
@@ -92,15 +92,15 @@ def command(
 
     \b
     LUT     look-up tables of four inputs, with tables used as carries and memories
-    FF      flip-flops, without those inside multipliers
+    FF      flip-flops outside multipliers
     mult    multipliers of 18x18 bits
     BRAM    block RAMs of 18 Kibit
     LUTRAM  memories of 16x4 bits in look-up tables
 
-    The first line has the parts of the FPGA. Clock rates are in MHz, over the seeds. The slowest path is that
-    of the slowest seed: the delay in cells, the delay between cells, and the registers at its ends. The cache
-    keeps earlier placements. On ECP5 registers beside a multiplier move into it. The tool does not time a
-    multiplier with registers on both sides; a line below the table then says so.
+    The first line has the parts of the FPGA. Clock rates are in MHz, over the seeds. The slowest path is from
+    the slowest seed: the delay in cells, the delay between cells, and the registers at both ends. The cache
+    keeps earlier placements. On ECP5 registers beside a multiplier move into the multiplier. The tool does
+    not time paths between registers on both sides of a multiplier. Lines below the table name these designs.
 
     \b
     Examples:
@@ -128,7 +128,7 @@ def command(
     if unknown:
         raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
     if not units:
-        # Of every method the default stands for all: it serves each core.
+        # With --every-method the options are checked with the default method, because it serves each core.
         built(design(**chosen), build)
     several = build.get("pipes", 1) > 1
     family = DEVICES[family_name] if family_name else ECP5_85F if several else ECP5

@@ -24,8 +24,8 @@ __all__ = ["command"]
 def command(folder, units):
     """Write a page for each unit, with drawings of structure, timing and errors, into FOLDER.
 
-    The default FOLDER is docs/blocks; the command makes it if needed. Pictures that no page has any more are
-    removed; other files stay.
+    The default FOLDER is docs/blocks. The command makes the folder if it does not exist. Pictures that no
+    page has any more are removed. Other files stay.
 
     \b
     Example:

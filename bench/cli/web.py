@@ -15,7 +15,7 @@ __all__ = ["command"]
 
 
 class _Design(click.ParamType):
-    """Type of an option: a method and a model with a stroke between them."""
+    """Type of an option: a method and a model with a slash between them."""
 
     name = "METHOD/MODEL"
 

@@ -52,7 +52,7 @@ class Claim:
     ours : str
         Our replacement of the statement.
     kind, matter : str
-        Kind of an erratum, and a common name of errata about one matter.
+        Kind of an erratum, and a name that all errata about the same matter share.
     timed : bool
         Whether the function measures a time.
     """
@@ -108,7 +108,7 @@ class ClaimTable:
     Parameters
     ----------
     name, title, note : str
-        As for `Table`.
+        As in `Table`.
     claims : callable
         Function that gives the claims of a quick report or of a full report.
     further : dict of str to str
@@ -152,7 +152,7 @@ class Plot:
     tasks : callable
         Function that gives the measurements of a quick report or of a full report.
     draw : callable
-        Makes the drawing from their results.
+        Function that makes the drawing from the results of the measurements.
     """
 
     tasks: Callable[[bool], Sequence[Task]]
@@ -166,11 +166,11 @@ class Document:
     Parameters
     ----------
     name, title, text, appendix
-        As for `Section`. A sentence on the confirmed printed values follows the text.
+        As in `Section`. A sentence about the confirmed printed values follows the text.
     tables : sequence of ClaimTable
-        Tables of its claims.
+        Tables of the document's claims.
     plots : sequence of Plot
-        Its drawings.
+        Drawings of the section.
     """
 
     name: str

@@ -43,7 +43,7 @@ _RELATED = ("cosquad7", "coscos2", "coscos4")
 _X = np.linspace(0, 30, 6001)
 """Values of ``n (1 - cos gamma)``.
 
-The models depend on almost nothing else. Above 30 Blinn's model is under 1e-13.
+The models depend on almost no other quantity. Above 30 Blinn's model is less than 1e-13.
 """
 
 
@@ -168,7 +168,7 @@ PUBLISHED = (
 
 
 def claims(quick: bool) -> list[Claim]:
-    """`PUBLISHED`, and the same measures of related models and of a refitted line, also if quick."""
+    """`PUBLISHED`, and the same measures of related models and of a refitted line. All are there if quick."""
     related = [_of_model(model, key) for model in _RELATED for key in ("absolute", "relative")]
     refitted = Claim(
         "ours", "", _LINE.replace("0.448 n + 0.099", "0.44813 n + 0.10235"), slopes, key="refitted"

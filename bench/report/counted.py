@@ -45,8 +45,10 @@ class Counted(np.ndarray):
 
     @classmethod
     def of(cls, values: np.ndarray, counts: Counter[str]) -> "Counted":
-        """Values whose operations count in ``counts``: multiplications, additions and subtractions (both as
-        additions), divisions, roots, functions, and comparisons.
+        """Values whose operations count in ``counts``.
+
+        The kinds are multiplications, additions, divisions, roots, functions and comparisons. A subtraction
+        counts as an addition.
         """
         counted = np.asarray(values, dtype=np.float64).view(cls)
         counted.counts = counts
@@ -70,7 +72,7 @@ class Counted(np.ndarray):
 
 
 def fastest(actions: Sequence[Callable[[], Any]], repeats: int) -> list[float]:
-    """Least processor time of each of several actions, in seconds. They run in turn, in the same minutes.
+    """Least processor time of each of several actions, in seconds. The actions run in turn.
 
     The time is the sum over all threads. Other processes do not count.
 
@@ -79,7 +81,7 @@ def fastest(actions: Sequence[Callable[[], Any]], repeats: int) -> list[float]:
     actions : sequence of callables
         Actions to time.
     repeats : int
-        Number of runs of each.
+        Number of runs of each action.
     """
     times = [[timed(action, 1)[0].cpu for action in actions] for _ in range(repeats)]
     return np.min(times, axis=0).tolist()

@@ -1,4 +1,4 @@
-"""The design space: pipelines, their errors in a scene, their costs, and the cheapest of them."""
+"""The design space: pipelines, their errors in a scene, their costs, and the cheapest pipelines."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -50,7 +50,7 @@ def errors_of(candidate: Mapping[str, Any], view: Mapping[str, Any], exponent: i
     candidate : dict
         Fields of a `Candidate`.
     view : dict
-        Mesh and size, as for `frames`.
+        Mesh and size, as in `frames`.
     exponent : int
         Exponent of the highlight.
 
@@ -187,7 +187,7 @@ def cheapest(designs: Sequence[Explored], error: str, largest: float, cost: str)
     Parameters
     ----------
     designs, error, cost
-        As for `front_of`.
+        As in `front_of`.
     largest : float
         Limit of the largest error, in LSB.
     """

@@ -26,8 +26,7 @@ FLIP_P99 = 0.05
 FLIP_MAX = 0.10
 CIEDE2000_P99 = 1.0
 CIEDE2000_MAX = 2.3
-"""The verdict's limits for larger errors. A colour difference of 2.3 is about the least noticed difference.
-"""
+"""Limits of the verdict for larger errors. An eye just notices a colour difference of about 2.3."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,9 @@ def perceived(image: np.ndarray, reference: np.ndarray, mask: np.ndarray) -> Per
     """FLIP and CIEDE2000 between two pictures.
 
     Channels are codes of sRGB. FLIP (Andersson and others 2020, LDR) is for a viewer who sees 67 pixels a
-    degree, its default. A pixel's FLIP value depends on its neighbours, also on the background. CIEDE2000 is
-    of each pixel alone, under D65 for the 2 degree observer. Only pixels of the mask count, because the
-    background would make both figures too small.
+    degree, the default of FLIP. The FLIP value of a pixel depends on its neighbours, pixels of the background
+    among them. CIEDE2000 is of each pixel alone, under D65 for the 2 degree observer. Only pixels of the mask
+    count, because the background would make both figures too small.
 
     Parameters
     ----------

@@ -64,9 +64,9 @@ def task(method: str, model: str | None = None, family: str = "ecp5") -> Task:
     Parameters
     ----------
     method, family
-        As for `measure`.
+        As in `measure`.
     model : str, optional
-        As for `measure`; by default `model_of` the method.
+        As in `measure`. The default is `model_of` the method.
     """
     seeds, model = 1, model or model_of(method)
     if method in METHODS and model == model_of(method):
@@ -81,7 +81,7 @@ def tasks(quick: bool) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        Whether there are no tasks.
+        Whether the report is quick. A quick report has no tasks.
     """
     if quick:
         return []

@@ -1,7 +1,7 @@
 """Committed results of place and route: parts and clock rates of pipelines, each with its date.
 
-A quick report reads them here, because placement takes minutes. ``blysk fpga --json FILE`` measures more, and
-``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
+A quick report reads these results, because placement takes minutes. ``blysk fpga --json FILE`` measures
+further designs. ``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
 """
 
 import json
@@ -61,7 +61,10 @@ def merged(
 
 
 def placed(device: str, path: Path = STORE) -> dict[tuple[str, ...], dict[str, Any]]:
-    """Committed figures, with ``fmax_median_mhz``, of pipelines of one light on a device, by `design_of`."""
+    """Committed figures of pipelines with one light on a device, by `design_of`.
+
+    ``fmax_median_mhz`` is added.
+    """
     found = {}
     for entry in read_store(path):
         design = design_of(entry["design"])

@@ -67,7 +67,7 @@ def about(quick: bool, meshes: Sequence[str], names: Sequence[str]) -> dict[str,
     meshes : sequence of str
         Files of further meshes.
     names : sequence of str
-        Names of its sections.
+        Names of the report's sections.
     """
     return {
         "program": "blysk",
@@ -119,7 +119,7 @@ def check_folder(folder: Path) -> None:
     Raises
     ------
     InputError
-        If it is a file, holds other files, or may not be written.
+        If the folder is a file, holds other files, or may not be written.
     """
     names = files_within(folder, PAGE)
     others = [name for name in names if name not in (PAGE, _JSON) and not name.endswith((".csv", ".svg"))]
@@ -238,7 +238,7 @@ def chosen_tasks(
     Parameters
     ----------
     quick, meshes
-        As for `about`.
+        As in `about`.
     names : sequence of str, optional
         Names of the sections, by default all.
 
@@ -272,7 +272,7 @@ def measured(
     progress : callable
         Called after each task.
     address : str, optional
-        As for `measure_all`.
+        As in `measure_all`.
     """
     results = iter(measure_all([task for _, own in chosen for task in own], jobs, progress, address))
     return [module.section(own, [next(results) for _ in own]) for module, own in chosen]

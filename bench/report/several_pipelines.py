@@ -20,7 +20,7 @@ def measure(count: int, meshes: Sequence[str], size: Sequence[int], method: str)
     count : int
         Number of pipelines.
     meshes, method
-        As for `pipes.measure`.
+        As in `pipes.measure`.
     size : sequence of int
         Width and height.
     """
@@ -40,7 +40,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: pixels a cycle, their limits, and whether the pictures equal one pipeline's pictures."""
+    """The section: pixels a cycle, their limits, and whether pictures equal those of a single pipeline."""
     rates = [pipes.Rate(**fields) for result in results for fields in result]
     same = sum(rate.same for rate in rates)
     settings = tasks[0].settings

@@ -22,7 +22,10 @@ def _cases(groups: Mapping[str, Sequence[dict]]) -> Iterator[dict]:
 
 
 def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str, str]:
-    """Largest error in spans without a flag inside the range, cut or served whole; its case and grade."""
+    """Largest error inside the range in spans without a flag, and its case and grade.
+
+    The spans are cut, or served whole.
+    """
     errors = [
         *(
             (of["prepared"]["silent"], of["case"], of["prepared"]["grade"])

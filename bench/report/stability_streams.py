@@ -27,10 +27,13 @@ __all__ = [
 
 
 class _Interrupted(wiring.Component):
-    """A pipeline that takes other spans first, and is reset while they are inside."""
+    """A pipeline that takes other spans first, and is reset while these spans are inside."""
 
     def __init__(self, unit: wiring.Component, before: dict[str, Sequence[int]], cycles: int):
-        """Take the words of ``write`` and ``i`` before the reset, and the cycles until it ends."""
+        """``before`` has the words of ``write`` and ``i`` before the reset.
+
+        ``cycles`` is the number of cycles until the reset ends.
+        """
         super().__init__(dict(unit.signature.members))
         self._unit, self._before, self._cycles = unit, before, cycles
 
@@ -106,7 +109,7 @@ def measure_stream(method: str, quick: bool) -> list[dict[str, Any]]:
     method : str
         One of `METHODS`.
     quick : bool
-        Whether Amaranth's own simulator runs some of the patterns; else compiled RTL runs all.
+        Whether Amaranth's own simulator runs some of the patterns. Else compiled RTL runs all patterns.
 
     Returns
     -------

@@ -12,7 +12,7 @@ __all__ = ["DIVIDED", "SCALED", "SPANS", "WAYS", "WIDEST", "Way", "random_operan
 
 
 SPANS = 4096
-"""Spans that the ways in software compute at once. They are few, so that their arrays stay in a cache."""
+"""Spans that the ways in software compute at a time. They are few, so their arrays stay in a cache."""
 
 WIDEST = 45.0
 
@@ -75,7 +75,10 @@ def _middles_by_factor(left, right, vectors, pixels):
 
 
 def _halves(half, left, right, pixels):
-    """Normals between two normals by bisection, from left to right. ``half(left, right, level)`` halves."""
+    """Normals between two normals by bisection, from left to right.
+
+    ``half(left, right, level)`` is the middle normal of two normals.
+    """
     levels = pixels.bit_length() - 1
 
     def between(left, right, level):

@@ -1,7 +1,7 @@
 """The core of this project beside other cores: rate, device, resources, light per pixel, verification.
 
-The figures of other cores are from their sources (docs/theory/references.md#other-hardware). None was
-measured here. A figure that we did not find in its source is "not found in its source".
+The figures of other cores are from their sources (docs/theory/references.md#other-hardware). None of these
+figures was measured here. A figure that we did not find in its source is "not found in its source".
 """
 
 from blysk.bench.report.claims import Claim, ClaimTable, Document
@@ -116,7 +116,7 @@ def own(method: str, model: str, date: str) -> dict[str, str]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """Statements of the sources of other cores, and of this project, also if quick."""
+    """Statements of the sources of other cores, and of this project. They are the same if quick."""
     found = []
     for quantity, printed in OTHERS.items():
         found += [Claim(f"{CORES[key]} [{key}]", "", quantity, printed=text) for key, text in printed.items()]

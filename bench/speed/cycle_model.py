@@ -15,7 +15,7 @@ from blysk.sim.meshes.teapot import teapot
 __all__ = ["WAITING", "compare", "frame_cycles", "span_cycles", "unit_of"]
 
 _NEVER = -(1 << 40)
-"""Minus infinity of sums of cycles."""
+"""This number stands for minus infinity in sums of cycles."""
 
 WAITING = InterpolatorUnit.room_after
 """`InterpolatorUnit.room_after` of most methods."""
@@ -34,14 +34,14 @@ def span_cycles(length: np.ndarray, interval: np.ndarray, waiting: int = WAITING
 
     ``s_k = max(s_{k-1} + l_{k-1}, r_k)``.
 
-    I_k is its interval, l_k the cycles of its pixels, and w is ``waiting``.
+    I_k is the interval of span k, l_k is the cycles of its pixels, and w is ``waiting``.
 
-    This is a product of matrices in the max-plus algebra, computed in pairs.
+    In the max-plus algebra this is a product of matrices. The product is computed in pairs.
 
     Parameters
     ----------
     length, interval : int arrays, shape (spans,)
-        Cycles of the pixels of each span, and least cycles from the previous span to it.
+        Cycles of the pixels of each span, and least cycles from the previous span to this span.
     waiting : int
         See `WAITING`.
     """
@@ -54,7 +54,10 @@ def span_cycles(length: np.ndarray, interval: np.ndarray, waiting: int = WAITING
 
 
 def _matrices(length: np.ndarray, interval: np.ndarray, waiting: int) -> np.ndarray:
-    """Max-plus matrices from span k - 1 to k of its end, r_k, s_k and s_{k-1}; shape (spans, 4, 4)."""
+    """Max-plus matrices, shape (spans, 4, 4). Matrix k leads from the state of span k - 1 to that of span k.
+
+    The state of span k is the end of its pixels, r_k, s_k and s_{k-1}.
+    """
     found = np.full((len(length), 4, 4), _NEVER, dtype=np.int64)
     found[:, :3, 1] = np.asarray(interval)[:, np.newaxis]
     found[:, :3, 3] = waiting
@@ -65,7 +68,7 @@ def _matrices(length: np.ndarray, interval: np.ndarray, waiting: int) -> np.ndar
 
 
 def _product(matrices: np.ndarray) -> np.ndarray:
-    """Max-plus product of all matrices, the last one leftmost."""
+    """Max-plus product of all matrices. The last matrix is the left factor."""
     while len(matrices) > 1:
         odd = matrices[-1:] if len(matrices) % 2 else matrices[:0]
         early, late = matrices[: len(matrices) - len(odd)].reshape(-1, 2, 4, 4).swapaxes(0, 1)
@@ -77,18 +80,18 @@ def _product(matrices: np.ndarray) -> np.ndarray:
 def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     """Cycles of a frame of one material without stalls, from the first write of a constant to the last pixel.
 
-    The result equals the cycles of a simulation if the interval of spans is constant, and by `compare` for
-    ``quotient``. It is within 3 % for ``chord-local``, ``bisection`` and ``quadratic-eval``, and within 12 %
-    for ``quadratic-horner``.
+    If the interval of spans is constant, the result is equal to the cycles of a simulation. `compare` finds
+    equal cycles for ``quotient``, too. The result is within 3 % of the cycles for ``chord-local``,
+    ``bisection`` and ``quadratic-eval``, and within 12 % for ``quadratic-horner``.
 
     Parameters
     ----------
     unit : ShadingPipelineUnit
-        The pipeline, throughput style.
+        The pipeline in throughput style.
     spans : Spans
-        Spans of the frame, none of them empty.
+        Spans of the frame. No span may be empty.
     writes : int
-        Writes of constants before the frame.
+        Number of writes of constants before the frame.
     """
     length = np.asarray(spans.length, dtype=np.int64) * unit.cycles_per_pixel
     method = unit._interpolator
@@ -97,7 +100,7 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
 
 
 def unit_of(design: ShadingPipeline) -> ShadingPipelineUnit:
-    """The pipeline of a design for its figures only, without the warning that it is never elaborated."""
+    """The pipeline of a design, for its figures only. Amaranth does not warn that it is never elaborated."""
     warnings.simplefilter("ignore", UnusedElaboratable)
     return ShadingPipelineUnit(design)
 

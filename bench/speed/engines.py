@@ -35,7 +35,10 @@ from blysk.sim.meshes.mesh import load_mesh
 __all__ = ["LEAST_LENGTH", "TARGETS", "beats_of_teapot", "main", "measure"]
 
 TARGETS = {"": 5e6, "verilator": 1, "pysim": 200}
-"""Key ``""``: least pixels a second of ``cxxrtl``. Other keys: least ratio of its speed to that engine's."""
+"""Targets of ``cxxrtl``. Key ``""`` has the least pixels a second.
+
+The key of another engine has the least ratio of the speed of ``cxxrtl`` to the speed of this engine.
+"""
 
 LEAST_LENGTH = 16
 """Least length of the spans for measurements of speed, in pixels."""
@@ -53,25 +56,25 @@ def measure(
     """Pixels a second of ``cxxrtl``, ``verilator`` and ``pysim``.
 
     The compiled engine and Verilator's model run in turn, and the fastest run of each counts. The interpreted
-    engine gets the first beats only, since it is much slower.
+    engine gets only the first beats, because it is much slower.
 
     Parameters
     ----------
     unit : ShadingPipelineUnit
         The pipeline.
     beats, write : mapping of field names to arrays
-        As `simulate` takes them; enough beats for some million cycles make a fair measure.
+        As `simulate` takes them. For a fair measure give enough beats for some million cycles.
     repeats : int
-        Runs of the compiled engine and of Verilator's model.
+        Number of runs of the compiled engine and of Verilator's model.
     few : int
-        Beats for the interpreted engine.
+        Number of beats for the interpreted engine.
 
     Raises
     ------
     ValueError
         If an engine or Verilator's model gives other beats or cycles than the compiled engine.
     SimulationError
-        If there is no Verilator, or it fails.
+        If Verilator is not installed or fails.
     """
 
     def run(engine: str, some: Mapping[str, np.ndarray]) -> tuple[float, Run]:
@@ -114,8 +117,8 @@ def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
 def beats_of_teapot(unit: ShadingPipelineUnit, width: int, height: int) -> tuple[Any, Any]:
     """Beats of the spans of at least `LEAST_LENGTH` pixels of a teapot, and the writes of its constants.
 
-    The order is random, from a fixed seed. So the first spans have lengths like all spans, and a short run
-    has about the pixels a second of a long run.
+    The order is random, from a fixed seed. So the lengths of the first spans are like the lengths of all
+    spans. A short run then has about as many pixels a second as a long run.
     """
     scene = scene_for(load_mesh("teapot").mesh, 20, width, height)
     prepared = prepare(scene, unit.model)
@@ -132,7 +135,7 @@ def main(width: int = 4000, height: int = 3000, repeats: int = 5) -> int:
     width, height : int
         Size of the picture whose spans the engines shade.
     repeats : int
-        As for `measure`.
+        As in `measure`.
 
     Returns
     -------

@@ -59,7 +59,7 @@ class Rate:
 
     @property
     def pixels_a_span(self) -> float:
-        """Mean number of pixels of a span. With one span a cycle it is the limit of pixels a cycle."""
+        """Mean number of pixels of a span. A span comes in each cycle, so this limits the pixels a cycle."""
         return self.pixels / self.spans
 
 
@@ -96,6 +96,6 @@ def measure(
 
 
 def times(rates: Sequence[Rate], rate: Rate) -> float:
-    """Ratio of a rate's pixels a cycle to those of one pipeline. NaN if one pipeline was not measured."""
+    """Pixels a cycle over the pixels a cycle of a single pipeline. NaN if this was not measured."""
     ones = [one.cycles for one in rates if (one.mesh, one.pipes) == (rate.mesh, 1)]
     return ones[0] / rate.cycles if ones else float("nan")

