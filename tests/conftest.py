@@ -115,9 +115,8 @@ def pytest_xdist_make_scheduler(config, log):
     return Groups(config, log)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def interrupts():
-    """Interrupts as at a terminal: a shell starts its background jobs with them ignored."""
+def pytest_configure():
+    """Interrupts as at a terminal, of workers too: a shell starts its background jobs with them ignored."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
