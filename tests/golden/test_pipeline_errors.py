@@ -137,9 +137,9 @@ def test_arithmetic_error(exponent, model):
 @pytest.mark.long
 @pytest.mark.parametrize("model", SPECULAR_MODELS[:1])
 @pytest.mark.parametrize("exponent", MEASURED)
-def test_arithmetic_error_of_ten_million_pixels(exponent, model):
+def test_arithmetic_error_of_millions_of_pixels(exponent, model):
     rng = np.random.default_rng(exponent + 1)
-    errors, ill_posed, _ = sweep(rng, 62, 5000, model, exponent)
-    assert len(errors) > 9_900_000
+    errors, ill_posed, _ = sweep(rng, 16, 5000, model, exponent)
+    assert len(errors) > 2_500_000
     check(errors, ill_posed, model, exponent)
     print(f"{model}, n = {exponent}: {errors.max():.3f} LSB, {ill_posed} at the terminator")
