@@ -23,7 +23,7 @@ from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool,
 
 QUICK = (("intensity", "3 lights, compact"),)
 QUICK_BEATS = 2000
-BEATS = {"verilator": 200_000, "icarus": 1000}
+BEATS = {"verilator": 20_000, "icarus": 1000}
 """Of a long run of the default variants."""
 
 FEWER = 1000
